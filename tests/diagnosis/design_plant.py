@@ -9,9 +9,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_bound_now
-from beaver_ftc.diagnosis.detection.filters import note_closest_approach
-from beaver_ftc.diagnosis.expectation import evaluate_design, evaluate_frame
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_uncertainty_bound_now
+from beaver_ftc.diagnosis.detection.filters import update_max_threshold_ratios
+from beaver_ftc.diagnosis.model_prediction import evaluate_bound_and_frame_means, evaluate_design_model
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
@@ -21,24 +21,24 @@ SURFACES = ("aileron", "elevator", "rudder")
 
 
 @kernel
-def believe(frames):
+def evaluate_prediction(frames):
     """What the design model makes of this instant."""
     frame = frames[0]
-    evaluate_design(frame.belief, frame.measured)
-    fill_bound_now(frame.fdi.bound, frame.belief.design, frame.measured, frame.belief.u)
+    evaluate_design_model(frame.prediction, frame.measured)
+    fill_uncertainty_bound_now(frame.fdi.bound, frame.prediction.design, frame.measured, frame.prediction.u)
 
 
 @kernel
 def evaluate(frames):
     """What the design model makes of the frame that ends at this instant."""
     frame = frames[0]
-    evaluate_frame(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+    evaluate_bound_and_frame_means(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
 
 
 @kernel
 def note(frames):
     """How close the residuals have come to their thresholds."""
-    note_closest_approach(frames[0].fdi.bank)
+    update_max_threshold_ratios(frames[0].fdi.bank)
 
 
 def conclude(frames):
@@ -72,7 +72,7 @@ class DesignPlant:
         self.servo = actuators == "servo"
         self.frames = configure_design(scenario, TRAVEL_RAD)
         self.frame, self.fdi = self.frames[0], self.frames[0]["fdi"]
-        self.fdi["bound"]["earth_rate"] = 0.0  # this plant flies over a flat Earth at rest
+        self.fdi["bound"]["earth_rate_rad_s"] = 0.0  # this plant flies over a flat Earth at rest
         self.dt, self.airspeed_mps = 1.0 / rate_hz, airspeed_mps
         self.surface = surface
         self.position = position or (lambda k, u: u * (1 + theta(k)) if theta else u)
@@ -127,11 +127,11 @@ class DesignPlant:
     def _step(self, uncertainty):
         frame = self.frame
         frame["k"], frame["t"] = self.k, self.k * self.dt
-        measured, belief = frame["measured"], frame["belief"]
-        measured["x"], measured["y"], belief["u"] = self.x, self.condition(), self.u
-        belief["commanded"] = self.commanded
-        believe(self.frames)
-        f, G = belief["f"].copy(), belief["G"].copy()
+        measured, prediction = frame["measured"], frame["prediction"]
+        measured["x"], measured["y"], prediction["u"] = self.x, self.condition(), self.u
+        prediction["commanded"] = self.commanded
+        evaluate_prediction(self.frames)
+        f, G = prediction["f"].copy(), prediction["G"].copy()
         phi = self.effect(G)
         frame["accounts"]["guarantee"]["phi"] = phi
         bound = np.maximum(self.fdi["bound"]["eta_bar_now"] - ROUNDING_RAD_S2, 0.0)

@@ -14,12 +14,12 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.detection import likelihood, noise_model, statistical
+from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
     MAX_HYPOTHESES,
-    N_LANES,
-    N_SLOTS,
-    SUPPORTING_SIGN,
+    N_ONSET_SLOTS,
+    N_ONSET_TESTS_PER_GROUP,
+    SUPPORTING_SIGN_BY_KIND,
     Capacity,
     block_dtype,
 )
@@ -32,13 +32,13 @@ TRAVEL_RAD = np.array([[-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]])
 LEVEL_FLIGHT = np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4)  # x, y, u
 
 
-def misread(y, place, error, thin_air_kw=0.0):
+def misread(y, place, error, density_power_error_kw=0.0):
     """y (5,) with a reading of it off, and with dpt as it is then worked out from the same engine's chart."""
     out = y.copy()
     out[place] += error
     density, before = 2.0 * out[3] / out[2] ** 2, 2.0 * y[3] / y[2] ** 2
     power_kw = (y[4] - DPT_0) * y[3] * y[2] / KW_TO_DPT
-    power_kw -= thin_air_kw * (density - before) / SEA_LEVEL_DENSITY_KG_M3
+    power_kw -= density_power_error_kw * (density - before) / SEA_LEVEL_DENSITY_KG_M3
     out[4] = DPT_0 + KW_TO_DPT * power_kw / (out[3] * out[2])
     return out
 
@@ -47,10 +47,10 @@ def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
     block = np.zeros(1, block_dtype(Capacity(105, MAX_HYPOTHESES))).view(np.recarray)[0]
-    block["n"], block["axis"][:n], block["keep"] = n, range(n), keep
-    block["drift"][:n, :n] = drift
-    block["noise"][:n], block["jitter"][:n] = np.square(noise), np.square(jitter)
-    block["P_xx"][:n, :n] = np.diag(block["noise"][:n])
+    block["n_axes"], block["axis"][:n], block["drift_decay_factor"] = n, range(n), keep
+    block["drift_intensity"][:n, :n] = drift
+    block["gyro_noise_variance"][:n], block["model_noise_variance"][:n] = np.square(noise), np.square(jitter)
+    block["P_xx"][:n, :n] = np.diag(block["gyro_noise_variance"][:n])
     block["P_dd"][:n, :n] = prior**2 * np.eye(n)
     return block
 
@@ -58,48 +58,53 @@ def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
 def with_hypotheses(block, *kinds, tolerance=()):
     """The same with hypotheses of these kinds, and regressors of these tolerances."""
     block["n_hypotheses"], block["n_regressors"] = len(kinds), len(tolerance)
-    block["tolerance"][: len(tolerance)] = tolerance
+    block["regressor_tolerance"][: len(tolerance)] = tolerance
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
-        group, lane = divmod(h * N_SLOTS, N_LANES)
-        block["lanes"]["sense"][group, lane : lane + N_SLOTS] = SUPPORTING_SIGN[kind]
+        group, lane = divmod(h * N_ONSET_SLOTS, N_ONSET_TESTS_PER_GROUP)
+        block["onset_tests"]["supporting_sign"][group, lane : lane + N_ONSET_SLOTS] = SUPPORTING_SIGN_BY_KIND[
+            kind
+        ]
     return block
 
 
-def lanes_of(block, name):
-    """What the lanes keep under a name, a copy, (..., lanes)."""
-    return np.concatenate(list(block["overlap"] if name == "overlap" else block["lanes"][name]), axis=-1)
+def onset_tests_of(block, name):
+    """What the onset tests keep under a name, a copy, (..., tests)."""
+    return np.concatenate(
+        list(block["regressor_overlap"] if name == "regressor_overlap" else block["onset_tests"][name]),
+        axis=-1,
+    )
 
 
 def by_onset(block, name):
-    """What the lanes keep under a name, a copy, (..., slots, hypotheses)."""
-    kept = lanes_of(block, name)
-    return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
+    """What the onset tests keep under a name, a copy, (..., slots, hypotheses)."""
+    kept = onset_tests_of(block, name)
+    return kept.reshape(*kept.shape[:-1], -1, N_ONSET_SLOTS).swapaxes(-1, -2)
 
 
 def covariance(block, frames, dt):
     """Of the stacked innovations (frames n,), frame by frame, from the model's very definition."""
-    n = int(block["n"])
+    n = int(block["n_axes"])
     k = np.arange(frames)
-    kept = block["keep"] ** (k[:, None] - k[None, :] - 1) * (
+    kept = block["drift_decay_factor"] ** (k[:, None] - k[None, :] - 1) * (
         k[None, :] < k[:, None]
     )  # of v[column] in d[row]
-    walk = np.kron(dt * kept @ kept.T, block["drift"][:n, :n])
-    constant = np.kron(block["keep"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
+    walk = np.kron(dt * kept @ kept.T, block["drift_intensity"][:n, :n])
+    constant = np.kron(block["drift_decay_factor"] ** np.add.outer(k, k), block["P_dd"][:n, :n])
     difference = (2.0 * np.eye(frames) - np.eye(frames, k=1) - np.eye(frames, k=-1)) / dt**2
-    gyros = np.kron(difference, np.diag(block["noise"][:n]))
-    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["jitter"][:n]))
+    gyros = np.kron(difference, np.diag(block["gyro_noise_variance"][:n]))
+    return constant + walk + gyros + np.kron(np.eye(frames), np.diag(block["model_noise_variance"][:n]))
 
 
 def drawn(block, frames, dt, rng, start=0.0):
     """Innovations (frames, n) rad/s2; start: standard deviation of the drift as they begin."""
-    n = int(block["n"])
-    root = np.linalg.cholesky(block["drift"][:n, :n] + 1e-300 * np.eye(n))
+    n = int(block["n_axes"])
+    root = np.linalg.cholesky(block["drift_intensity"][:n, :n] + 1e-300 * np.eye(n))
     steps = np.sqrt(dt) * rng.standard_normal((frames, n)) @ root.T
     steps[0] = start * rng.standard_normal(n)
-    gyros = np.sqrt(block["noise"][:n]) * rng.standard_normal((frames + 1, n))
-    white = np.sqrt(block["jitter"][:n]) * rng.standard_normal((frames, n))
-    drifts = lfilter([1.0], [1.0, -float(block["keep"])], steps, axis=0)
+    gyros = np.sqrt(block["gyro_noise_variance"][:n]) * rng.standard_normal((frames + 1, n))
+    white = np.sqrt(block["model_noise_variance"][:n]) * rng.standard_normal((frames, n))
+    drifts = lfilter([1.0], [1.0, -float(block["drift_decay_factor"])], steps, axis=0)
     return drifts + white + np.diff(gyros, axis=0) / dt
 
 
@@ -107,12 +112,16 @@ class PlainKalman:
     """The textbook filter of 2n states, rates and drifts, on measured rates."""
 
     def __init__(self, block, dt):
-        n = self.n = int(block["n"])
-        self.F = np.block([[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["keep"] * np.eye(n)]])
+        n = self.n = int(block["n_axes"])
+        self.F = np.block(
+            [[np.eye(n), dt * np.eye(n)], [np.zeros((n, n)), block["drift_decay_factor"] * np.eye(n)]]
+        )
         self.H = np.hstack([np.eye(n), np.zeros((n, n))])
         self.P = block_diag(block["P_xx"][:n, :n], block["P_dd"][:n, :n])
-        self.Q = block_diag(dt**2 * np.diag(block["jitter"][:n]), dt * block["drift"][:n, :n])
-        self.R = np.diag(block["noise"][:n])
+        self.Q = block_diag(
+            dt**2 * np.diag(block["model_noise_variance"][:n]), dt * block["drift_intensity"][:n, :n]
+        )
+        self.R = np.diag(block["gyro_noise_variance"][:n])
         self.x = np.zeros(2 * n)
 
     def step(self, z):
@@ -132,26 +141,26 @@ def filter_all(block, innovations, dt, out):
     """Innovations (k, n) rad/s2 whitened into out (k, 2)."""
     for k in range(len(innovations)):
         likelihood.advance_covariance(block, dt)
-        block.scratch[: block.n] = innovations[k]
-        likelihood.whiten(block, block.state, block.scratch, dt, out[k])
+        block.frame_innovation[: block.n_axes] = innovations[k]
+        likelihood.whiten(block, block.state, block.frame_innovation, dt, out[k])
 
 
 @kernel
-def weigh_all(block, innovations, signatures, regressors, first, keep, has_tolerances, dt):
+def weigh_all(block, innovations, signatures, regressors, first, keep, has_regressors, dt):
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
-            likelihood.reset_onset(block, likelihood.slot_to_reset(first + k))
+            likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(first + k))
         likelihood.advance_covariance(block, dt)
-        block.scratch[: block.n] = innovations[k]
-        likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
+        block.frame_innovation[: block.n_axes] = innovations[k]
+        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.innovation)
         for j in range(block.n_regressors):
             likelihood.whiten(
-                block, block.regressor_state[j], regressors[k, j], dt, block.regressor_response[j]
+                block, block.regressor_filter_state[j], regressors[k, j], dt, block.regressor_response[j]
             )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate_evidence(block, has_tolerances, dt, keep)
+        likelihood.accumulate_evidence(block, has_regressors, dt, keep)
         likelihood.evaluate_hypotheses(block)
 
 
@@ -161,10 +170,10 @@ def bounded_all(block, d, signatures, onset, dt):
     bounded = np.full(3, 0.02)
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
-        block.scratch[: block.n] = d[k]
-        likelihood.whiten(block, block.state, block.scratch, dt, block.innovation)
+        block.frame_innovation[: block.n_axes] = d[k]
+        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.innovation)
         for h in range(block.n_hypotheses):
-            block.hypothesis[h].signature[: block.n] = signatures[k, h]
+            block.hypothesis[h].signature[: block.n_axes] = signatures[k, h]
         likelihood.fill_uncertainty_response(block, bounded, dt)
         if k >= onset:
             likelihood.accumulate_evidence(block, False, dt, 1.0)
@@ -179,8 +188,8 @@ class Detector:
         self.frames = configure_design(scenario, TRAVEL_RAD).view(np.recarray)
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
-        design, declared = frame["belief"]["design"], Declared.of(scenario)
-        noise_model.configure_statistics(
+        design, declared = frame["prediction"]["design"], Declared.of(scenario)
+        statistical.configure_statistical_detector(
             self.fdi, scenario.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz
         )
         self.detector = self.fdi["statistical"]
@@ -195,8 +204,8 @@ class Detector:
         """Healthy ones (frames, 3), as declared."""
         out = np.empty((frames, 3))
         for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
-            out[:, block["axis"][: block["n"]]] = drawn(
-                block, frames, self.dt, rng, likelihood.PRIOR_DRIFT_RAD_S2
+            out[:, block["axis"][: block["n_axes"]]] = drawn(
+                block, frames, self.dt, rng, likelihood.PRIOR_DRIFT_STD_RAD_S2
             )
         return out
 
@@ -212,17 +221,17 @@ class Detector:
 def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
-        blocks, alarm, tests = detector.block, detector.alarm, detector.tests
+        blocks, alarm, tests = detector.block, detector.alarm, detector.test_config
         fill_block_signatures(blocks, Gu[k], cubic[k])
-        bounded, still = detector.noise.bounded, detector.air
+        bounded, still = detector.noise.uncertainty_bound, detector.gust
         statistical.update_blocks(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
         views = detector.views[: detector.n_views]
         statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
-        scores[k] = alarm.score
-        if renew and alarm.score > 1.0:
-            for slot in range(N_SLOTS):
+        scores[k] = alarm.score_over_alarm_level
+        if renew and alarm.score_over_alarm_level > 1.0:
+            for slot in range(N_ONSET_SLOTS):
                 for b in range(detector.block.size):
-                    likelihood.reset_onset(blocks[b], slot)
+                    likelihood.reset_onset_slot(blocks[b], slot)
 
 
 def surfaces_at_work(frames, rate_hz, rng, size=0.3):
@@ -238,5 +247,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = bounds.flow_angle_noise(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return bounds.gust_estimate_noise(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    flow = bounds.level_flow_angle_noise_std(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
+    return bounds.gust_estimate_noise_std_for(flow, design, *LEVEL_FLIGHT[1:], span_m)

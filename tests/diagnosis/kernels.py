@@ -12,13 +12,13 @@ DT, POLES = 0.02, np.array([1e6, 4.0, 0.5])
 
 def new_fdi():
     fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
-    fdi["config"]["dt"], fdi["bank"]["config"]["n"], fdi["bank"]["config"]["decay"][:3] = (
+    fdi["config"]["dt"], fdi["bank"]["config"]["n_filters"], fdi["bank"]["config"]["decay_factor"][:3] = (
         DT,
         3,
         np.exp(-POLES * DT),
     )
     fdi["types"]["config"]["dt"] = DT
-    fdi["isolation"]["config"]["forgetting"], fdi["isolation"]["config"]["decay"] = (
+    fdi["isolation"]["config"]["forgetting_factor"], fdi["isolation"]["config"]["filter_decay"] = (
         0.98,
         np.exp(-np.array([3.0, 4.0, 5.0]) * DT),
     )
@@ -38,8 +38,14 @@ def fill(record, **values):
     return record
 
 
+# Short names of fields, for cases that say a few of them.
+SHORT = {
+    "whole": "is_single_instant", "length": "frames_per_block", "thresholds": "threshold_kind",
+    "memory": "uses_reach_test", "shared": "shares_theta_across_axes", "membership": "narrows_theta_sets",
+    "forgetting": "forgetting_factor", "instants": "n_substeps",
+}  # fmt: skip
 WHERE = {
-    **dict.fromkeys(("enabled", "authority", "every_type", "abrupt", "dt"), "config"),
+    **dict.fromkeys(("enabled", "authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
     **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
     **dict.fromkeys(("eta_bar", "noise"), "bound"),
 }
@@ -48,29 +54,44 @@ WHERE = {
 def put(fdi, **values):
     """Fill fields of the stages' records, by their names alone."""
     for name, value in values.items():
-        if name in fdi["types"]["config"].dtype.names:
-            fdi["types"]["config"][name] = value
+        field = SHORT.get(name, name)
+        if field in fdi["types"]["config"].dtype.names:
+            fdi["types"]["config"][field] = value
         if name in WHERE:
-            fill(fdi[WHERE[name]], **{name: value})
+            fill(fdi[WHERE[name]], **{field: value})
 
 
 # Fields of a surface's records by one name each, for cases that say a few of them.
-_ACTUATOR = (
-    "travel_low", "travel_high", "reach_low", "reach_high", "least_runaway_rate", "approach", "step",
-    "slowest_step",
-)  # fmt: skip
-_OBSERVED = ("command", "low", "high", "anomalous", "effectiveness_variation", "stop_hides")
-_EVIDENCE = ("rest_frames", "unhidden_frames", "started_at", "start_low", "start_high")
+_ACTUATOR = {
+    **{name: name for name in ("travel_low", "travel_high", "reachable_low", "reachable_high")},
+    "min_runaway_rate": "min_runaway_rate",
+    "approach": "lag_share_per_substep", "step": "max_motion_per_substep",
+    "slowest_step": "min_motion_per_substep",
+}  # fmt: skip
+_OBSERVED = {
+    "command": "healthy_position", "low": "position_low", "high": "position_high",
+    **{name: name for name in ("is_anomalous", "effectiveness_variation", "stop_can_hide_deflection")},
+}  # fmt: skip
+_EVIDENCE = (
+    "n_rest_frames",
+    "n_frames_since_stop_could_hide",
+    "first_anomalous_frame",
+    "first_position_low",
+    "first_position_high",
+)
 OF_SURFACE = {
-    **{name: ("actuator", name) for name in _ACTUATOR},
-    **{name: ("elapsed", name) for name in _OBSERVED},
-    **{f"{name}_then": ("judged", name) for name in _OBSERVED},
-    **{f"{name}_before": ("earlier", name) for name in ("low", "high", "anomalous")},
-    "evidence": ("evidence", "frames"),
+    **{name: ("actuator", field) for name, field in _ACTUATOR.items()},
+    **{name: ("last_observation", field) for name, field in _OBSERVED.items()},
+    **{f"{name}_then": ("judged_observation", field) for name, field in _OBSERVED.items()},
+    **{
+        f"{name}_before": ("earlier_observation", _OBSERVED[name]) for name in ("low", "high", "is_anomalous")
+    },
+    "evidence": ("evidence", "n_anomalous_frames"),
     **{name: ("evidence", name) for name in _EVIDENCE},
-    "frames_absent": ("accommodation", "frames_absent"),
-    "in_question": ("status", "is_candidate"), "standing": ("status", "decided_by"),
-    **{name: ("status", name) for name in ("named", "named_at_s", "type", "type_at_s")},
+    "n_frames_absent": ("accommodation", "n_frames_absent"),
+    "in_question": ("status", "is_candidate"), "standing": ("status", "decision_basis"),
+    "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
+    "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),
 }  # fmt: skip
 
 
@@ -94,13 +115,18 @@ def of_stages(fdi, kernel):
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
-        "shared": fdi["isolation"]["config"]["shared"], "abrupt": fdi["config"]["abrupt"],
-        "every_type": fdi["config"]["every_type"],
-        "instants": fdi["config"]["instants"], "bank": fdi["bank"], "fdae": fdi["fdae"],
-        "innovation": fdi["bank"]["output"]["innovation"], "detected": fdi["verdict"]["detected"],
-        "frame_bound": fdi["bound"]["frame"], "noise": fdi["bound"]["noise"], "dt": fdi["config"]["dt"],
-        "statistical_alarm": fdi["statistical"]["alarm"],
-        **({"k": types["frame"] if later else types["frame"] - 1} if whole else {}),
+        **dict.fromkeys(
+            ("shared", "shared_by_axes", "axes_share_theta"),
+            fdi["isolation"]["config"]["shares_theta_across_axes"],
+        ),
+        "abrupt": fdi["config"]["abrupt"], "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
+        "n_substeps": fdi["config"]["n_substeps"], "bank": fdi["bank"], "fdae": fdi["fdae"],
+        "innovation": fdi["bank"]["output"]["innovation"],
+        **dict.fromkeys(("detected", "is_fault_detected"), fdi["verdict"]["detected"]),
+        "frame_bound": fdi["bound"]["frame_innovation_bound"],
+        **dict.fromkeys(("noise", "gyro_change_bound"), fdi["bound"]["gyro_change_bound"]), "dt":
+        fdi["config"]["dt"], "statistical_alarm": fdi["statistical"]["alarm"],
+        **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
     }  # fmt: skip
 
 
@@ -120,10 +146,10 @@ def on(kernel, fdi, *given):
 
 
 def estimator(fdi, kind=LOSS, surface=0, low=-1.0, high=0.0):
-    fdi["isolation"]["config"]["n"] = max(int(fdi["isolation"]["config"]["n"]), 1)
+    fdi["isolation"]["config"]["n_estimators"] = max(int(fdi["isolation"]["config"]["n_estimators"]), 1)
     fie = fdi["isolation"]["estimator"][0]
-    fie["kind"], fie["surface"], fie["low"], fie["high"] = kind, surface, low, high
-    fie["theta_low"], fie["theta_high"] = low, high
+    fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = kind, surface, low, high
+    fie["feasible_theta_min"], fie["feasible_theta_max"] = low, high
     return fie
 
 

@@ -28,44 +28,44 @@ class Statistical:
 
     @staticmethod
     def score(record, t, known=True):
-        tests, blocks, views = record["tests"], record["block"], views_of(record)
+        tests, blocks, views = record["test_config"], record["block"], views_of(record)
         statistical.update_alarm(
-            record["alarm"], tests, blocks, views, record["forces"], record["air"], t, known
+            record["alarm"], tests, blocks, views, record["forces"], record["gust"], t, known
         )
 
     @staticmethod
     def record(record, row):
-        tests, blocks, views = record["tests"], record["block"], views_of(record)
-        statistical.log_scores(tests, blocks, views, record["forces"], record["air"], row)
+        tests, blocks, views = record["test_config"], record["block"], views_of(record)
+        statistical.write_scores_to_log_row(tests, blocks, views, record["forces"], record["gust"], row)
 
     @staticmethod
-    def track_residual_mean(record, surprise, dt):
-        statistical.track_residual_mean(record["block"], record["air"], surprise, dt)
+    def filter_residual_mean(record, surprise, dt):
+        statistical.filter_residual_mean(record["block"], record["gust"], surprise, dt)
 
     @staticmethod
     def unknown_acceleration(record, out):
-        statistical.statistical_unknown_acceleration(record["block"], record["air"], out)
+        statistical.fill_statistical_unknown_acceleration(record["block"], record["gust"], out)
 
     @staticmethod
     def drifts(record, fdi, design, x, y):
-        noise, blocks, air = record["noise"], record["block"], record["air"]
-        statistical.fill_drift_and_jitter(
+        noise, blocks, air = record["noise"], record["block"], record["gust"]
+        statistical.fill_drift_and_model_noise(
             noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"]
         )
 
     @staticmethod
     def prepare(record, fdi, design, x, y, u):
-        parts = (record[name] for name in ("tests", "noise", "block", "air"))
+        parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
         statistical.prepare_tests(*parts, fdi["bound"], design, _measured(x, y), u, fdi["config"]["dt"])
 
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):
-        parts = (record[name] for name in ("tests", "noise", "block", "air"))
-        statistical.accumulate_test_substep(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
+        parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
+        statistical.add_instant_to_tests(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
 
     @staticmethod
     def shows(fdi, surface):
-        tests, blocks = fdi["statistical"]["tests"], fdi["statistical"]["block"]
+        tests, blocks = fdi["statistical"]["test_config"], fdi["statistical"]["block"]
         return statistical.confirms_loss(
             tests, blocks, fdi["isolation"]["estimator"], fdi["layout"]["loss_estimator"], surface
         )
@@ -73,7 +73,7 @@ class Statistical:
     @staticmethod
     def excludes(fdi, surface, ends):
         tests, blocks, loss_estimator = (
-            fdi["statistical"]["tests"],
+            fdi["statistical"]["test_config"],
             fdi["statistical"]["block"],
             fdi["layout"]["loss_estimator"],
         )
@@ -93,27 +93,27 @@ class Across:
 
     @staticmethod
     def part(fdi, view, innovation, i):
-        parts = (fdi["statistical"][name] for name in ("forces", "air", "inertial_air"))
+        parts = (fdi["statistical"][name] for name in ("forces", "gust", "inertial_gust"))
         return parity.innovation_component(view, *parts, innovation, i)
 
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return parity.set_direction(view, record["forces"], record["air"], fdi["bound"], G)
+        return parity.set_view_direction(view, record["forces"], record["gust"], fdi["bound"], G)
 
     @staticmethod
     def uses_gust_estimate(record, view):
-        return parity.uses_gust_estimate(view, record["air"])
+        return parity.uses_gust_estimate(view, record["gust"])
 
     @staticmethod
     def blur(view, record, V):
-        parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
+        parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
         parity.set_view_noise(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
         view["column_leak"] = share
-        parts = (fdi["statistical"][name] for name in ("block", "forces", "air", "inertial_air"))
+        parts = (fdi["statistical"][name] for name in ("block", "forces", "gust", "inertial_gust"))
         parity.fill_view_regressors(view, *parts, innovation)
 
     @staticmethod
@@ -123,38 +123,42 @@ class Across:
     @staticmethod
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
-        views, tests = views_of(record), record["tests"]
-        parity.update_directions(views, record["forces"], record["air"], bound, G, Gu)
-        parts = (record[name] for name in ("noise", "block", "forces", "air", "inertial_air"))
-        parity.project_innovation(views, int(tests["has_tolerances"]), *parts, innovation, y[2])
-        parity.update_views(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
+        views, tests = views_of(record), record["test_config"]
+        parity.update_view_directions(views, record["forces"], record["gust"], bound, G, Gu)
+        parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
+        parity.project_innovation(views, int(tests["has_regressors"]), *parts, innovation, y[2])
+        parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
-    def is_sensitive_to(fdi, view, s, column):
-        return parity.is_sensitive_to(view, fdi["statistical"]["forces"], s, column)
+    def is_view_sensitive_to_fault(fdi, view, s, column):
+        return parity.is_view_sensitive_to_fault(view, fdi["statistical"]["forces"], s, column)
 
     @staticmethod
     def shown(record, view):
-        return parity.confirmed_score(
-            view, views_of(record), record["tests"], record["forces"], record["air"]
+        return parity.vane_confirmed_score(
+            view, views_of(record), record["test_config"], record["forces"], record["gust"]
         )
 
     @staticmethod
     def alarm(record, view):
-        return parity.alarm_score(view, views_of(record), record["tests"], record["forces"], record["air"])
+        return parity.alarm_score(
+            view, views_of(record), record["test_config"], record["forces"], record["gust"]
+        )
 
     @staticmethod
     def excludes(fdi, s):
         record, column = (
             fdi["statistical"],
-            fdi["isolation"]["estimator"]["effect"]["Z"][fdi["layout"]["position_estimator"][s]],
+            fdi["isolation"]["estimator"]["effect"]["regressor"][fdi["layout"]["position_estimator"][s]],
         )
         views = views_of(record)
-        return parity.excludes_surface(views, record["tests"], record["forces"], record["air"], s, column)
+        return parity.excludes_surface(
+            views, record["test_config"], record["forces"], record["gust"], s, column
+        )
 
 
 def put(record, **fields):
     """Write loose numbers where they belong: tests, noise, alarm."""
     for name, value in fields.items():
-        (part,) = [part for part in ("tests", "noise", "alarm") if name in record[part].dtype.names]
+        (part,) = [part for part in ("test_config", "noise", "alarm") if name in record[part].dtype.names]
         record[part][name] = value

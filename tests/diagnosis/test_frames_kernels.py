@@ -29,20 +29,23 @@ def summed(pole_keeps, inputs):
 @pytest.mark.parametrize("kind", ["random", "push"])
 def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
     flown = plant().fly(30, UNCERTAINTIES[kind])
-    fdi, n = flown.fdi, int(flown.fdi["bank"]["config"]["n"])
+    fdi, n = flown.fdi, int(flown.fdi["bank"]["config"]["n_filters"])
     missed, bounds = np.array(flown.innovations[:-1]), np.array(flown.bounds[:-1]) + ROUNDING_RAD_S2
     assert not fdi["verdict"]["detected"]
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(missed[-1])
-    keeps = fdi["bank"]["config"]["decay"][:n]
+    keeps = fdi["bank"]["config"]["decay_factor"][:n]
     assert fdi["bank"]["output"]["residual"][:n] == pytest.approx(summed(keeps, missed))
     assert fdi["bank"]["output"]["threshold"][:n] == pytest.approx(summed(keeps, bounds))
     for i in range(3):
-        keep = fdi["fdae"]["config"]["decay"][i]
+        keep = fdi["fdae"]["config"]["decay_factor"][i]
         assert fdi["fdae"]["output"]["residual"][i] == pytest.approx(summed(keep, missed[:, [i]])[0])
         assert fdi["fdae"]["output"]["threshold"][i] == pytest.approx(summed(keep, bounds[:, [i]])[0])
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["isolation"]["estimator"]["xhat"].any()
-    assert ((fdi["bank"]["output"]["closest"][:n] > 0.0) & (fdi["bank"]["output"]["closest"][:n] < 1.0)).all()
+    assert (
+        (fdi["bank"]["output"]["max_threshold_ratio_so_far"][:n] > 0.0)
+        & (fdi["bank"]["output"]["max_threshold_ratio_so_far"][:n] < 1.0)
+    ).all()
 
 
 @pytest.mark.parametrize("surface", [AILERON, ELEVATOR, RUDDER])
@@ -52,7 +55,7 @@ def test_an_alarm_is_of_the_frame_in_which_a_residual_leaves_its_bound(surface):
     for _ in range(40):
         flown.fly(1, exactly)
         bank = flown.fdi["bank"]
-        n = int(bank["config"]["n"])
+        n = int(bank["config"]["n_filters"])
         seen.append((np.abs(bank["output"]["residual"][:n]) > bank["output"]["threshold"][:n]).any(axis=0))
         if flown.fdi["verdict"]["detected"]:
             break
@@ -65,8 +68,8 @@ def test_an_alarm_is_of_the_frame_in_which_a_residual_leaves_its_bound(surface):
     fie = flown.fdi["isolation"]["estimator"][surface]
     assert fie["xhat"] == pytest.approx(flown.frame["measured"]["x"])
     assert not fie["excluded"]
-    assert fie["covariance"] == pytest.approx([1.0 / 12.0] * 3)
-    assert not fie["omega"].any()
+    assert fie["theta_variance"] == pytest.approx([1.0 / 12.0] * 3)
+    assert not fie["filtered_regressor"].any()
 
 
 def loss_flown(surface, kind=exactly, frames=60, **fdi):
@@ -79,10 +82,10 @@ def loss_flown(surface, kind=exactly, frames=60, **fdi):
         if verdict["detected"]:
             asked = fie["ignored_axes"] == 0
             room = 1e-12
-            assert (fie["lower"] - room <= fie["residual"])[asked].all()
-            assert (fie["residual"] <= fie["upper"] + room)[asked].all()
-            assert (fie["low"] <= fie["theta"]).all()
-            assert (fie["theta"] <= fie["high"]).all()
+            assert (fie["lower_threshold"] - room <= fie["residual"])[asked].all()
+            assert (fie["residual"] <= fie["upper_threshold"] + room)[asked].all()
+            assert (fie["theta_min"] <= fie["theta"]).all()
+            assert (fie["theta"] <= fie["theta_max"]).all()
     return flown
 
 
@@ -92,11 +95,11 @@ def test_the_estimator_of_the_true_loss_stays_and_is_named_once_it_is_alone(surf
     flown = loss_flown(surface, exactly if kind == "none" else UNCERTAINTIES[kind])
     verdict, fies = (
         flown.fdi["verdict"],
-        flown.fdi["isolation"]["estimator"][: int(flown.fdi["isolation"]["config"]["n"])],
+        flown.fdi["isolation"]["estimator"][: int(flown.fdi["isolation"]["config"]["n_estimators"])],
     )
     left = np.flatnonzero(fies["excluded"] == 0)
     assert surface in left
-    assert verdict["isolated"] == (surface if len(left) == 1 else -1)
+    assert verdict["isolated_estimator"] == (surface if len(left) == 1 else -1)
     if len(left) == 1:
         gone = np.delete(fies["excluded_at_s"], surface)
         assert verdict["isolated_at_s"] == pytest.approx(gone.max())
@@ -112,8 +115,8 @@ def test_an_estimator_filters_what_its_fault_does_not_explain():
         if verdict["detected"]:
             alarm = round(float(verdict["detected_at_s"]) * RATE_HZ)
             moments = np.array(flown.innovations[alarm:k]).reshape(-1, 3) / THETA
-            omega = summed(flown.fdi["isolation"]["config"]["decay"][ELEVATOR], moments)
-            assert fie["omega"] == pytest.approx(omega, abs=1e-15)
+            omega = summed(flown.fdi["isolation"]["config"]["filter_decay"][ELEVATOR], moments)
+            assert fie["filtered_regressor"] == pytest.approx(omega, abs=1e-15)
             assert fie["residual"] == pytest.approx(omega * (THETA - fie["theta"]), abs=1e-12)
             steps.append(np.abs(fie["residual"]).max())
     assert len(steps) > 40
@@ -134,7 +137,10 @@ def test_what_is_known_of_a_fault_is_expected_from_the_alarm_on(known, whole_cla
         if flown.fdi["verdict"]["detected"] and known:
             control["surfaces"]["output"]["effectiveness"][ELEVATOR] = 0.0 if whole_class else 1.0 + THETA
             control["surfaces"]["output"]["offset"][ELEVATOR] = stuck_at if whole_class else 0.0
-    left = flown.frame["belief"]["expected"] - flown.frame["belief"]["means"]["acceleration"]
+    left = (
+        flown.frame["prediction"]["acceleration_with_known_faults"]
+        - flown.frame["prediction"]["frame_means"]["acceleration"]
+    )
     phi = np.array(flown.innovations[-2])
     assert np.abs(phi).max() > 0.05
     assert left == pytest.approx(phi if known else 0.0 * phi, abs=1e-12)
@@ -159,8 +165,8 @@ def test_of_faults_of_every_kind_the_true_position_is_never_excluded(name, surfa
         assert not flown.position_excluded(surface)
     verdict = flown.fdi["verdict"]
     assert verdict["detected"]
-    assert verdict["lead"] in (-1, surface)
-    named = int(verdict["isolated"])
+    assert verdict["accommodated_surface"] in (-1, surface)
+    named = int(verdict["isolated_estimator"])
     assert named == -1 or flown.fdi["isolation"]["estimator"]["surface"][named] == surface
     if name != "oscillation" or surface != RUDDER:
         assert (

@@ -1,8 +1,10 @@
-"""A new fault type is a row of two tables, what happens and what tells it: the package with both, in a copy.
+"""A new fault type is a row of two tables, what happens and what tells it: the packages with both, in a copy.
 
-Two are added that are not like those there: one of a constant parameter, and one with memory.
+Two are added that are not like those there: one of a constant parameter, and one with memory. That the latter
+is excluded has a certificate, which the checker of the checkout accepts if it is true.
 """
 
+import copy
 import json
 import os
 import shutil
@@ -11,11 +13,13 @@ import sys
 from filecmp import dircmp
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import beaver_ftc
 import needs
-from beaver_ftc.diagnosis.types import contract, registry
+from beaver_ftc.diagnosis import types
+from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.files import data_root
 from fault_kinds import DOWN, UP
 
@@ -27,20 +31,20 @@ REVERSED = '''
 """A surface rigged the wrong way round: p = -u."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types.contract import EMPTY_SET, UNLIMITED_SET, FaultType
+from beaver_ftc.diagnosis.types import EMPTY_SET, UNLIMITED_SET, FaultType
 
 
 @kernel
-def judge(config, surface, kind, k):
+def consistent_interval(config, surface, type_index, k):
     """Whether the mirrored command explains this frame."""
-    seen = surface.judged
-    return UNLIMITED_SET if seen.low <= -seen.command <= seen.high else EMPTY_SET
+    seen = surface.judged_observation
+    return UNLIMITED_SET if seen.position_low <= -seen.healthy_position <= seen.position_high else EMPTY_SET
 
 
 @kernel
-def deflection(config, surface, kind, k):
+def deflection(config, surface, type_index, k):
     """The mirrored command."""
-    return -surface.elapsed.command, -surface.elapsed.command
+    return -surface.last_observation.healthy_position, -surface.last_observation.healthy_position
 
 
 def estimate(fdi, s, kind):
@@ -48,7 +52,12 @@ def estimate(fdi, s, kind):
     return -1.0
 
 
-TYPES = (FaultType(name="reversed", constant=True, judge=judge, deflection=deflection, estimate=estimate),)
+TYPES = (
+    FaultType(
+        name="reversed", has_constant_parameter=True, consistent_interval=consistent_interval,
+        possible_deflection=deflection, estimate=estimate,
+    ),
+)  # fmt: skip
 '''
 # A servo whose feedback wears: both the fault and the set of its parameter have a memory.
 WEARS = '''
@@ -59,7 +68,7 @@ from typing import Literal
 
 from beaver_ftc.documents.document import Number, entry, number
 from beaver_ftc.scenario.airframe import Actuator
-from beaver_ftc.scenario.faults.base import Button, Past, Properties, Switched, constant
+from beaver_ftc.scenario.faults import Button, Past, Properties, Switched, constant
 
 
 class Overdrive(Switched):
@@ -87,23 +96,30 @@ WORN = '''
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.isolation import consistent_parameters
-from beaver_ftc.diagnosis.types.contract import EMPTY_SET, SUBTRACT_OFFSET, UNLIMITED_SET, FaultType
+from beaver_ftc.diagnosis.types import (
+    EMPTY_SET,
+    SUBTRACT_OFFSET,
+    UNLIMITED_SET,
+    DeflectionRelation,
+    FaultType,
+)
 
 MOST = 2.0
 
 
 @kernel
-def begin(surface, kind):
+def reset_memory(surface, type_index):
     """It does what it is told."""
     surface.overdrive.least = 1.0
 
 
 @kernel
-def judge(config, surface, kind, k):
+def consistent_interval(config, surface, type_index, k):
     """A factor explains this frame that is no smaller than one that was needed before."""
-    low, high, worn = surface.judged.low, surface.judged.high, surface.overdrive
+    seen, worn = surface.judged_observation, surface.overdrive
+    low, high = seen.position_low, seen.position_high
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = consistent_parameters(middle, slack, surface.judged.command, worn.least, MOST)
+    low, high = consistent_parameters(middle, slack, seen.healthy_position, worn.least, MOST)
     if low > high:
         return EMPTY_SET
     worn.least = max(worn.least, low)
@@ -117,8 +133,12 @@ def estimate(fdi, s, kind):
 
 TYPES = (
     FaultType(
-        name="overdrive", constant=False, rank=5, begin=begin, judge=judge, record="overdrive",
-        memory=record(least=float), accommodation=SUBTRACT_OFFSET, estimate=estimate,
+        name="overdrive", has_constant_parameter=False, sort_rank=5, reset_memory=reset_memory,
+        consistent_interval=consistent_interval, record_name="overdrive",
+        memory_dtype=record(least=float), accommodation_mode=SUBTRACT_OFFSET, estimate=estimate,
+        deflection_relation=DeflectionRelation(
+            1.0, theta_is_share=True, theta_range=lambda low, high: (0.0, MOST - 1.0)
+        ),
     ),
 )  # fmt: skip
 '''
@@ -127,7 +147,7 @@ KNOWN = """
 import json
 from beaver_ftc.cli.catalogue import _available
 from beaver_ftc.results.metrics import faults_of
-from beaver_ftc.scenario.faults.base import Past
+from beaver_ftc.scenario.faults import Past
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, scenario_of
@@ -149,6 +169,19 @@ from beaver_ftc_live.page.session import fault_types
 live = fault_types()
 print(json.dumps([live["breaks"][-1], live["sizes"]["overdrive"]]))
 """
+# A jam, which excludes the type.
+CERTIFIED = """
+import json
+import beaver_ftc as bf
+jam = dict(
+    name="jam", duration_s=1.2, rate_hz=50, fdi=dict(fault_class="all"),
+    reference={axis: [dict(sine=dict(amplitude_deg_s=3, frequency_hz=0.3))] for axis in "pqr"},
+    faults=[dict(actuator="aileron", type="stuck", position_deg=5, at_s=0.5)],
+)
+proof = bf.fly(jam).proof()
+log = {name: [float(value) for value in column] for name, column in proof.log.items()}
+print(json.dumps([proof.certificate, log, proof.scenario]))
+"""
 FLIGHT = """
 import sys
 sys.path.insert(0, {folder!r})
@@ -168,8 +201,8 @@ PROMISE = """
 import sys, json
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
-from beaver_ftc.diagnosis.types.registry import kind_of
-KIND = kind_of("overdrive", constant=False)
+from beaver_ftc.diagnosis.types.registry import type_index_of
+KIND = type_index_of("overdrive", has_constant_parameter=False)
 
 def worn(sign):
     past = dict(travel=0.0, last=0.0)
@@ -186,8 +219,8 @@ def flown(name, sign):
     for _ in range(130):
         plant.fly(1, UNCERTAINTIES[name])
         surface = plant.fdi["types"]["surface"][0]
-        excluded += surface["feasible"]["excluded"][KIND] or plant.position_excluded(0)
-        judged = int(surface["evidence"]["frames"])
+        excluded += surface["feasible_sets"]["excluded"][KIND] or plant.position_excluded(0)
+        judged = int(surface["evidence"]["n_anomalous_frames"])
     return int(excluded), judged
 
 print(json.dumps(dict(worn=[flown(name, 1.0) for name in UNCERTAINTIES], heals=flown("random", -1.0))))
@@ -195,42 +228,43 @@ print(json.dumps(dict(worn=[flown(name, 1.0) for name in UNCERTAINTIES], heals=f
 SCENARIO = """
 import json
 import beaver_ftc as bf
-def flown(law):
+def flown(law, duration_s):
     return bf.fly(dict(
-        name="worn", duration_s=13.5, rate_hz=25, fdi=dict(fault_class="all"), control=dict(law=law),
+        name="worn", duration_s=duration_s, rate_hz=25, fdi=dict(fault_class="all"), control=dict(law=law),
         reference=dict(p=[dict(sine=dict(amplitude_deg_s=6, frequency_hz=0.3))]),
         faults=[dict(actuator="aileron", type="overdrive", growth_per_deg=0.02, at_s=2)],
         expect=dict(isolated_as="aileron", isolated_type="overdrive"),
     ))
-flights = [flown(law) for law in ("fault-tolerant", "nominal")]
+flights = [flown("fault-tolerant", 10.5), flown("nominal", 5.0)]
 print(json.dumps([flights[0].metrics, flights[1].metrics, str(flights[0])]))
 """
 
 
 def copied(root, **modules):
-    """A copy of the packages with a module more in each of the two tables; runs a text there."""
+    """A copy of the packages with a module more in each of the two tables; runs texts there as one."""
     for package in PACKAGES:
-        shutil.copytree(SOURCE / package, root / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(SOURCE / package, root / package)
     for folder in ("aircraft", "scenarios"):
         shutil.copytree(data_root() / folder, root / "beaver_ftc" / "data" / folder)
     for place, text in modules.items():
         (root / "beaver_ftc" / place).write_text(text)
 
-    def printed(text):
+    def printed(*texts):
         done = subprocess.run(
-            [sys.executable, "-c", text],
+            [sys.executable, "-c", "\n".join(texts)],
             env={**os.environ, "PYTHONPATH": str(root), "NUMBA_DISABLE_JIT": "1"},
             capture_output=True,
             text=True,
             check=True,
         )
-        return done.stdout
+        return done.stdout.splitlines()
 
     return printed
 
 
 SOURCE = Path(beaver_ftc.__path__[0]).parent
-PACKAGES = [name for name in ("beaver_ftc", "beaver_ftc_live") if (SOURCE / name).is_dir()]
+ALL_PACKAGES = "beaver_ftc", "beaver_ftc_live", "beaver_ftc_assurance"
+PACKAGES = [name for name in ALL_PACKAGES if (SOURCE / name).is_dir()]
 OVERDRIVE = {IN_FAULTS.format("wear"): WEARS, IN_TABLE.format("wear"): WORN}
 
 
@@ -243,6 +277,15 @@ def root(tmp_path_factory):
 def in_a_copy(root):
     """The copy with the type that has a memory."""
     return copied(root, **OVERDRIVE)
+
+
+@pytest.fixture(scope="module")
+def found(in_a_copy):
+    """What the texts find in that copy."""
+    texts = {"flights": SCENARIO, "known": KNOWN}
+    if "beaver_ftc_live" in PACKAGES:
+        texts["page"] = PAGE
+    return dict(zip(texts, map(json.loads, in_a_copy(*texts.values())), strict=True))
 
 
 def differing(one, other):
@@ -263,8 +306,8 @@ def test_a_type_with_memory_is_two_files(in_a_copy, root):
     assert len(OVERDRIVE) <= 2
 
 
-def test_it_is_injected_named_accommodated_and_put_in_words(in_a_copy):
-    tolerant, nominal, said = json.loads(in_a_copy(SCENARIO))
+def test_it_is_injected_named_accommodated_and_put_in_words(found):
+    tolerant, nominal, said = found["flights"]
     isolation = tolerant["isolation"]
     assert (isolation["fault"], isolation["type"]) == ("aileron", "overdrive")
     assert isolation["correct"] is isolation["type_correct"] is True
@@ -279,7 +322,7 @@ def test_it_is_injected_named_accommodated_and_put_in_words(in_a_copy):
 
 def test_it_is_never_excluded_while_it_acts(in_a_copy):
     """And is, where the excess over the command shrinks: the set has a memory."""
-    found = json.loads(in_a_copy(PROMISE.format(folder=str(HERE))))
+    found = json.loads(*in_a_copy(PROMISE.format(folder=str(HERE))))
     assert [excluded for excluded, _ in found["worn"]] == [0] * len(found["worn"])
     assert sum(judged > 20 for _, judged in found["worn"]) > 2  # some uncertainties hide it
     assert found["heals"][0] > 0
@@ -287,11 +330,11 @@ def test_it_is_never_excluded_while_it_acts(in_a_copy):
 
 def test_a_type_of_a_constant_parameter_is_found_and_named(tmp_path):
     printed = copied(tmp_path, **{IN_TABLE.format("backwards"): REVERSED})
-    assert printed(FLIGHT.format(folder=str(HERE))).split() == ["rudder", "reversed", "-1.0"]
+    assert printed(FLIGHT.format(folder=str(HERE))) == ["rudder reversed -1.0"]
 
 
-def test_scenario_documents_matrix_and_list_know_it(in_a_copy):
-    *said, known = json.loads(in_a_copy(KNOWN))
+def test_scenario_documents_matrix_and_list_know_it(found):
+    *said, known = found["known"]
     assert known is True
     assert said == [
         "The surface moves too far, the more so the more it has moved.", "overdrive",
@@ -300,27 +343,107 @@ def test_scenario_documents_matrix_and_list_know_it(in_a_copy):
 
 
 @needs.command("live")
-def test_the_live_page_knows_it(in_a_copy):
+def test_the_live_page_knows_it(found):
     button = ["wear", {"type": "overdrive", "growth_per_deg": 0.02}]
-    assert json.loads(in_a_copy(PAGE)) == [button, ["by", "%"]]
+    assert found["page"] == [button, ["by", "%"]]
+
+
+@pytest.fixture(scope="module")
+def certified(in_a_copy):
+    """Certificate, log and text of the scenario of a flight in which the new type is excluded."""
+    certificate, log, scenario = json.loads(*in_a_copy(CERTIFIED))
+    return certificate, {name: np.array(column) for name, column in log.items()}, scenario
+
+
+def check_certificate():
+    """The checker, which is not of the copy."""
+    from beaver_ftc_assurance.certificates import check_certificate
+
+    return check_certificate
+
+
+def refused(certificate, log, scenario):
+    """Why the checker refuses it."""
+    from beaver_ftc_assurance.certificates.certificate import with_digest
+
+    return [*check_certificate().failures(with_digest(certificate), log, scenario)]
+
+
+def statement(certificate, what):
+    (said,) = (said for said in certificate["statements"] if said["what"] == what)
+    return said
+
+
+FORGED = {
+    "sides": "the stated sides are not the recomputed ones",
+    "range": "most is not the end of theta's range in the log",
+    "one number": "theta of this type is not one number",
+    "event": "the log has no column aileron_stuck_excluded: it was not written with this certificate",
+    "definition": "neither this checker nor the log says what overdrive is",
+}
+
+
+@needs.service("proof")
+def test_that_it_is_excluded_is_certified(certified):
+    """The checker does not know the type: the log says what it is, and its effect is (0 to 1) times G u."""
+    certificate, log, _ = certified
+    said = statement(certificate, "aileron overdrive")
+    assert refused(*certified) == []
+    (line,) = (line for line in check_certificate().sentences(certificate, log) if "overdrive" in line)
+    assert line.startswith("aileron overdrive excluded at")
+    assert "overdrive being what the log defines" in line
+    assert log["aileron_overdrive_excluded"][said["frame"]] == 1.0
+    defined = {name: set(log[f"aileron_overdrive_{name}"]) for name in (
+        "gain", "theta_is_share", "theta_is_constant", "theta_low", "theta_high",
+    )}  # fmt: skip
+    assert defined == {
+        "gain": {1.0}, "theta_is_share": {1.0}, "theta_is_constant": {0.0}, "theta_low": {0.0},
+        "theta_high": {1.0},
+    }  # fmt: skip
+    (term,) = said["terms"]
+    k, d = term["frame"], np.array(term["d"])
+    x, model, of_position = (
+        np.array([log[column.format(axis)] for axis in "pqr"])
+        for column in ("{}_measured_rad_s", "{}_design_rad_s2", "fie_aileron_position_{}_offset_rad_s2")
+    )
+    innovation = d @ ((x[:, k] - x[:, k - 1]) * 50.0 - model[:, k])
+    assert innovation > max(0.0, d @ -of_position[:, k])
+
+
+@needs.service("proof")
+@pytest.mark.parametrize(("forged", "says"), FORGED.items())
+def test_a_forged_certificate_of_it_is_refused(certified, forged, says):
+    certificate, log, scenario = copy.deepcopy(certified)
+    said = statement(certificate, "aileron overdrive")
+    if forged == "sides":
+        said["sides"][1] *= 0.5
+    elif forged == "range":
+        said |= {"least": 0.0, "most": 0.5}
+    elif forged == "one number":
+        said["theta"] = "constant while it shows"
+    elif forged == "event":
+        said |= {"what": "aileron stuck", "column": "aileron_stuck_excluded"}
+    else:
+        del log["aileron_overdrive_gain"]
+    assert [why.partition(": ")[2] for why in refused(certificate, log, scenario)] == [says]
 
 
 def test_every_type_keeps_the_contract():
     for row in registry.TYPES:
-        assert callable(row.judge)
-        assert row.deflection is not contract.within_reach or not row.constant
-        assert bool(row.memory) == bool(row.record)
+        assert callable(row.consistent_interval)
+        assert row.possible_deflection is not types.reachable_range or not row.has_constant_parameter
+        assert bool(row.memory_dtype) == bool(row.record_name)
 
 
 def test_types_of_a_constant_parameter_come_first():
-    constant = [row.constant for row in registry.TYPES]
+    constant = [row.has_constant_parameter for row in registry.TYPES]
     assert constant == sorted(constant, reverse=True)
-    assert sum(constant) == registry.N_CONSTANT
+    assert sum(constant) == registry.N_CONSTANT_TYPES
 
 
 def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():
     """The order of every array of types, of lists and of candidates in a verdict."""
-    assert [(row.name, row.constant) for row in registry.TYPES] == [
+    assert [(row.name, row.has_constant_parameter) for row in registry.TYPES] == [
         ("loss_of_effectiveness", True), ("stuck", True), ("float", True), ("hardover", True),
         ("hardover", True), ("bias", True), ("loss_of_effectiveness", False), ("oscillatory", False),
         ("rate_limit", False), ("bias", False),

@@ -1,4 +1,4 @@
-"""An alarm can be recomputed from the log alone, by the recursions that theory.md states (section 3)."""
+"""An alarm can be recomputed from the log alone, by the recursions of detection.md."""
 
 from math import exp, log, pi, radians
 
@@ -28,7 +28,7 @@ def filtered(decay, inputs, first=0.0):
 
 
 def changing_error(rate):
-    """n of theory, section 2, for GYRO."""
+    """n of detection.md, "Changing error of a gyro", for GYRO."""
     offset = LIMIT_SIGMA * SIGMA + BIAS
     return offset - BIAS + SLOPE * (abs(rate) + (offset + SLOPE * abs(rate)) / (1.0 - SLOPE))
 
@@ -43,8 +43,8 @@ def recomputed(memory, axis, pole, dt, errors=False):
     return filtered(decay, dt * innovation), bound
 
 
-def poles_for_noise(constant):
-    """The three poles of theory, section 3."""
+def detection_poles_for_noise(constant):
+    """The three poles of detection.md, "A bank of poles"."""
     found, nbar = [], 2 * LIMIT_SIGMA * SIGMA
     for delay in DELAYS_S:
         phi = constant + 8 * nbar / delay
@@ -104,7 +104,7 @@ def test_residuals_thresholds_and_the_alarm_follow_from_the_log(rate_hz, substep
         },
     )
     dt, t = 1.0 / rate_hz, memory["t_s"]
-    poles = [published, 1e6, further, *(poles_for_noise(0.02) if gyros else ())]
+    poles = [published, 1e6, further, *(detection_poles_for_noise(0.02) if gyros else ())]
     alarm = np.zeros(t.size, bool)
     for axis in "pqr":
         filters = [recomputed(memory, axis, pole, dt, bool(gyros)) for pole in poles]

@@ -18,9 +18,9 @@ A derived aircraft declares a map of its model's error. The map has a few boxes 
 other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
 within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
 acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `further_error`, belongs to the hypothesis that it is off its
-command (isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes
-nothing has been measured, so nothing is concluded.
+be anywhere: the additional error of its share, `additional_map_error`, belongs to the hypothesis that it is
+off its command (isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside
+all boxes nothing has been measured, so nothing is concluded.
 
 Variances: for plug-ins, and for the filters and tests of the statistical detector.
 """
@@ -37,8 +37,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, MOMENTS
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS, RATE_SIGNALS
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.air import LEAST_HEIGHT_M
-from beaver_ftc.design.context import DeclaredErrors, DesignFunctions
+from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.model import (
     AIRSPEED,
     DPT,
@@ -50,6 +49,7 @@ from beaver_ftc.design.model import (
     QDYN,
     QH,
     RH,
+    DesignFunctions,
     coefficient_slopes,
     density_ratio,
     inertia_coefficients,
@@ -65,309 +65,386 @@ from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
 
 if TYPE_CHECKING:
+    from beaver_ftc.design.context import DeclaredErrors
     from beaver_ftc.scenario.schema import Scenario
 
-_AIR_DATA = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
-_LEAST_AIRSPEED_SHARE = 0.1
+_FIRST_AIR_DATA_SIGNAL_INDEX = (
+    3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
+)
+_MIN_AIRSPEED_SHARE = 0.1
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
 ROUNDING_RAD_S2 = 1e-11
-UNKNOWN_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
+UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same for filters with a covariance, whose noise is 1e-4: above the acceleration of any aircraft.
-UNKNOWN_IN_FILTERS_RAD_S2 = 100.0
-_ROUNDING = 1e-9
-N_PLACES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
+UNMAPPED_ERROR_IN_FILTERS_RAD_S2 = 100.0
+_ROUNDING_SHARE = 1e-9
+N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @sized
 def declared_errors_dtype(n: int) -> np.dtype:
     """The declared errors beyond the published bound, of an aircraft with n surfaces."""
     return record(
-        any=int,
-        tolerance=MAX_TERMS,  # of each moment coefficient, as the design model has them
-        inertia=12,  # of each inertia coefficient, in the order of design.model
-        offset=7, slope=7,  # error of a signal: offset + slope |signal|
-        steady=3,  # of the offset of a gyro, what does not change
-        gust=3, deflection=float,
+        has_declared_errors=int,
+        coefficient_tolerance=MAX_TERMS,  # of each moment coefficient, as the design model has them
+        inertia_tolerance=12,  # of each inertia coefficient, in the order of design.model
+        # error of a signal: offset + slope |signal|
+        signal_error_offset=7, signal_error_slope=7,
+        constant_gyro_error_bound=3,  # of the offset of a gyro, what does not change
+        air_rotation_bound=3, deflection_error_bound=float,
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
         # far the reading of the altitude can be off, m, and as a share
-        gust_aloft=float, gust_low=float, altitude_off=float, altitude_slope=float,
-        engine=int, engine_kw=float, thin_air_kw=float,  # of dpt: see `slipstream_error`
+        air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_bound_m=float,
+        altitude_error_share=float,
+        # of dpt: see `slipstream_error_bound`
+        has_engine_errors=int, engine_power_error_kw=float, density_power_error_kw=float,
         # scratch: magnitudes as measured, and as large as they can be
-        measured_x=3, measured_y=N_Y, measured_u=n, largest_x=3, largest_y=N_Y, largest_u=n, largest_aero=3,
-        signal=N_SIGNALS,
-        near=MAX_MONOMIALS, far=MAX_MONOMIALS, per_rad=(3, n), moment=3, slack=3,
+        magnitude_x=3, magnitude_y=N_Y, magnitude_u=n, max_magnitude_x=3, magnitude_bound_y=N_Y,
+        max_magnitude_u=n, max_air_relative_rate=3,
+        signal_magnitude=N_SIGNALS,
+        monomial_magnitude=MAX_MONOMIALS, max_monomial_magnitude=MAX_MONOMIALS,
+        acceleration_error_per_rad=(3, n), moment_magnitude=3,
+        moment_error_bound=3,
     )  # fmt: skip
 
 
 @sized
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
-    """The map for an aircraft with n surfaces. anywhere: one surface may be, or, whole, more. outside: of all
-    boxes; box, age: where this is in the map. before: the surfaces in the frame before, rad. now: the error
-    here, rad/s2. apart: `engines_apart`."""
+    """The map of the error of an aircraft's model, with n surfaces.
+
+    anywhere: one surface may be anywhere in its travel; several_surfaces_anywhere: more than one may.
+    is_outside_all_boxes: whether the state is outside all boxes; box, time_row: where it is in the map.
+    surface_positions_before: deflections in the frame before, rad; error_now: error here, rad/s2.
+    engine_asymmetry_bound: bound on the yawing moment of healthy engines, by box."""
     return record(
-        n_boxes=int, n_levels=int, n_ages=int, anywhere=int, whole=int, outside=int, box=int, age=int,
-        time_s=float, until_s=MAX_AGES, low=(boxes, N_PLACES), high=(boxes, N_PLACES), share=MAX_LEVELS,
-        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, before=n, place=N_PLACES, now=3,
-        apart=boxes, apart_now=float,
+        n_boxes=int, n_levels=int, n_time_rows=int, one_surface_anywhere=int, several_surfaces_anywhere=int,
+        is_outside_all_boxes=int, box=int, time_row=int,
+        time_s=float, until_s=MAX_AGES, box_low=(boxes, N_MAP_COORDINATES), box_high=(boxes,
+        N_MAP_COORDINATES),
+        travel_share=MAX_LEVELS,
+        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, surface_positions_before=n,
+        coordinates=N_MAP_COORDINATES, error_now=3,
+        engine_asymmetry_bound=boxes, engine_asymmetry_bound_now=float,
     )  # fmt: skip
 
 
 @sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
-    noise: on what a gyro's error changes by, rad/s. frame: on one frame's innovation, rad/s2. own: of the
-    errors of n surfaces' own terms, per rad of deflection and at the command, means over the frame. beyond:
-    by how much the map's error with a surface at each share of its travel exceeds that in eta_bar."""
+    gyro_change_bound: on the change of a gyro's error, rad/s. frame_bound: on the innovation of one frame,
+    rad/s2. effectiveness_error_per_rad, surface_error_at_command: errors of the own terms of n surfaces, per
+    rad of deflection and at the command, means over the frame. additional_map_error: by how much the map's
+    error with a surface at each share of its travel exceeds that in eta_bar."""
     return record(
-        inertia=3, constant=3, earth_rate=float, declared_errors=declared_errors_dtype(n),
-        error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, noise=3, noise_before=3, frame=3,
-        has_surface_errors=int, surface_error_per_rad=(3, n), own=(3, n), further_error=(MAX_LEVELS, 3),
+        inertia_coupling=3, constant_bound=3, earth_rate_rad_s=float,
+        declared_errors=declared_errors_dtype(n),
+        model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_change_bound=3,
+        gyro_change_bound_before=3,
+        frame_innovation_bound=3,
+        has_surface_errors=int, effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        additional_map_error=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
-def fill_error_map(error_map: np.void, aircraft: Aircraft, anywhere: bool, whole: bool) -> None:
-    """Write an aircraft's map, if it has one; anywhere: one surface may be, in its travel; whole: more."""
-    given = aircraft.file.model_error_map
-    if given is None:
+def fill_error_map(
+    error_map: np.void, aircraft: Aircraft, one_surface_anywhere: bool, several_surfaces_anywhere: bool
+) -> None:
+    """Write an aircraft's map, if it has one; one_surface_anywhere: one surface may be, in its travel;
+    several_surfaces_anywhere: more."""
+    declared_map = aircraft.file.model_error_map
+    if declared_map is None:
         return
-    n_levels, n_ages = len(given.travel_share), len(given.until_s)
-    error_map["anywhere"], error_map["whole"], error_map["n_boxes"] = anywhere, whole, len(given.boxes)
-    error_map["n_levels"], error_map["n_ages"] = n_levels, n_ages
-    error_map["until_s"][:n_ages], error_map["share"][:n_levels] = given.until_s, given.travel_share
-    least = np.array([given.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
-    error_map["travel_low"] = least * [travel.min_rad for travel in aircraft.travel.values()]
-    error_map["travel_high"] = least * [travel.max_rad for travel in aircraft.travel.values()]
-    for k, box in enumerate(given.boxes):
-        ends = np.array(box.ends(aircraft.signals))
-        error_map["low"][k, : len(ends)], error_map["high"][k, : len(ends)] = ends.T
+    n_levels, n_time_rows = len(declared_map.travel_share), len(declared_map.until_s)
+    error_map["one_surface_anywhere"] = one_surface_anywhere
+    error_map["several_surfaces_anywhere"] = several_surfaces_anywhere
+    error_map["n_boxes"] = len(declared_map.boxes)
+    error_map["n_levels"], error_map["n_time_rows"] = n_levels, n_time_rows
+    error_map["until_s"][:n_time_rows] = declared_map.until_s
+    error_map["travel_share"][:n_levels] = declared_map.travel_share
+    travel_share_of_surface = np.array(
+        [declared_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
+    )
+    error_map["travel_low"] = travel_share_of_surface * [
+        travel.min_rad for travel in aircraft.travel.values()
+    ]
+    error_map["travel_high"] = travel_share_of_surface * [
+        travel.max_rad for travel in aircraft.travel.values()
+    ]
+    for k, box in enumerate(declared_map.boxes):
+        box_ends = np.array(box.ends(aircraft.signals))
+        error_map["box_low"][k, : len(box_ends)], error_map["box_high"][k, : len(box_ends)] = box_ends.T
         errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        error_map["error"][:n_ages, k, :n_levels] = np.stack(errors, axis=-1)
-        error_map["apart"][k] = box.engines_apart or 0.0
+        error_map["error"][:n_time_rows, k, :n_levels] = np.stack(errors, axis=-1)
+        error_map["engine_asymmetry_bound"][k] = box.engines_apart or 0.0
 
 
 @kernel
-def reading_error(declared_errors, i, reading):
-    """How far the truth of signal i can be from its reading."""
-    return (declared_errors.offset[i] + declared_errors.slope[i] * abs(reading)) / (
-        1.0 - declared_errors.slope[i]
+def reading_error_bound(declared_errors, i, reading):
+    """Bound the error of the reading of signal i, in its unit."""
+    return (declared_errors.signal_error_offset[i] + declared_errors.signal_error_slope[i] * abs(reading)) / (
+        1.0 - declared_errors.signal_error_slope[i]
     )
 
 
 @kernel
-def changing_gyro_error(declared_errors, i, reading):
-    """How far gyro i can be off, rad/s, but for a constant: noise, resolution, slope times the true rate."""
-    changing = declared_errors.offset[i] - declared_errors.steady[i]
-    return changing + declared_errors.slope[i] * (abs(reading) + reading_error(declared_errors, i, reading))
+def changing_gyro_error_bound(declared_errors, i, reading):
+    """Bound the changing error of gyro i, rad/s: noise, resolution, slope times the true rate."""
+    changing_offset = declared_errors.signal_error_offset[i] - declared_errors.constant_gyro_error_bound[i]
+    return changing_offset + declared_errors.signal_error_slope[i] * (
+        abs(reading) + reading_error_bound(declared_errors, i, reading)
+    )
 
 
 @kernel
-def slipstream_error(declared_errors, y):
-    """How far dpt can be off that is worked out from the engine's instruments and the air data.
+def slipstream_error_bound(declared_errors, y):
+    """Bound the error of dpt, which is computed from the engine's instruments and the air data.
 
-    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_kw and by the density
-    thin_air_kw for all of it; and the share that dynamic pressure and airspeed are off.
+    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_power_error_kw and by the
+    density density_power_error_kw for all of it; and the share that dynamic pressure and airspeed are off.
     """
-    pressure = reading_error(declared_errors, _AIR_DATA + QDYN, y[QDYN]) / y[QDYN]
-    speed = reading_error(declared_errors, _AIR_DATA + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
-    stretch = 1.0 / ((1.0 - min(pressure, 0.9)) * (1.0 - min(speed, 0.9)))
-    density = (1.0 + pressure) / (1.0 - min(speed, 0.9)) ** 2 - 1.0
-    power_kw = declared_errors.engine_kw + declared_errors.thin_air_kw * density * density_ratio(y)
-    return stretch * KW_TO_DPT * power_kw / (y[QDYN] * y[AIRSPEED]) + (stretch - 1.0) * abs(y[DPT] - DPT_0)
+    pressure_error_share = (
+        reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + QDYN, y[QDYN]) / y[QDYN]
+    )
+    airspeed_error_share = (
+        reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + AIRSPEED, y[AIRSPEED])
+        / y[AIRSPEED]
+    )
+    max_error_ratio = 1.0 / ((1.0 - min(pressure_error_share, 0.9)) * (1.0 - min(airspeed_error_share, 0.9)))
+    density_error_share = (1.0 + pressure_error_share) / (1.0 - min(airspeed_error_share, 0.9)) ** 2 - 1.0
+    power_error_kw = (
+        declared_errors.engine_power_error_kw
+        + declared_errors.density_power_error_kw * density_error_share * density_ratio(y)
+    )
+    return max_error_ratio * KW_TO_DPT * power_error_kw / (y[QDYN] * y[AIRSPEED]) + (
+        max_error_ratio - 1.0
+    ) * abs(y[DPT] - DPT_0)
 
 
 @kernel
-def fill_magnitudes(declared_errors, x, y, u):
+def fill_signal_magnitudes(declared_errors, x, y, u):
     """Fill the scratch with |signal| as measured and as large as it may be; for airspeed, as small."""
     for i in range(3):
-        declared_errors.measured_x[i] = abs(x[i])
-        declared_errors.largest_x[i] = abs(x[i]) + reading_error(declared_errors, i, x[i])
-        declared_errors.largest_aero[i] = declared_errors.largest_x[i] + declared_errors.gust[i]
+        declared_errors.magnitude_x[i] = abs(x[i])
+        declared_errors.max_magnitude_x[i] = abs(x[i]) + reading_error_bound(declared_errors, i, x[i])
+        declared_errors.max_air_relative_rate[i] = (
+            declared_errors.max_magnitude_x[i] + declared_errors.air_rotation_bound[i]
+        )
     for i in range(DPT):
-        declared_errors.measured_y[i] = abs(y[i])
-        declared_errors.largest_y[i] = abs(y[i]) + reading_error(declared_errors, _AIR_DATA + i, y[i])
+        declared_errors.magnitude_y[i] = abs(y[i])
+        declared_errors.magnitude_bound_y[i] = abs(y[i]) + reading_error_bound(
+            declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + i, y[i]
+        )
     for i in range(DPT, y.size):
-        declared_errors.measured_y[i] = declared_errors.largest_y[i] = abs(y[i])
-    if declared_errors.engine:
-        declared_errors.largest_y[DPT] += slipstream_error(declared_errors, y)
+        declared_errors.magnitude_y[i] = declared_errors.magnitude_bound_y[i] = abs(y[i])
+    if declared_errors.has_engine_errors:
+        declared_errors.magnitude_bound_y[DPT] += slipstream_error_bound(declared_errors, y)
     for s in range(u.size):
-        declared_errors.measured_u[s] = abs(u[s])
-        declared_errors.largest_u[s] = abs(u[s]) + declared_errors.deflection
+        declared_errors.magnitude_u[s] = abs(u[s])
+        declared_errors.max_magnitude_u[s] = abs(u[s]) + declared_errors.deflection_error_bound
     V = y[AIRSPEED]
-    declared_errors.largest_y[AIRSPEED] = max(
-        2.0 * V - declared_errors.largest_y[AIRSPEED], _LEAST_AIRSPEED_SHARE * V
+    declared_errors.magnitude_bound_y[AIRSPEED] = max(
+        2.0 * V - declared_errors.magnitude_bound_y[AIRSPEED], _MIN_AIRSPEED_SHARE * V
     )
 
 
 @kernel
-def fill_moments(declared_errors, design):
+def fill_moment_magnitudes(declared_errors, design):
     """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
-    near_q, far_q = declared_errors.measured_y[QDYN], declared_errors.largest_y[QDYN]
+    measured_pressure, max_pressure = (
+        declared_errors.magnitude_y[QDYN],
+        declared_errors.magnitude_bound_y[QDYN],
+    )
     table = design.moments
     for i in range(3):
-        near, far = 0.0, 0.0
+        measured_coefficient, max_coefficient = 0.0, 0.0
         for k in range(table.free_from[i], table.surface_to[i]):
-            size, s = abs(table.value[k]), table.surface[k]
-            near += (
-                size
-                * declared_errors.near[table.monomial[k]]
-                * (declared_errors.measured_u[s] if s >= 0 else 1.0)
+            coefficient, s = abs(table.value[k]), table.surface[k]
+            measured_coefficient += (
+                coefficient
+                * declared_errors.monomial_magnitude[table.monomial[k]]
+                * (declared_errors.magnitude_u[s] if s >= 0 else 1.0)
             )
-            largest = declared_errors.far[table.monomial[k]] * (
-                declared_errors.largest_u[s] if s >= 0 else 1.0
+            max_factor = declared_errors.max_monomial_magnitude[table.monomial[k]] * (
+                declared_errors.max_magnitude_u[s] if s >= 0 else 1.0
             )
-            far += (size + declared_errors.tolerance[k]) * largest
-        arm = design.S * (design.c if i == 1 else design.b)
-        declared_errors.moment[i] = arm * near_q * near
-        declared_errors.slack[i] = arm * (far_q * far - near_q * near)
+            max_coefficient += (coefficient + declared_errors.coefficient_tolerance[k]) * max_factor
+        area_times_length = design.S * (design.c if i == 1 else design.b)
+        declared_errors.moment_magnitude[i] = area_times_length * measured_pressure * measured_coefficient
+        declared_errors.moment_error_bound[i] = area_times_length * (
+            max_pressure * max_coefficient - measured_pressure * measured_coefficient
+        )
 
 
 @kernel
-def product_error(size, tolerance, near, far):
+def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_magnitude):
     """Error of a coefficient times a signal."""
-    return (abs(size) + tolerance) * far - abs(size) * near
+    return (abs(coefficient) + tolerance) * max_signal_magnitude - abs(coefficient) * signal_magnitude
 
 
 @kernel
-def moment_error(declared_errors, i, size, tolerance):
+def moment_product_error_bound(declared_errors, i, coefficient, tolerance):
     """Error of an inertia coefficient times moment i."""
-    near = declared_errors.moment[i]
-    return product_error(size, tolerance, near, near + declared_errors.slack[i])
+    moment_magnitude = declared_errors.moment_magnitude[i]
+    return product_error_bound(
+        coefficient, tolerance, moment_magnitude, moment_magnitude + declared_errors.moment_error_bound[i]
+    )
 
 
 @kernel
-def rate_product_error(declared_errors, i, j, size, tolerance):
+def rate_product_error_bound(declared_errors, i, j, coefficient, tolerance):
     """Error of an inertia coefficient times rates i and j."""
-    near, far = declared_errors.measured_x, declared_errors.largest_x
-    return product_error(size, tolerance, near[i] * near[j], far[i] * far[j])
+    magnitude, max_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
+    return product_error_bound(
+        coefficient, tolerance, magnitude[i] * magnitude[j], max_magnitude[i] * max_magnitude[j]
+    )
 
 
 @kernel
-def moment_per_rad(declared_errors, design, i, s):
-    """Of moment i, what surface s adds per rad: its magnitude, and with all errors; N m."""
-    near, far = 0.0, 0.0
+def surface_moment_per_rad(declared_errors, design, i, s):
+    """Return the part of surface s in moment i per rad: its magnitude, and with all errors; N m."""
+    measured_coefficient, max_coefficient = 0.0, 0.0
     table = design.moments
     for k in range(table.free_to[i], table.surface_to[i]):
         if table.surface[k] == s:
-            size = abs(table.value[k])
-            near += size * declared_errors.near[table.monomial[k]]
-            far += (size + declared_errors.tolerance[k]) * declared_errors.far[table.monomial[k]]
-    arm = design.S * (design.c if i == 1 else design.b)
-    return arm * declared_errors.measured_y[QDYN] * near, arm * declared_errors.largest_y[QDYN] * far
+            coefficient = abs(table.value[k])
+            measured_coefficient += coefficient * declared_errors.monomial_magnitude[table.monomial[k]]
+            max_coefficient += (
+                coefficient + declared_errors.coefficient_tolerance[k]
+            ) * declared_errors.max_monomial_magnitude[table.monomial[k]]
+    area_times_length = design.S * (design.c if i == 1 else design.b)
+    return area_times_length * declared_errors.magnitude_y[
+        QDYN
+    ] * measured_coefficient, area_times_length * declared_errors.magnitude_bound_y[QDYN] * max_coefficient
 
 
 @kernel
-def fill_error_per_rad(declared_errors, design, s):
+def fill_acceleration_error_per_rad(declared_errors, design, s):
     """Fill per_rad (3, s) rad/s2 per rad: what the declared errors can do to the effect of surface s.
 
-    The bound is affine in |u_s|; this is its slope. `add_declared_errors` comes first.
+    The bound is affine in |u_s|; this is its slope. `add_declared_error_bound` comes first.
     """
-    t, per_rad = declared_errors.inertia, declared_errors.per_rad
-    roll, roll_far = moment_per_rad(declared_errors, design, 0, s)
-    pitch, pitch_far = moment_per_rad(declared_errors, design, 1, s)
-    yaw, yaw_far = moment_per_rad(declared_errors, design, 2, s)
-    per_rad[0, s] = product_error(design.Pl, t[2], roll, roll_far)
-    per_rad[0, s] += product_error(design.Pn, t[3], yaw, yaw_far)
-    per_rad[1, s] = product_error(design.Qm, t[7], pitch, pitch_far)
-    per_rad[2, s] = product_error(design.Rl, t[10], roll, roll_far)
-    per_rad[2, s] += product_error(design.Rn, t[11], yaw, yaw_far)
+    inertia_tolerance, per_rad = declared_errors.inertia_tolerance, declared_errors.acceleration_error_per_rad
+    roll, max_roll = surface_moment_per_rad(declared_errors, design, 0, s)
+    pitch, max_pitch = surface_moment_per_rad(declared_errors, design, 1, s)
+    yaw, max_yaw = surface_moment_per_rad(declared_errors, design, 2, s)
+    per_rad[0, s] = product_error_bound(design.Pl, inertia_tolerance[2], roll, max_roll)
+    per_rad[0, s] += product_error_bound(design.Pn, inertia_tolerance[3], yaw, max_yaw)
+    per_rad[1, s] = product_error_bound(design.Qm, inertia_tolerance[7], pitch, max_pitch)
+    per_rad[2, s] = product_error_bound(design.Rl, inertia_tolerance[10], roll, max_roll)
+    per_rad[2, s] += product_error_bound(design.Rn, inertia_tolerance[11], yaw, max_yaw)
 
 
 @kernel
-def add_declared_errors(declared_errors, design, x, y, u, eta_bar):
+def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y, u (surfaces,) as measured."""
-    fill_magnitudes(declared_errors, x, y, u)
-    signals(design.moments, declared_errors.measured_x, declared_errors.measured_y, declared_errors.signal)
-    monomials(design.moments, declared_errors.signal, declared_errors.near)
-    signals(design.moments, declared_errors.largest_aero, declared_errors.largest_y, declared_errors.signal)
-    monomials(design.moments, declared_errors.signal, declared_errors.far)
-    fill_moments(declared_errors, design)
-    t = declared_errors.inertia
-    eta_bar[0] += moment_error(declared_errors, 0, design.Pl, t[2]) + moment_error(
-        declared_errors, 2, design.Pn, t[3]
+    fill_signal_magnitudes(declared_errors, x, y, u)
+    signals(
+        design.moments,
+        declared_errors.magnitude_x,
+        declared_errors.magnitude_y,
+        declared_errors.signal_magnitude,
     )
-    eta_bar[0] += rate_product_error(declared_errors, 0, 1, design.Ppq, t[0]) + rate_product_error(
-        declared_errors, 1, 2, design.Pqr, t[1]
+    monomials(design.moments, declared_errors.signal_magnitude, declared_errors.monomial_magnitude)
+    signals(
+        design.moments,
+        declared_errors.max_air_relative_rate,
+        declared_errors.magnitude_bound_y,
+        declared_errors.signal_magnitude,
     )
-    eta_bar[1] += moment_error(declared_errors, 1, design.Qm, t[7]) + rate_product_error(
-        declared_errors, 0, 2, design.Qpr, t[5]
-    )
-    eta_bar[1] += rate_product_error(declared_errors, 0, 0, design.Qpp, t[4]) + rate_product_error(
-        declared_errors, 2, 2, design.Qrr, t[6]
-    )
-    eta_bar[2] += moment_error(declared_errors, 0, design.Rl, t[10]) + moment_error(
-        declared_errors, 2, design.Rn, t[11]
-    )
-    eta_bar[2] += rate_product_error(declared_errors, 0, 1, design.Rpq, t[8]) + rate_product_error(
-        declared_errors, 1, 2, design.Rqr, t[9]
-    )
+    monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
+    fill_moment_magnitudes(declared_errors, design)
+    inertia_tolerance = declared_errors.inertia_tolerance
+    eta_bar[0] += moment_product_error_bound(
+        declared_errors, 0, design.Pl, inertia_tolerance[2]
+    ) + moment_product_error_bound(declared_errors, 2, design.Pn, inertia_tolerance[3])
+    eta_bar[0] += rate_product_error_bound(
+        declared_errors, 0, 1, design.Ppq, inertia_tolerance[0]
+    ) + rate_product_error_bound(declared_errors, 1, 2, design.Pqr, inertia_tolerance[1])
+    eta_bar[1] += moment_product_error_bound(
+        declared_errors, 1, design.Qm, inertia_tolerance[7]
+    ) + rate_product_error_bound(declared_errors, 0, 2, design.Qpr, inertia_tolerance[5])
+    eta_bar[1] += rate_product_error_bound(
+        declared_errors, 0, 0, design.Qpp, inertia_tolerance[4]
+    ) + rate_product_error_bound(declared_errors, 2, 2, design.Qrr, inertia_tolerance[6])
+    eta_bar[2] += moment_product_error_bound(
+        declared_errors, 0, design.Rl, inertia_tolerance[10]
+    ) + moment_product_error_bound(declared_errors, 2, design.Rn, inertia_tolerance[11])
+    eta_bar[2] += rate_product_error_bound(
+        declared_errors, 0, 1, design.Rpq, inertia_tolerance[8]
+    ) + rate_product_error_bound(declared_errors, 1, 2, design.Rqr, inertia_tolerance[9])
 
 
 @kernel
 def is_inside_box(error_map, k):
     """Whether `place` is in box k."""
-    inside = True
-    for i in range(error_map.place.size):
-        room = _ROUNDING * (1.0 + abs(error_map.place[i]))
-        inside = inside and error_map.low[k, i] - room <= error_map.place[i] <= error_map.high[k, i] + room
-    return inside
+    is_inside = True
+    for i in range(error_map.coordinates.size):
+        rounding_margin = _ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
+        is_inside = (
+            is_inside
+            and error_map.box_low[k, i] - rounding_margin
+            <= error_map.coordinates[i]
+            <= error_map.box_high[k, i] + rounding_margin
+        )
+    return is_inside
 
 
 @kernel
-def is_outside_all_boxes(error_map, i):
+def is_coordinate_outside_all_boxes(error_map, i):
     """Whether quantity i of `place` is outside what any box spans."""
     low, high = np.inf, -np.inf
     for k in range(error_map.n_boxes):
-        low, high = min(low, error_map.low[k, i]), max(high, error_map.high[k, i])
-    room = _ROUNDING * (1.0 + abs(error_map.place[i]))
-    return not low - room <= error_map.place[i] <= high + room
+        low, high = min(low, error_map.box_low[k, i]), max(high, error_map.box_high[k, i])
+    rounding_margin = _ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
+    return not low - rounding_margin <= error_map.coordinates[i] <= high + rounding_margin
 
 
 @kernel
-def travel_level(error_map, u):
+def map_level_for_positions(error_map, u):
     """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
-    if error_map.whole:
+    if error_map.several_surfaces_anywhere:
         return error_map.n_levels - 1
-    used = 0.0
+    travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
-            end = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
-            used = max(used, u[s] / end) if end != 0.0 else 1.0
-    return level_covering(error_map, used)
+            travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
+            travel_share = max(travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
+    return map_level_for_travel_share(error_map, travel_share)
 
 
 @kernel
-def level_covering(error_map, used):
+def map_level_for_travel_share(error_map, travel_share):
     """The first level of the map for so large a share of the travel."""
-    last = error_map.n_levels - 1
-    for j in range(last):
-        if used <= error_map.share[j]:
+    last_level = error_map.n_levels - 1
+    for j in range(last_level):
+        if travel_share <= error_map.travel_share[j]:
             return j
-    return last
+    return last_level
 
 
 @kernel
-def travel_share_used(error_map, s, where, before, instants):
+def max_travel_share_used(error_map, s, position_interval, share_before, n_instants):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
-    where: (low, high) rad, in the mean over them; before: the share as the frame began, where it may be yet
-    at the first.
+    position_interval: (low, high) rad, in the mean over them; share_before: the share as the frame began,
+    where it may be yet at the first.
     """
-    used, (low, high) = 0.0, where
+    used, (low, high) = 0.0, position_interval
     if high > 0.0:
         used = high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
     if low < 0.0:
         used = max(used, low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0)
-    if instants > 1:
-        used = max(before, (instants * used + before) / (instants - 1))
+    if n_instants > 1:
+        used = max(share_before, (n_instants * used + share_before) / (n_instants - 1))
     return min(used, 1.0)
 
 
 @kernel
-def time_row(error_map):
+def error_map_time_row(error_map):
     """The row for the flight as old as it is, -1 if none was measured so late."""
-    for a in range(error_map.n_ages):
+    for a in range(error_map.n_time_rows):
         if error_map.time_s <= error_map.until_s[a]:
             return a
     return -1
@@ -375,27 +452,29 @@ def time_row(error_map):
 
 @kernel
 def look_up_map_error(error_map, x, y, u):
-    """Fill `place` and `now`, the error measured about this state; x (3,) rad/s, y (4 + declared,), u (n,)
-    rad."""
-    place = error_map.place
-    place[:3], place[3 : 3 + y.size] = x, y
-    place[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    level, age = travel_level(error_map, u), time_row(error_map)
-    for k in range(error_map.n_boxes if age >= 0 else 0):
+    """Fill `coordinates` and `now`, the error measured about this state; x (3,) rad/s, y (4 + declared,), u
+    (n,) rad."""
+    coordinates = error_map.coordinates
+    coordinates[:3], coordinates[3 : 3 + y.size] = x, y
+    coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
+    level, time_row = map_level_for_positions(error_map, u), error_map_time_row(error_map)
+    for k in range(error_map.n_boxes if time_row >= 0 else 0):
         if is_inside_box(error_map, k):
-            error_map.outside, error_map.now[:] = 0, error_map.error[age, k, level]
-            error_map.box, error_map.age = k, age
-            error_map.apart_now = error_map.apart[k]
+            error_map.is_outside_all_boxes, error_map.error_now[:] = 0, error_map.error[time_row, k, level]
+            error_map.box, error_map.time_row = k, time_row
+            error_map.engine_asymmetry_bound_now = error_map.engine_asymmetry_bound[k]
             return
-    error_map.outside, error_map.now[:], error_map.apart_now = 1, UNKNOWN_RAD_S2, UNKNOWN_RAD_S2
+    error_map.is_outside_all_boxes = 1
+    error_map.error_now[:] = UNMAPPED_ERROR_RAD_S2
+    error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
 
 
 @kernel
-def further_map_error(error_map, j, i):
+def additional_map_error(error_map, j, i):
     """By how much the error of axis i at this instant is larger with a surface at level j, rad/s2."""
-    if error_map.outside:
+    if error_map.is_outside_all_boxes:
         return 0.0
-    return max(error_map.error[error_map.age, error_map.box, j, i] - error_map.now[i], 0.0)
+    return max(error_map.error[error_map.time_row, error_map.box, j, i] - error_map.error_now[i], 0.0)
 
 
 @kernel
@@ -403,33 +482,39 @@ def add_map_error(error_map, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
     look_up_map_error(error_map, x, y, u)
     for i in range(3):
-        eta_bar[i] += error_map.now[i]
+        eta_bar[i] += error_map.error_now[i]
 
 
 @kernel
-def add_published_bound(x, design, inertia, constant, earth_rate, eta_bar):
+def add_published_bound(x, design, inertia_coupling, constant_bound, earth_rate_rad_s, eta_bar):
     """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate |x| on any axis, and the inertia coupling makes `rate_coupling` times as much of it.
+    earth_rate_rad_s |x| on any axis, and the inertia coupling makes `max_rate_coupling` times as much of it.
     """
     p, q, r = x[0], x[1], x[2]
     rates = abs(p) + abs(q) + abs(r)
-    roll, pitch, yaw = rate_coupling(design)
+    roll, pitch, yaw = max_rate_coupling(design)
     eta_bar[0] += (
-        inertia[0] * abs(design.Pqr * q * r) + constant[0] + earth_rotation_bound(earth_rate, rates, roll)
+        inertia_coupling[0] * abs(design.Pqr * q * r)
+        + constant_bound[0]
+        + earth_rotation_bound(earth_rate_rad_s, rates, roll)
     )
     eta_bar[1] += (
-        inertia[1] * abs(design.Qpr * p * r) + constant[1] + earth_rotation_bound(earth_rate, rates, pitch)
+        inertia_coupling[1] * abs(design.Qpr * p * r)
+        + constant_bound[1]
+        + earth_rotation_bound(earth_rate_rad_s, rates, pitch)
     )
     eta_bar[2] += (
-        inertia[2] * abs(design.Rpq * p * q) + constant[2] + earth_rotation_bound(earth_rate, rates, yaw)
+        inertia_coupling[2] * abs(design.Rpq * p * q)
+        + constant_bound[2]
+        + earth_rotation_bound(earth_rate_rad_s, rates, yaw)
     )
 
 
 @kernel
-def rate_coupling(design):
+def max_rate_coupling(design):
     """How much of one rate times another the inertia coupling makes on each axis, at most; 1 where it is
     less, as it is of most aircraft."""
     roll, yaw = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
@@ -438,80 +523,103 @@ def rate_coupling(design):
 
 
 @kernel
-def earth_rotation_bound(earth_rate, rates, share):
-    """What the Earth's rotation and rounding add on an axis, rad/s2; rates: |p| + |q| + |r|, rad/s."""
-    return earth_rate * ((1.0 + share) * rates + share * earth_rate) + ROUNDING_RAD_S2
+def earth_rotation_bound(earth_rate_rad_s, sum_of_rates, rate_coupling):
+    """Return the bound by the Earth's rotation and rounding on an axis, rad/s2; sum_of_rates: |p| + |q| +
+    |r|, rad/s."""
+    return (
+        earth_rate_rad_s * ((1.0 + rate_coupling) * sum_of_rates + rate_coupling * earth_rate_rad_s)
+        + ROUNDING_RAD_S2
+    )
 
 
 @kernel
-def lowest_height(altitude, off, slope):
+def min_true_height_m(altitude, error_offset_m, error_slope):
     """The least height, m, that a measured altitude leaves: off by so much and by a share. The ground is at
     sea level; the model of turbulence has no height below LEAST_HEIGHT_M."""
-    return max(altitude - (off + slope * abs(altitude)) / (1.0 - slope), LEAST_HEIGHT_M)
+    return max(
+        altitude - (error_offset_m + error_slope * abs(altitude)) / (1.0 - error_slope), LEAST_HEIGHT_M
+    )
 
 
 @kernel
-def set_gust_bound(declared_errors, altitude):
+def set_air_rotation_bound(declared_errors, altitude):
     """Bring the bound on the air's rotation to this altitude, m as measured."""
-    if declared_errors.gust_low > 0.0:
-        height = lowest_height(altitude, declared_errors.altitude_off, declared_errors.altitude_slope)
-        declared_errors.gust[:] = max(declared_errors.gust_aloft, declared_errors.gust_low / np.sqrt(height))
+    if declared_errors.air_rotation_bound_at_1_m > 0.0:
+        height = min_true_height_m(
+            altitude, declared_errors.altitude_error_bound_m, declared_errors.altitude_error_share
+        )
+        declared_errors.air_rotation_bound[:] = max(
+            declared_errors.air_rotation_bound_aloft,
+            declared_errors.air_rotation_bound_at_1_m / np.sqrt(height),
+        )
 
 
 @kernel
-def fill_bound_now(bound, design, measured, u):
+def fill_uncertainty_bound_now(bound, design, measured, u):
     """Fill eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
     x, y = measured.x, measured.y
     bound.eta_bar_now[:] = 0.0
-    if bound.declared_errors.any:
-        set_gust_bound(bound.declared_errors, measured.altitude)
-        add_declared_errors(bound.declared_errors, design, x, y, u, bound.eta_bar_now)
+    if bound.declared_errors.has_declared_errors:
+        set_air_rotation_bound(bound.declared_errors, measured.altitude)
+        add_declared_error_bound(bound.declared_errors, design, x, y, u, bound.eta_bar_now)
         if bound.has_surface_errors:
             for s in range(u.size):
-                fill_error_per_rad(bound.declared_errors, design, s)
-    if bound.error_map.n_boxes > 0:
-        add_map_error(bound.error_map, x, y, u, bound.eta_bar_now)
-    far = bound.declared_errors.largest_x if bound.declared_errors.any else x
-    add_published_bound(far, design, bound.inertia, bound.constant, bound.earth_rate, bound.eta_bar_now)
+                fill_acceleration_error_per_rad(bound.declared_errors, design, s)
+    if bound.model_error_map.n_boxes > 0:
+        add_map_error(bound.model_error_map, x, y, u, bound.eta_bar_now)
+    max_rates = bound.declared_errors.max_magnitude_x if bound.declared_errors.has_declared_errors else x
+    add_published_bound(
+        max_rates,
+        design,
+        bound.inertia_coupling,
+        bound.constant_bound,
+        bound.earth_rate_rad_s,
+        bound.eta_bar_now,
+    )
 
 
 GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
-_INERTIA = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
-DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
+_INERTIA_NAMES = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
+POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
 
 @lru_cache(maxsize=64)
-def inertia_coefficient_errors(tolerance: float, mass: MassProperties) -> np.ndarray:
+def max_inertia_coefficient_errors(tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
     Each is monotonic in each inertia as long as the others stay put, so the corners tell.
     """
     nominal = np.array(inertia_coefficients(mass))
-    worst = np.zeros(12)
+    max_change = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
-        change = {
-            name: getattr(mass, name) * (1 + tolerance * s) for name, s in zip(_INERTIA, signs, strict=True)
+        changed_inertias = {
+            name: getattr(mass, name) * (1 + tolerance * s)
+            for name, s in zip(_INERTIA_NAMES, signs, strict=True)
         }
-        there = np.array(inertia_coefficients(replace(mass, **change)))
-        worst = np.maximum(worst, np.abs(there - nominal))
-    worst.flags.writeable = False  # kept: the same for every flight of a design
-    return worst
+        changed_coefficients = np.array(inertia_coefficients(replace(mass, **changed_inertias)))
+        max_change = np.maximum(max_change, np.abs(changed_coefficients - nominal))
+    max_change.flags.writeable = False  # kept: the same for every flight of a design
+    return max_change
 
 
-def configure_bound(bound: np.void, scenario: "Scenario", declared: Declared, design: np.void) -> None:
+def configure_uncertainty_bound(
+    bound: np.void, scenario: "Scenario", declared: Declared, design: np.void
+) -> None:
     """Fill in the declared bound, and what the aircraft's terms leave: where it is mapped, or everywhere the
     same; design: the designer's record."""
     config, aircraft = scenario.fdi, declared.aircraft
-    bound["inertia"], bound["earth_rate"] = declared.coupling, EARTH_RATE_RAD_S
-    bound["constant"] = declared.constant_rad_s2
-    every_type = config.fault_class == "all"
-    fill_error_map(bound["error_map"], aircraft, every_type, whole=every_type and config.pairs)
+    bound["inertia_coupling"], bound["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
+    bound["constant_bound"] = declared.constant_rad_s2
+    diagnoses_all_types = config.fault_class == "all"
+    fill_error_map(
+        bound["model_error_map"], aircraft, diagnoses_all_types, diagnoses_all_types and config.pairs
+    )
     if aircraft.file.model_error_map is None:
-        bound["constant"] += aircraft.model_error_rad_s2
+        bound["constant_bound"] += aircraft.model_error_rad_s2
     declared_errors = bound["declared_errors"]
     fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
     fill_declared_engine_errors(declared_errors, scenario, declared)
-    bound["has_surface_errors"] = declared_errors["any"] and every_type
+    bound["has_surface_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
 
 
 def fill_declared_errors(
@@ -519,26 +627,25 @@ def fill_declared_errors(
 ) -> None:
     """Fill the record; the design record and mass are the designer's."""
     tolerance = declared.coefficients.absolute(declared.aircraft.moments, design["moments"]["value"])
-    declared_errors["tolerance"][: tolerance.size] = tolerance
-    declared_errors["inertia"] = inertia_coefficient_errors(declared.inertia, mass)
-    declared_errors["deflection"] = declared.actuators.deflection_rad
+    declared_errors["coefficient_tolerance"][: tolerance.size] = tolerance
+    declared_errors["inertia_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
+    declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
     errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    declared_errors["gust_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
-    declared_errors["gust_low"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
-    declared_errors["gust"] = declared_errors["gust_aloft"]
-    declared_errors["altitude_off"], declared_errors["altitude_slope"] = (
-        errors["altitude"].worst,
-        errors["altitude"].slope,
+    declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
+    declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
+    declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
+    declared_errors["altitude_error_bound_m"] = errors["altitude"].worst
+    declared_errors["altitude_error_share"] = errors["altitude"].slope
+    declared_errors["signal_error_offset"] = errors.each("worst")
+    declared_errors["signal_error_slope"] = errors.each("slope")
+    declared_errors["constant_gyro_error_bound"] = errors.each("steady", AXES)
+    error_bounds = (
+        declared_errors["coefficient_tolerance"],
+        declared_errors["inertia_tolerance"],
+        declared_errors["deflection_error_bound"],
+        declared_errors["air_rotation_bound"],
     )
-    declared_errors["offset"], declared_errors["slope"] = errors.each("worst"), errors.each("slope")
-    declared_errors["steady"] = errors.each("steady", AXES)
-    parts = (
-        declared_errors["tolerance"],
-        declared_errors["inertia"],
-        declared_errors["deflection"],
-        declared_errors["gust"],
-    )
-    declared_errors["any"] = any(np.any(part) for part in parts) or not errors.is_ideal
+    declared_errors["has_declared_errors"] = any(np.any(part) for part in error_bounds) or not errors.is_ideal
 
 
 def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", declared: Declared) -> None:
@@ -547,96 +654,107 @@ def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", 
     The engine may be set anywhere between here and its highest manifold pressure.
     """
     sensors = declared.sensors
-    flawed = any(not getattr(sensors.declared, name).is_ideal for name in OF_THE_SLIPSTREAM)
-    if not (flawed and declared.aircraft.has_engine_instruments):
+    has_instrument_errors = any(not getattr(sensors.declared, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    if not (has_instrument_errors and declared.aircraft.has_engine_instruments):
         return
     initial: Any = scenario.initial
-    highest = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
-    largest = dict(zip(ENGINE, (initial.engine_rpm, highest), strict=True))
-    errors = [sensors[name].of_reading(most) for name, most in largest.items()]
-    declared_errors["engine"] = 1
-    declared_errors["engine_kw"], declared_errors["thin_air_kw"] = power_error_kw(
-        initial.engine_rpm, highest, *errors
+    max_manifold_pressure = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
+    max_readings = dict(zip(ENGINE, (initial.engine_rpm, max_manifold_pressure), strict=True))
+    errors = [sensors[name].of_reading(most) for name, most in max_readings.items()]
+    declared_errors["has_engine_errors"] = 1
+    declared_errors["engine_power_error_kw"], declared_errors["density_power_error_kw"] = power_error_kw(
+        initial.engine_rpm, max_manifold_pressure, *errors
     )
 
 
-def poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> tuple[float, ...]:
+def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of DELAYS_S, despite gyro noise.
 
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
     of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
     """
-    nbar = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
-    return tuple(_pole(delay_s, nbar, constant_rad_s2) for delay_s in DESIGN_DELAYS_S) if nbar > 0 else ()
+    gyro_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
+    return (
+        tuple(
+            _detection_pole_per_s(delay_s, gyro_change_bound, constant_rad_s2)
+            for delay_s in POLE_DESIGN_DELAYS_S
+        )
+        if gyro_change_bound > 0
+        else ()
+    )
 
 
-def _pole(delay_s: float, noise: float, eta_bar: float) -> float:
-    phi = eta_bar + 8.0 * noise / delay_s
+def _detection_pole_per_s(delay_s: float, gyro_change_bound: float, eta_bar: float) -> float:
+    phi = eta_bar + 8.0 * gyro_change_bound / delay_s
     for _ in range(50):
-        pole = max(log(phi * delay_s / noise) / delay_s, 0.1 / delay_s)
-        phi = (noise * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
+        pole = max(log(phi * delay_s / gyro_change_bound) / delay_s, 0.1 / delay_s)
+        phi = (gyro_change_bound * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
     return pole
 
 
-_GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
+_AXIS_OF_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
-def variances_of(
+def declared_errors_for_plugin(
     declared: Declared, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray
-) -> DeclaredErrors:
-    """What is declared as a plug-in is given it, of a flight trimmed at y and u rad; design: the designer's
+) -> "DeclaredErrors":
+    """Return the declared errors as a plug-in is given them, trimmed at y and u rad; design: the designer's
     record, (1,)."""
+    from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
+
     aircraft, errors = declared.aircraft, declared.sensors
     noise, bias, resolution = (errors.each(of_it) for of_it in ("noise", "steady", "resolution"))
     coefficients = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
-    rotation, time_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
-    air_data = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_AIR_DATA:]
+    gust_rad_s, gust_time_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
+    air_data_std = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_FIRST_AIR_DATA_SIGNAL_INDEX:]
     deflection_rad = declared.actuators.deflection_rad
     return DeclaredErrors(
         noise=noise,
         bias=bias,
         resolution=resolution,
         slope=errors.each("slope"),
-        gust_rad_s=rotation,
-        gust_time_s=time_s,
-        gust_effect=gust_effect(DesignFunctions(design.copy()), y),
+        gust_rad_s=gust_rad_s,
+        gust_time_s=gust_time_s,
+        gust_effect=air_rotation_effect(DesignFunctions(design.copy()), y),
         coefficients=coefficients,
         inertia=declared.inertia,
         deflection_rad=deflection_rad,
-        model_rad_s2=model_error_deviation(design, y, u, air_data, coefficients, deflection_rad),
+        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficients, deflection_rad),
         bandwidth_rad_s=np.array([getattr(actuators, s).bandwidth_rad_s for s in aircraft.surfaces]),
         rate_limit_rad_s=np.radians([getattr(actuators, s).rate_limit_deg_s for s in aircraft.surfaces]),
     )
 
 
-def gust_effect(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
+def air_rotation_effect(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
     step = 1e-4
     columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
     return -np.column_stack(columns)
 
 
-def model_error_deviation(
+def model_error_std(
     design: np.ndarray,
     y: np.ndarray,
     u: np.ndarray,
-    air_data: np.ndarray,
+    air_data_std: np.ndarray,
     coefficients: np.ndarray,
     deflection_rad: float,
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, every error standing for itself.
 
-    air_data (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficients: absolute errors.
+    air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficients: absolute errors.
     """
-    here = _acceleration(design, y, u)
-    errors = np.pad(np.diag(air_data), ((0, 0), (0, y.size - air_data.size)))
-    apart = [_acceleration(design, y + error, u) - here for error in errors]
-    apart += [_acceleration(design, y, u + deflection_rad * e) - here for e in np.eye(u.size)]
-    for place in np.flatnonzero(coefficients):
-        changed = design.copy()
-        changed["moments"]["value"][0][place] += coefficients[place]
-        apart.append(_acceleration(changed, y, u) - here)
-    return np.sqrt(np.square(apart).sum(axis=0))
+    nominal_acceleration = _acceleration(design, y, u)
+    air_data_errors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
+    deviations = [_acceleration(design, y + error, u) - nominal_acceleration for error in air_data_errors]
+    deviations += [
+        _acceleration(design, y, u + deflection_rad * e) - nominal_acceleration for e in np.eye(u.size)
+    ]
+    for term_index in np.flatnonzero(coefficients):
+        changed_design = design.copy()
+        changed_design["moments"]["value"][0][term_index] += coefficients[term_index]
+        deviations.append(_acceleration(changed_design, y, u) - nominal_acceleration)
+    return np.sqrt(np.square(deviations).sum(axis=0))
 
 
 def _acceleration(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -644,23 +762,26 @@ def _acceleration(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarra
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
-def flow_angle_noise(errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
-    """Of the flow's angles (2,) against the level axes, as vanes, airspeed and attitude have them, standard
-    deviation in rad: what pitch attitude and heading are off turns the flow as much as what a vane is off."""
-    through = 0.3  # attitudes and incidences of up to 17 deg
-    pairs = (("alpha", "theta"), ("beta", "psi"))
-    vanes = [hypot(errors[vane].random, errors[angle].random) for vane, angle in pairs]
-    return np.array(vanes) + through * (errors["V"].random / airspeed_mps + errors["phi"].random)
+def level_flow_angle_noise_std(errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
+    """Estimate the noise of the flow's angles (2,) against the level axes, as vanes, airspeed and attitude
+    have them, standard deviation in rad: what pitch attitude and heading are off turns the flow as much as
+    what a vane is off."""
+    cross_axis_share = 0.3  # attitudes and incidences of up to 17 deg
+    vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
+    vane_noise_std = [hypot(errors[vane].random, errors[angle].random) for vane, angle in vane_attitude_pairs]
+    return np.array(vane_noise_std) + cross_axis_share * (
+        errors["V"].random / airspeed_mps + errors["phi"].random
+    )
 
 
-def gust_estimate_noise(
-    flow: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float
+def gust_estimate_noise_std_for(
+    flow_angle_noise_std: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float
 ) -> np.ndarray:
     """Standard deviation, rad/s2 on each axis, of what noise of the flow's angles (2,) rad adds to a gust."""
-    V, b = y[AIRSPEED], span_m
-    pitching, yawing = flow * pi * V / (np.array([4.0, 3.0]) * b)
+    V, span = y[AIRSPEED], span_m
+    pitch_gust_noise, yaw_gust_noise = flow_angle_noise_std * pi * V / (np.array([4.0, 3.0]) * span)
     damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
-    return np.sqrt((damping[:, 1] * pitching) ** 2 + (damping[:, 2] * yawing) ** 2)
+    return np.sqrt((damping[:, 1] * pitch_gust_noise) ** 2 + (damping[:, 2] * yaw_gust_noise) ** 2)
 
 
 def axis_of_term(term: Term) -> int:
@@ -668,36 +789,41 @@ def axis_of_term(term: Term) -> int:
     return MOMENTS.index(term.coefficient)
 
 
-def coefficient_tolerances(
+def moment_term_tolerances(
     declared: Declared, design: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
-    (noise_model.py); y, u in trim."""
+    (statistical.py); y, u in trim."""
     aircraft, errors = declared.aircraft, declared.sensors
-    size = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    slack, nominal = inertia_coefficient_errors(declared.inertia, mass), np.abs(inertia_coefficients(mass))
-    of_own_axis = (2, 7, 11)  # what multiplies a moment there
-    share = np.full(size.shape, max(slack[i] / nominal[i] for i in of_own_axis))
-    share += [_measured_share(errors, term) for term in aircraft.moments]
-    total = declared.coefficients.absolute(aircraft.moments, size) + share * size
+    coefficient = np.abs(design["moments"]["value"][: len(aircraft.moments)])
+    inertia_error = max_inertia_coefficient_errors(declared.inertia, mass)
+    nominal_inertia = np.abs(inertia_coefficients(mass))
+    own_axis_coefficients = (2, 7, 11)  # what multiplies a moment there
+    relative_tolerance = np.full(
+        coefficient.shape, max(inertia_error[i] / nominal_inertia[i] for i in own_axis_coefficients)
+    )
+    relative_tolerance += [_relative_reading_error(errors, term) for term in aircraft.moments]
+    tolerance = (
+        declared.coefficients.absolute(aircraft.moments, coefficient) + relative_tolerance * coefficient
+    )
     slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
     span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for name, place, length in zip(AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True):
-        error = errors[name].steady * length / y[AIRSPEED]
+    for name, signal_index, length in zip(AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True):
+        normalised_rate_error = errors[name].steady * length / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                total[k] += error * slopes[axis_of_term(term), place]
-    return total
+                tolerance[k] += normalised_rate_error * slopes[axis_of_term(term), signal_index]
+    return tolerance
 
 
-def _measured_share(errors: SensorErrors, term: Term) -> float:
+def _relative_reading_error(errors: SensorErrors, term: Term) -> float:
     """Relative error of what a term multiplies, by the slopes of gyros, vanes, airspeed and pressure."""
-    own = AXES[axis_of_term(term)]  # a gyro's slope is counted once for all terms of its own axis
-    share = errors[own].slope + errors["qdyn"].slope
+    own_gyro = AXES[axis_of_term(term)]  # a gyro's slope is counted once for all terms of its own_gyro axis
+    relative_error = errors[own_gyro].slope + errors["qdyn"].slope
     for signal, power in term.of:
-        if signal in _GYRO_OF:
-            share += power * errors["V"].slope
-        error = errors.get(_GYRO_OF.get(signal, signal))
-        if error is not None and _GYRO_OF.get(signal) != own:
-            share += power * error.slope
-    return share
+        if signal in _AXIS_OF_RATE_SIGNAL:
+            relative_error += power * errors["V"].slope
+        sensor_error = errors.get(_AXIS_OF_RATE_SIGNAL.get(signal, signal))
+        if sensor_error is not None and _AXIS_OF_RATE_SIGNAL.get(signal) != own_gyro:
+            relative_error += power * sensor_error.slope
+    return relative_error

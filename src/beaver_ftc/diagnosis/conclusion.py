@@ -14,39 +14,45 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR
-from beaver_ftc.diagnosis.types import verdict
-from beaver_ftc.diagnosis.types.contract import (
+from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     WAIT_FOR_SURFACE,
-    observed_error,
+    observed_deflection_error,
+    verdict,
 )
 
-MAX_WITHDRAWN = 16
+MAX_WITHDRAWN_ISOLATIONS = 16
 
-# A name that was withdrawn: the surface, named from when to when, s.
-WITHDRAWN_NAME = record(surface=int, from_s=float, to_s=float)
+# An isolation that was withdrawn: the surface, isolated from when to when, s.
+WITHDRAWN_ISOLATION_RECORD = record(surface=int, from_s=float, to_s=float)
 
 
 @sized
 def conclusion_dtype(n: int) -> np.dtype:
-    """The conclusion about n surfaces. isolated: an estimator, NOT_ISOLATED or UNANTICIPATED. type: of the
-    isolated fault, -1 if open. lead, lead_kind: the surface the law acts upon, and its accommodation mode.
-    effectiveness: of every surface, where a plug-in `estimates` it. named_from_s: since when each surface is
-    named, -1 if it is not; withdrawn: what was named before."""
+    """The conclusion about n surfaces. isolated_estimator: that of the isolated fault, NOT_ISOLATED or
+    UNANTICIPATED. fault_type: of the isolated fault, -1 if open. accommodated_surface, accommodation_mode:
+    the surface the law acts upon, and its accommodation mode. effectiveness: of every surface, where a
+    plug-in estimates it (has_effectiveness). isolated_from_s: since when each surface is isolated, -1 if it
+    is not; withdrawn_isolations: what was isolated before."""
     return record(
-        detected=int, detected_at_s=float, detected_axis=int, isolated=int, isolated_at_s=float, type=int,
-        type_at_s=float, lead=int, lead_kind=int, estimates=int, effectiveness=n, named_from_s=n,
-        n_withdrawn=int, withdrawn=(WITHDRAWN_NAME, MAX_WITHDRAWN),
+        detected=int, detected_at_s=float, detected_axis=int, isolated_estimator=int, isolated_at_s=float,
+        fault_type=int, type_decided_at_s=float, accommodated_surface=int, accommodation_mode=int,
+        has_effectiveness=int,
+        effectiveness=n, isolated_from_s=n,
+        n_withdrawn_isolations=int,
+        withdrawn_isolations=(WITHDRAWN_ISOLATION_RECORD, MAX_WITHDRAWN_ISOLATIONS),
     )  # fmt: skip
 
 
-def configure_conclusion(conclusion: np.void) -> None:
+def reset_conclusion(conclusion: np.void) -> None:
     """Fill the record of a diagnosis that has concluded nothing."""
     conclusion["detected_at_s"] = conclusion["isolated_at_s"] = -1.0
-    conclusion["isolated"], conclusion["named_from_s"] = NOT_ISOLATED, -1.0
-    conclusion["type"] = conclusion["lead"] = conclusion["lead_kind"] = conclusion["type_at_s"] = -1
+    conclusion["isolated_estimator"], conclusion["isolated_from_s"] = NOT_ISOLATED, -1.0
+    conclusion["fault_type"] = conclusion["accommodated_surface"] = conclusion[
+        "accommodation_mode"
+    ] = conclusion["type_decided_at_s"] = -1
 
 
 @kernel
@@ -57,68 +63,74 @@ def latch_alarm(conclusion, axis, t):
 
 
 @kernel
-def record_isolated(conclusion, isolated, t):
+def record_isolated_estimator(conclusion, isolated_estimator, t):
     """Replace the isolated fault, and at t s its instant if it is another one."""
-    if isolated != conclusion.isolated:
-        conclusion.isolated, conclusion.isolated_at_s = isolated, t
+    if isolated_estimator != conclusion.isolated_estimator:
+        conclusion.isolated_estimator, conclusion.isolated_at_s = isolated_estimator, t
 
 
 @kernel
-def record_finding(conclusion, finding):
+def record_isolation_finding(conclusion, finding):
     """Replace fault, type and lead by the finding of the fault types.
 
-    finding: (isolated, isolated_at_s, type, type_at_s, lead, lead_kind).
+    finding: (isolated, isolated_at_s, type, type_at_s, accommodated_surface, accommodation_mode).
     """
-    conclusion.isolated, conclusion.isolated_at_s = finding[0], finding[1]
-    conclusion.type, conclusion.type_at_s = finding[2], finding[3]
-    conclusion.lead, conclusion.lead_kind = finding[4], finding[5]
+    conclusion.isolated_estimator, conclusion.isolated_at_s = finding[0], finding[1]
+    conclusion.fault_type, conclusion.type_decided_at_s = finding[2], finding[3]
+    conclusion.accommodated_surface, conclusion.accommodation_mode = finding[4], finding[5]
 
 
 @kernel
-def record_plugin_verdict(conclusion, given, t):
-    """Replace the built-in conclusion at t s by the verdict `given` of a plug-in."""
-    if given.detected:
-        latch_alarm(conclusion, given.axis, t)
-    record_isolated(conclusion, given.isolated if conclusion.detected else NOT_ISOLATED, t)
-    conclusion.estimates = given.estimates
-    conclusion.effectiveness[:] = given.effectiveness
+def record_plugin_verdict(conclusion, plugin_verdict, t):
+    """Replace the built-in conclusion at t s by the verdict of a plug-in."""
+    if plugin_verdict.detected:
+        latch_alarm(conclusion, plugin_verdict.axis, t)
+    record_isolated_estimator(conclusion, plugin_verdict.isolated if conclusion.detected else NOT_ISOLATED, t)
+    conclusion.has_effectiveness = plugin_verdict.has_effectiveness
+    conclusion.effectiveness[:] = plugin_verdict.effectiveness
 
 
 @kernel
 def discard_conclusion(conclusion):
     """Discard the conclusion: a sensor is broken, not a surface."""
-    conclusion.detected, conclusion.isolated, conclusion.type = 0, NOT_ISOLATED, -1
+    conclusion.detected, conclusion.isolated_estimator, conclusion.fault_type = 0, NOT_ISOLATED, -1
     conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
-    conclusion.lead = conclusion.lead_kind = -1
+    conclusion.accommodated_surface = conclusion.accommodation_mode = -1
 
 
 @kernel
-def record_named(conclusion, s, named, t):
-    """Note at t s whether surface s is named, and keep a withdrawn name; once the room for them is used up
-    the latest takes the last place."""
-    since = conclusion.named_from_s[s]
-    if named and since < 0.0:
-        conclusion.named_from_s[s] = t
-    elif since >= 0.0 and not named:
-        gone = conclusion.withdrawn[min(conclusion.n_withdrawn, MAX_WITHDRAWN - 1)]
-        gone.surface, gone.from_s, gone.to_s = s, since, t
-        conclusion.n_withdrawn += 1
-        conclusion.named_from_s[s] = -1.0
+def update_isolation_interval(conclusion, surface, is_isolated, t):
+    """Note at t s whether a surface is isolated, and keep a withdrawn isolation; once the room for them is
+    used up the latest takes the last place."""
+    isolated_from_s = conclusion.isolated_from_s[surface]
+    if is_isolated and isolated_from_s < 0.0:
+        conclusion.isolated_from_s[surface] = t
+    elif isolated_from_s >= 0.0 and not is_isolated:
+        withdrawn = conclusion.withdrawn_isolations[
+            min(conclusion.n_withdrawn_isolations, MAX_WITHDRAWN_ISOLATIONS - 1)
+        ]
+        withdrawn.surface, withdrawn.from_s, withdrawn.to_s = surface, isolated_from_s, t
+        conclusion.n_withdrawn_isolations += 1
+        conclusion.isolated_from_s[surface] = -1.0
 
 
 @kernel
 def isolated_surface(conclusion, estimators):
     """The surface of the isolated fault, or -1."""
-    return estimators[conclusion.isolated].surface if conclusion.isolated >= 0 else -1
+    return estimators[conclusion.isolated_estimator].surface if conclusion.isolated_estimator >= 0 else -1
 
 
 @kernel
-def cause_is_unknown(conclusion):
+def is_cause_unknown(conclusion):
     """Whether the cause is open: no surface is isolated or leads, and no plug-in estimates effectiveness."""
-    return conclusion.isolated < 0 and conclusion.lead < 0 and not conclusion.estimates
+    return (
+        conclusion.isolated_estimator < 0
+        and conclusion.accommodated_surface < 0
+        and not conclusion.has_effectiveness
+    )
 
 
-SURE_INFORMATION = (
+MIN_INFORMATION_TO_APPLY_IMMEDIATELY = (
     400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
 )
 
@@ -127,63 +139,80 @@ SURE_INFORMATION = (
 def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces.
 
-    detected: a fault; unknown: no surface is isolated or leads; named: the isolated surface, -1 for none.
-    surface_lags: a surface follows its command late. accommodation_mode: of each surface, -1 where open, or
-    where faults of every type are not diagnosed; effectiveness; apply_immediately: whether the law applies it
-    at once, not gradually; offset, lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault.
-    pitch_undecided: elevator or flap is at fault, and it has long been open which.
+    detected: a fault; is_cause_unknown: no surface is isolated or accommodated; isolated_surface: -1 for
+    none. any_surface_lags: a surface follows its command late. accommodation_mode: of each surface, -1 where
+    open, or where faults of every type are not diagnosed; effectiveness; apply_immediately: whether the law
+    applies it at once, not gradually; deflection_offset, deflection_lag rad. unknown_acceleration (3,)
+    rad/s2: explained by no known fault. pitch_undecided: elevator or flap is at fault, and it has long been
+    open which.
     """
     return record(
-        detected=int, unknown=int, every_type=int, named=int, surface_lags=int, accommodation_mode=(int, n),
-        effectiveness=n, apply_immediately=(int, n), offset=n, lag=n, unknown_acceleration=3,
+        detected=int, is_cause_unknown=int, diagnoses_all_types=int, isolated_surface=int,
+        any_surface_lags=int,
+        accommodation_mode=(int, n),
+        effectiveness=n, apply_immediately=(int, n), deflection_offset=n, deflection_lag=n,
+        unknown_acceleration=3,
         pitch_undecided=int,
     )  # fmt: skip
 
 
 @kernel
-def assess_surfaces(assessment, config, conclusion, types, layout, estimators, statistics):
-    """Bring the assessment to this frame, by the stages' outputs; statistics: of `statistical_dtype`."""
-    every_type, named = config.every_type, isolated_surface(conclusion, estimators)
-    assessment.detected, assessment.every_type = conclusion.detected, every_type
-    assessment.named, assessment.surface_lags, assessment.unknown = named, 0, cause_is_unknown(conclusion)
+def assess_surfaces(assessment, config, conclusion, types, layout, estimators, statistical_detector):
+    """Bring the assessment to this frame, by the stages' outputs; statistical_detector: of
+    `statistical_dtype`."""
+    diagnoses_all_types, isolated = config.diagnoses_all_types, isolated_surface(conclusion, estimators)
+    assessment.detected, assessment.diagnoses_all_types = conclusion.detected, diagnoses_all_types
+    assessment.isolated_surface, assessment.any_surface_lags, assessment.is_cause_unknown = (
+        isolated,
+        0,
+        is_cause_unknown(conclusion),
+    )
     for s in range(assessment.accommodation_mode.size):
-        assessment.accommodation_mode[s] = types.surface[s].accommodation.mode if every_type else -1
+        assessment.accommodation_mode[s] = types.surface[s].accommodation.mode if diagnoses_all_types else -1
         assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0, 0
-        assessment.offset[s], assessment.lag[s] = 0.0, 0.0
-        if conclusion.estimates and conclusion.detected:
+        assessment.deflection_offset[s], assessment.deflection_lag[s] = 0.0, 0.0
+        if conclusion.has_effectiveness and conclusion.detected:
             assessment.effectiveness[s] = conclusion.effectiveness[s]
         elif assessment.accommodation_mode[s] >= 0:
             assess_surface_at_fault(assessment, types, layout, estimators, s)
-        elif s == named and not every_type:
-            likely = uses_statistical_estimates(statistics.tests, config.authority)
-            sure = likely and statistical.estimated_loss(statistics.block, s)[1] > SURE_INFORMATION
-            theta = isolated_theta(config, conclusion, layout, estimators, statistics, s)
-            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, sure
+        elif s == isolated and not diagnoses_all_types:
+            uses_statistics = uses_statistical_estimates(statistical_detector.test_config, config.authority)
+            is_precise = (
+                uses_statistics
+                and statistical.estimate_loss(statistical_detector.block, s)[1]
+                > MIN_INFORMATION_TO_APPLY_IMMEDIATELY
+            )
+            theta = estimated_theta_of_isolated_loss(
+                config, conclusion, layout, estimators, statistical_detector, s
+            )
+            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, is_precise
 
 
 @kernel
 def assess_surface_at_fault(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, at fault by the diagnosis of every type."""
     surface = types.surface[s]
-    at_fault, mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
+    is_at_fault, mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
     if mode == SCALE_COMMAND:
-        assessment.effectiveness[s] = verdict.effectiveness_left(types, layout, estimators, s)
+        assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
     elif mode == GIVE_UP:
         assessment.effectiveness[s], assessment.apply_immediately[s] = 0.0, 1
-        assessment.offset[s] = surface.elapsed.command + verdict.deflection_error(surface, at_fault)
+        assessment.deflection_offset[s] = (
+            surface.last_observation.healthy_position + verdict.deflection_error(surface, is_at_fault)
+        )
     elif mode == SUBTRACT_OFFSET:
-        assessment.offset[s] = verdict.deflection_error(surface, at_fault)
+        assessment.deflection_offset[s] = verdict.deflection_error(surface, is_at_fault)
     elif mode == WAIT_FOR_SURFACE:
-        assessment.lag[s] = observed_error(surface)
-        assessment.surface_lags = 1
+        assessment.deflection_lag[s] = observed_deflection_error(surface)
+        assessment.any_surface_lags = 1
 
 
 @kernel
-def isolated_theta(config, conclusion, layout, estimators, statistics, s):
+def estimated_theta_of_isolated_loss(config, conclusion, layout, estimators, statistical_detector, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
-    if uses_statistical_estimates(statistics.tests, config.authority):
-        return statistical.estimated_loss(statistics.block, s)[0]
-    return estimators[conclusion.isolated].theta[layout.dominant_axis[s]]
+    if uses_statistical_estimates(statistical_detector.test_config, config.authority):
+        return statistical.estimate_loss(statistical_detector.block, s)[0]
+    return estimators[conclusion.isolated_estimator].theta[layout.dominant_axis[s]]
 
 
 @kernel
@@ -193,18 +222,31 @@ def uses_statistical_estimates(tests, authority):
 
 
 @kernel
-def assess_unknown_acceleration(assessment, config, conclusion, types, layout, statistics, detector, bound):
-    """Fill unknown_acceleration and pitch_undecided; detector: the FDAE's record; bound: what is declared.
+def assess_unknown_acceleration(
+    assessment, config, conclusion, types, layout, statistical_detector, fdae, bound
+):
+    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound: what is declared.
 
     No acceleration is asked for what a slow surface lags: it would only wind the command up.
     """
-    unknown, every_type = assessment.unknown_acceleration, config.every_type
-    unknown[:] = 0.0
-    lags = conclusion.lead >= 0 and conclusion.lead_kind == WAIT_FOR_SURFACE
-    if conclusion.detected and not lags and uses_statistical_estimates(statistics.tests, config.authority):
-        statistical.statistical_unknown_acceleration(statistics.block, statistics.air, unknown)
+    unknown_acceleration, diagnoses_all_types = assessment.unknown_acceleration, config.diagnoses_all_types
+    unknown_acceleration[:] = 0.0
+    lags = conclusion.accommodated_surface >= 0 and conclusion.accommodation_mode == WAIT_FOR_SURFACE
+    if (
+        conclusion.detected
+        and not lags
+        and uses_statistical_estimates(statistical_detector.test_config, config.authority)
+    ):
+        statistical.fill_statistical_unknown_acceleration(
+            statistical_detector.block, statistical_detector.gust, unknown_acceleration
+        )
     elif conclusion.detected and not lags:
-        filters.fdae_unknown_acceleration(detector, bound.noise, unknown)
-    is_not_excluded = every_type and conclusion.detected and conclusion.isolated == NOT_ISOLATED
-    long = types.surface[layout.main[PITCH]].evidence.frames >= types.config.half_cycle_frames
-    assessment.pitch_undecided = is_not_excluded and long
+        filters.fill_fdae_unknown_acceleration(fdae, bound.gyro_change_bound, unknown_acceleration)
+    is_undecided = (
+        diagnoses_all_types and conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED
+    )
+    has_half_cycle = (
+        types.surface[layout.main[PITCH]].evidence.n_anomalous_frames
+        >= types.config.slowest_half_cycle_frames
+    )
+    assessment.pitch_undecided = is_undecided and has_half_cycle

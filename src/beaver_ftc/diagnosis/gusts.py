@@ -20,7 +20,7 @@ V is the speed relative to the field of gusts. The mean wind carries that field 
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
 sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
 `gust_velocity` is that sum, with a decay as slow as this drift permits. A relative error e of V leaves at
-most e^2 / 4 of the gust's intensity unmeasured (`speed_error_share`).
+most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_variance`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
@@ -36,7 +36,7 @@ from beaver_ftc.aircraft import MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.air import SCALE_M, rotation_lengths
+from beaver_ftc.design import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import (
     AIRSPEED,
     ALPHA,
@@ -48,586 +48,687 @@ from beaver_ftc.design.model import (
     rate_damping,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import flow_angle_noise, gust_estimate_noise, lowest_height
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
+from beaver_ftc.diagnosis.bounds import (
+    gust_estimate_noise_std_for,
+    level_flow_angle_noise_std,
+    min_true_height_m,
+)
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
-# exact vanes and over a filter's memory it is smaller (`tests/diagnosis/belief/test_air.py`).
-UNMEASURED_SHARES = (1.0, 0.003, 0.03)
-FORCE_ERROR_SHARE = 0.01  # share left unmeasured by an error of a tenth in the forces
-TWO_STEP_NOISE = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
+# exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
+MIN_UNMEASURED_INTENSITY_SHARES = (1.0, 0.003, 0.03)
+UNMEASURED_SHARE_BY_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
+ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
-MAX_GUST_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
+MAX_GUST_VELOCITY_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
 MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
 MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
-MIN_AXES_TURN = 0.01  # share of a gust's own intensity below which the turn of its axes is ignored
+MIN_AXES_TURN_INTENSITY_SHARE = (
+    0.01  # share of a gust's own intensity below which the turn of its axes is ignored
+)
 
-CONFIG = record(
+GUST_CONFIG_RECORD = record(
     has_force_model=int,  # whether the design model has forces
-    coarse=int,  # whether only a coarse estimate of the gust is possible
-    area_per_mass=float, gravity=float, span=float,  # m2/kg, m/s2, m
+    only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
+    wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
     # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
-    intensity_aloft=3, intensity_at_1_m=3,
-    altitude_error=float, altitude_slope=float,  # bound on the altimeter's error: m; share of the reading
-    max_gust=float, decay_rate=float,  # limit of a gust component, m/s; decay of `gust_velocity`, 1/s
+    drift_intensity_aloft=3, drift_intensity_at_1_m=3,
+    altitude_error_bound=float,
+    altitude_error_share=float,  # bound on the altimeter's error: m; share of the reading
+    # limit of a gust component, m/s; decay of `gust_velocity`, 1/s
+    max_gust_velocity=float, gust_velocity_decay_rate=float,
     # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
     # relative error of the speed leaves, over the variance of that error.
-    speed_variance=float, gust_variance=float, error_gain=float,
-    rolling_length=float,  # lag of the rolling gust times airspeed, m
-    turbulence_length=float,  # of the gusts, m
-    in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
+    speed_error_variance=float, gust_velocity_variance=float, unmeasured_share_per_speed_variance=float,
+    rolling_gust_correlation_length=float,  # lag of the rolling gust times airspeed, m
+    turbulence_scale_length=float,  # of the gusts, m
+    starts_in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
 )  # fmt: skip
 
-MEMORY = record(
-    started=int,  # whether `acceleration_before` is valid
-    measured=3,  # reading of the accelerometers, m/s2
+GUST_MEMORY_RECORD = record(
+    has_acceleration_before=int,  # whether `level_acceleration_before` is valid
+    accelerometer_reading=3,  # reading of the accelerometers, m/s2
     force_table=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
     # Velocity relative to the air, m/s in level axes; specific force, m/s2 in body axes; attitude.
-    velocity=3, force=3, level_to_body=(3, 3), heading=float,
-    acceleration_before=3,  # an instant before, by forces and gravity, m/s2 in the level axes of this one
-    gust=3, rotation=3,  # rotation of the air, rad/s: in level axes, in body axes
-    acceleration_sum=3,  # sum of `acceleration` over the instants of a frame, rad/s2
-    intensity=3,  # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
-    unmeasured_share=3,  # share of it that the vanes do not measure
+    air_relative_velocity=3, specific_force=3, level_to_body=(3, 3), heading=float,
+    # an instant before, by forces and gravity, m/s2 in the level axes of this one
+    level_acceleration_before=3,
+    air_rotation_in_level_axes=3, air_rotation_in_body_axes=3,  # rad/s
+    gust_angular_acceleration_sum=3,  # sum of `gust_acceleration` over the instants of a frame, rad/s2
+    # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
+    gust_drift_intensity=3,
+    unmeasured_intensity_share=3,  # share of it that the vanes do not measure
     # Change of the gust's velocity since the start, m/s ahead, right, down; share of the variance of the
     # initial gust that still counts.
-    gust_velocity=3, initial_share=float,
+    gust_velocity=3, initial_gust_variance_share=float,
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
-    # the pitching gust that was present when the diagnosis started.
-    lost_share=float, turning_share=float, start_share=float,
-    axes_rate=(3, 3), axes_turn_fast=int,  # turn of the gusts' axes in the body, 1/s; whether it counts
+    # the pitching gust that was present when the diagnosis has_acceleration_before.
+    unmeasured_share_by_turn=float, unmeasured_share_by_past_turns=float, unmeasured_share_by_start=float,
+    # turn of the gusts' axes in the body, 1/s; whether it counts
+    gust_axes_rate=(3, 3), has_fast_axes_turn=int,
     # Variance of the accelerations by that turn, (rad/s2)2: in the current frame, in the frame before; number
     # of frames for which there is any.
-    turn_variance_now=(3, 3), turn_variance_before=(3, 3), turn_frames=int,
+    axes_turn_variance_now=(3, 3), axes_turn_variance_before=(3, 3), n_axes_turn_frames=int,
 )  # fmt: skip
 
-OUTPUT = record(
+GUST_OUTPUT_RECORD = record(
     # Whether there is turbulence; whether accelerometers are used; whether the gust is measured. These are
     # filled by configure, and end with the accelerometers.
-    moving=int, uses_accelerometers=int, measures_gust=int,
-    acceleration=3, mean=3,  # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
-    coarse_acceleration=3,  # effect of the coarse estimate, rad/s2
-    turn_variance=(3, 3),  # `turn_variance_now` plus `turn_variance_before`, (rad/s2)2
-    speed=float,  # relative to the mean air, m/s
-    damping=(3, 3), axes=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
+    is_turbulent=int, uses_accelerometers=int, is_gust_measured=int,
+    # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
+    gust_acceleration=3, mean_gust_acceleration=3,
+    coarse_gust_acceleration=3,  # effect of the coarse estimate, rad/s2
+    axes_turn_variance=(3, 3),  # `axes_turn_variance_now` plus `axes_turn_variance_before`, (rad/s2)2
+    speed_relative_to_mean_air=float,  # relative to the mean air, m/s
+    rate_damping=(3, 3), gust_axes_in_body=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
 )  # fmt: skip
 
-GUST_RECORD = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
+GUST_RECORD = record(config=GUST_CONFIG_RECORD, memory=GUST_MEMORY_RECORD, output=GUST_OUTPUT_RECORD)
 
 
 @kernel
-def fill_specific_force(air, x, y, u, out):
+def fill_specific_force(gust, x, y, u, out):
     """Fill out (3,) m/s2 with the aerodynamic and propulsive force over mass in body axes, by the model.
 
     x (3,) rad/s, y (4 + declared,), u (n,) rad. The term of the rate of sideslip is omitted: it is below a
     hundredth of the side force.
     """
-    table = air.memory.force_table
+    table = gust.memory.force_table
     evaluate(table, x, y)
     for i in range(3):
-        out[i] = y[QDYN] * air.config.area_per_mass * whole_sum(table, i, table.power, u)
+        out[i] = y[QDYN] * gust.config.wing_area_per_mass * whole_sum(table, i, table.power, u)
 
 
 @kernel
-def fill_level_axes(phi, theta, turn):
-    """Fill turn (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
+def fill_level_to_body_rotation(phi, theta, level_to_body):
+    """Fill level_to_body (3, 3), the rotation from level axes (forward, right, down) to body axes; angles
+    rad."""
     sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
-    turn[0, 0], turn[0, 1], turn[0, 2] = cos_theta, 0.0, -sin_theta
-    turn[1, 0], turn[1, 1], turn[1, 2] = sin_phi * sin_theta, cos_phi, sin_phi * cos_theta
-    turn[2, 0], turn[2, 1], turn[2, 2] = cos_phi * sin_theta, -sin_phi, cos_phi * cos_theta
+    level_to_body[0, 0], level_to_body[0, 1], level_to_body[0, 2] = cos_theta, 0.0, -sin_theta
+    level_to_body[1, 0] = sin_phi * sin_theta
+    level_to_body[1, 1] = cos_phi
+    level_to_body[1, 2] = sin_phi * cos_theta
+    level_to_body[2, 0] = cos_phi * sin_theta
+    level_to_body[2, 1] = -sin_phi
+    level_to_body[2, 2] = cos_phi * cos_theta
 
 
 @kernel
-def to_level(turn, body, i):
+def level_component(level_to_body, body_vector, i):
     """Component i in level axes of a vector (3,) in body axes."""
-    return turn[0, i] * body[0] + turn[1, i] * body[1] + turn[2, i] * body[2]
+    return (
+        level_to_body[0, i] * body_vector[0]
+        + level_to_body[1, i] * body_vector[1]
+        + level_to_body[2, i] * body_vector[2]
+    )
 
 
 @kernel
-def measure_air_velocity(air, y, attitude):
+def measure_air_relative_velocity(gust, y, attitude):
     """Fill attitude, heading and velocity relative to the air, m/s in level axes, of this instant.
 
     y (5,) and attitude (3,) rad as measured.
     """
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
-    fill_level_axes(attitude[0], attitude[1], air.memory.level_to_body)
-    air.memory.heading = attitude[2]
-    u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
+    fill_level_to_body_rotation(attitude[0], attitude[1], gust.memory.level_to_body)
+    gust.memory.heading = attitude[2]
+    forward = V * np.cos(alpha) * np.cos(beta)
+    right = V * np.sin(beta)
+    down = V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
-        air.memory.velocity[i] = (
-            air.memory.level_to_body[0, i] * u
-            + air.memory.level_to_body[1, i] * v
-            + air.memory.level_to_body[2, i] * w
+        gust.memory.air_relative_velocity[i] = (
+            gust.memory.level_to_body[0, i] * forward
+            + gust.memory.level_to_body[1, i] * right
+            + gust.memory.level_to_body[2, i] * down
         )
 
 
 @kernel
-def start_gust_estimate(air, y, attitude):
+def start_gust_estimate(gust, y, attitude):
     """Start at the first frame of a diagnosis: the estimated gust is zero.
 
     If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
     """
-    measure_air_velocity(air, y, attitude)
-    update_gust_axes(air, 0.0, 1.0)
-    air.memory.gust[:] = 0.0
-    air.memory.started, air.memory.lost_share = 0, 0.0
-    air.memory.turning_share = air.memory.start_share = air.memory.initial_share = float(air.config.in_flight)
-    air.memory.gust_velocity[:], air.output.speed = 0.0, y[AIRSPEED]
-    (
-        air.memory.turn_variance_now[:],
-        air.memory.turn_variance_before[:],
-        air.output.turn_variance[:],
-        air.memory.turn_frames,
-    ) = 0.0, 0.0, 0.0, 0
+    measure_air_relative_velocity(gust, y, attitude)
+    update_gust_axes(gust, 0.0, 1.0)
+    gust.memory.air_rotation_in_level_axes[:] = 0.0
+    gust.memory.has_acceleration_before, gust.memory.unmeasured_share_by_turn = 0, 0.0
+    gust.memory.unmeasured_share_by_past_turns = gust.memory.unmeasured_share_by_start = (
+        gust.memory.initial_gust_variance_share
+    ) = float(gust.config.starts_in_flight)
+    gust.memory.gust_velocity[:], gust.output.speed_relative_to_mean_air = 0.0, y[AIRSPEED]
+    gust.memory.axes_turn_variance_now[:] = 0.0
+    gust.memory.axes_turn_variance_before[:] = 0.0
+    gust.output.axes_turn_variance[:] = 0.0
+    gust.memory.n_axes_turn_frames = 0
 
 
 @kernel
-def update_gust_axes(air, sin, cos):
-    """Fill `axes` for this instant, and keep those of the instant before in `axes_rate`.
+def update_gust_axes(gust, sin_heading_change, cos_heading_change):
+    """Fill `gust_axes_in_body` for this instant, and keep those of the instant before in `gust_axes_rate`.
 
-    sin, cos: of the change of heading. JSBSim's gusts have the heading of the step before.
+    sin, cos_heading_change: of the change of heading. JSBSim's gusts have the heading of the step before.
     """
-    air.memory.axes_rate[:] = air.output.axes
+    gust.memory.gust_axes_rate[:] = gust.output.gust_axes_in_body
     for i in range(3):
-        ahead, right = air.memory.level_to_body[i, 0], air.memory.level_to_body[i, 1]
-        air.output.axes[i, 0], air.output.axes[i, 1] = ahead * cos - right * sin, ahead * sin + right * cos
-        air.output.axes[i, 2] = air.memory.level_to_body[i, 2]
+        ahead, right = gust.memory.level_to_body[i, 0], gust.memory.level_to_body[i, 1]
+        gust.output.gust_axes_in_body[i, 0] = ahead * cos_heading_change - right * sin_heading_change
+        gust.output.gust_axes_in_body[i, 1] = ahead * sin_heading_change + right * cos_heading_change
+        gust.output.gust_axes_in_body[i, 2] = gust.memory.level_to_body[i, 2]
 
 
 @kernel
-def update_axes_rate(air, dt, V):
-    """Fill `axes_rate`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant before.
+def update_gust_axes_rate(gust, dt, V):
+    """Fill `gust_axes_rate`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant
+    before.
 
     A constant unmeasured gust of deviation sigma = sqrt(intensity lag / 2) then changes in body axes at the
-    rate sigma axes_rate. Over its lag this equals a random walk of (axes_rate lag)^2 / 2 times its intensity.
+    rate sigma gust_axes_rate. Over its lag this equals a random walk of (gust_axes_rate lag)^2 / 2 times its
+    intensity.
     """
-    most = 0.0
+    fastest_turn = 0.0
     for i in range(3):
         for g in range(3):
-            air.memory.axes_rate[i, g] = (air.output.axes[i, g] - air.memory.axes_rate[i, g]) / dt
-            most = max(most, abs(air.memory.axes_rate[i, g]))
-    air.memory.axes_turn_fast = 0.5 * (most * air.config.rolling_length / V) ** 2 > MIN_AXES_TURN
+            gust.memory.gust_axes_rate[i, g] = (
+                gust.output.gust_axes_in_body[i, g] - gust.memory.gust_axes_rate[i, g]
+            ) / dt
+            fastest_turn = max(fastest_turn, abs(gust.memory.gust_axes_rate[i, g]))
+    gust.memory.has_fast_axes_turn = (
+        0.5 * (fastest_turn * gust.config.rolling_gust_correlation_length / V) ** 2
+        > MIN_AXES_TURN_INTENSITY_SHARE
+    )
 
 
 @kernel
-def share_lost_by_turning(air, V, rate):
-    """Share of the yawing gust's intensity that is unmeasured while the heading turns at `rate` rad/s.
+def unmeasured_share_of_turn(gust, V, heading_rate):
+    """Share of the yawing gust's intensity that is unmeasured while the heading turns at `heading_rate`
+    rad/s.
 
     The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
-    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / turbulence_length. The share is the
-    ratio of their squares over the lag of the yawing gust, 3 span / pi V.
+    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / turbulence_scale_length. The share is
+    the ratio of their squares over the lag of the yawing gust, 3 span / pi V.
     """
-    return rate * rate * air.config.span * air.config.turbulence_length / (pi * V * V)
+    return (
+        heading_rate
+        * heading_rate
+        * gust.config.wing_span
+        * gust.config.turbulence_scale_length
+        / (pi * V * V)
+    )
 
 
 @kernel
-def update_gust(air, y, attitude, dt):
-    """Update `gust` (3,) rad/s in level axes for the elapsed dt s; the rolling gust stays unknown.
+def update_gust_rotation(gust, y, attitude, dt):
+    """Update `air_rotation_in_level_axes` (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
-    y (5,) and attitude (3,) rad as measured now; `force` and attitude in memory are those dt s ago. If the
-    heading turns so fast that the vanes mostly measure this turn, as when the nose passes the vertical, the
-    yawing gust only decays. It does so one instant longer: JSBSim's gusts turn a step after the heading.
+    y (5,) and attitude (3,) rad as measured now; `specific_force` and attitude in memory are those dt s ago.
+    If the heading turns so fast that the vanes mostly measure this turn, as when the nose passes the
+    vertical, the yawing gust only decays, and the sum of changes `gust_velocity` starts again. It does so one
+    instant longer: JSBSim's gusts turn a step after the heading.
     """
-    pulled = air.memory.scratch
+    level_acceleration = gust.memory.scratch
     for i in range(3):
-        pulled[i] = to_level(air.memory.level_to_body, air.memory.force, i)
-    pulled[2] += air.config.gravity
-    if not air.memory.started:
-        air.memory.acceleration_before[:] = pulled[:3]
-        air.memory.started = 1
+        level_acceleration[i] = level_component(gust.memory.level_to_body, gust.memory.specific_force, i)
+    level_acceleration[2] += gust.config.gravity
+    if not gust.memory.has_acceleration_before:
+        gust.memory.level_acceleration_before[:] = level_acceleration[:3]
+        gust.memory.has_acceleration_before = 1
     for i in range(3):
-        air.memory.velocity[i] += dt * (1.5 * pulled[i] - 0.5 * air.memory.acceleration_before[i])
-    turned = wrapped(attitude[2] - air.memory.heading)
-    sin, cos = np.sin(turned), np.cos(turned)
-    ahead, right = (
-        air.memory.velocity[0] * cos + air.memory.velocity[1] * sin,
-        air.memory.velocity[1] * cos - air.memory.velocity[0] * sin,
+        gust.memory.air_relative_velocity[i] += dt * (
+            1.5 * level_acceleration[i] - 0.5 * gust.memory.level_acceleration_before[i]
+        )
+    heading_change = wrapped(attitude[2] - gust.memory.heading)
+    sin, cos = np.sin(heading_change), np.cos(heading_change)
+    predicted_ahead = gust.memory.air_relative_velocity[0] * cos + gust.memory.air_relative_velocity[1] * sin
+    predicted_right = gust.memory.air_relative_velocity[1] * cos - gust.memory.air_relative_velocity[0] * sin
+    predicted_down = gust.memory.air_relative_velocity[2]
+    gust.memory.level_acceleration_before[0] = level_acceleration[0] * cos + level_acceleration[1] * sin
+    gust.memory.level_acceleration_before[1] = level_acceleration[1] * cos - level_acceleration[0] * sin
+    gust.memory.level_acceleration_before[2] = level_acceleration[2]
+    measure_air_relative_velocity(gust, y, attitude)
+    update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, y[AIRSPEED], dt)
+    V = gust.output.speed_relative_to_mean_air
+    update_gust_axes(gust, sin, cos)
+    update_gust_axes_rate(gust, dt, V)
+    pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
+    share_before = gust.memory.unmeasured_share_by_turn
+    gust.memory.unmeasured_share_by_turn = unmeasured_share_of_turn(gust, V, heading_change / dt)
+    unmeasured_share = max(share_before, gust.memory.unmeasured_share_by_turn)
+    gust.memory.unmeasured_share_by_past_turns = min(
+        max(np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_share_by_past_turns, unmeasured_share), 1.0
     )
-    down = air.memory.velocity[2]
-    air.memory.acceleration_before[0], air.memory.acceleration_before[1] = (
-        pulled[0] * cos + pulled[1] * sin,
-        pulled[1] * cos - pulled[0] * sin,
+    gust.memory.unmeasured_share_by_start *= np.exp(-dt / pitching_lag_s)
+    gust.memory.air_rotation_in_level_axes[1] = np.exp(
+        -dt / pitching_lag_s
+    ) * gust.memory.air_rotation_in_level_axes[1] + (
+        predicted_down - gust.memory.air_relative_velocity[2]
+    ) / (V * pitching_lag_s)
+    gust.memory.air_rotation_in_level_axes[2] = (
+        np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
-    air.memory.acceleration_before[2] = pulled[2]
-    measure_air_velocity(air, y, attitude)
-    update_speed(air, ahead, right, down, y[AIRSPEED], dt)
-    V = air.output.speed
-    update_gust_axes(air, sin, cos)
-    update_axes_rate(air, dt, V)
-    pitching, yawing = 4.0 * air.config.span / (pi * V), 3.0 * air.config.span / (pi * V)  # lags, s
-    before, air.memory.lost_share = air.memory.lost_share, share_lost_by_turning(air, V, turned / dt)
-    lost = max(before, air.memory.lost_share)
-    air.memory.turning_share = min(max(np.exp(-dt / yawing) * air.memory.turning_share, lost), 1.0)
-    air.memory.start_share *= np.exp(-dt / pitching)
-    air.memory.gust[1] = np.exp(-dt / pitching) * air.memory.gust[1] + (down - air.memory.velocity[2]) / (
-        V * pitching
-    )
-    air.memory.gust[2] = np.exp(-dt / yawing) * air.memory.gust[2]
-    if lost < 1.0:
-        air.memory.gust[2] += (right - air.memory.velocity[1]) / (V * yawing)
+    if unmeasured_share < 1.0:
+        gust.memory.air_rotation_in_level_axes[2] += (
+            predicted_right - gust.memory.air_relative_velocity[1]
+        ) / (V * yawing_lag_s)
     else:
-        air.memory.gust_velocity[:], air.memory.initial_share = 0.0, 1.0
+        gust.memory.gust_velocity[:], gust.memory.initial_gust_variance_share = 0.0, 1.0
 
 
 @kernel
-def update_speed(air, ahead, right, down, V, dt):
-    """Update `gust_velocity` and `speed` for the elapsed dt s.
+def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, airspeed, dt):
+    """Update `gust_velocity` and `speed_relative_to_mean_air` for the elapsed dt s.
 
     ahead, right, down, m/s: the velocity relative to the air if the gust had not changed. V m/s: airspeed; it
     is the speed if no gust is measured.
     """
-    air.output.speed = V
-    if not air.output.measures_gust:
+    gust.output.speed_relative_to_mean_air = airspeed
+    if not gust.output.is_gust_measured:
         return
-    kept = np.exp(-air.config.decay_rate * dt)
-    air.memory.initial_share *= kept * kept
-    air.memory.gust_velocity[0] = kept * air.memory.gust_velocity[0] + ahead - air.memory.velocity[0]
-    air.memory.gust_velocity[1] = kept * air.memory.gust_velocity[1] + right - air.memory.velocity[1]
-    air.memory.gust_velocity[2] = kept * air.memory.gust_velocity[2] + down - air.memory.velocity[2]
-    squared = 0.0
+    decay_factor = np.exp(-gust.config.gust_velocity_decay_rate * dt)
+    gust.memory.initial_gust_variance_share *= decay_factor * decay_factor
+    gust.memory.gust_velocity[0] = (
+        decay_factor * gust.memory.gust_velocity[0] + predicted_ahead - gust.memory.air_relative_velocity[0]
+    )
+    gust.memory.gust_velocity[1] = (
+        decay_factor * gust.memory.gust_velocity[1] + predicted_right - gust.memory.air_relative_velocity[1]
+    )
+    gust.memory.gust_velocity[2] = (
+        decay_factor * gust.memory.gust_velocity[2] + predicted_down - gust.memory.air_relative_velocity[2]
+    )
+    squared_speed = 0.0
     for i in range(3):
-        air.memory.gust_velocity[i] = min(
-            max(air.memory.gust_velocity[i], -air.config.max_gust), air.config.max_gust
+        gust.memory.gust_velocity[i] = min(
+            max(gust.memory.gust_velocity[i], -gust.config.max_gust_velocity), gust.config.max_gust_velocity
         )
-        squared += (air.memory.velocity[i] + air.memory.gust_velocity[i]) ** 2
-    air.output.speed = max(np.sqrt(squared), 0.5 * V)
+        squared_speed += (gust.memory.air_relative_velocity[i] + gust.memory.gust_velocity[i]) ** 2
+    gust.output.speed_relative_to_mean_air = max(np.sqrt(squared_speed), 0.5 * airspeed)
 
 
 @kernel
-def set_gust_intensity(air, altitude):
+def set_gust_drift_intensity(gust, altitude):
     """Fill the intensity of turbulence at this altitude, m as measured."""
-    height = lowest_height(altitude, air.config.altitude_error, air.config.altitude_slope)
-    air.memory.intensity[0] = max(air.config.intensity_aloft[0], air.config.intensity_at_1_m[0] / height**1.5)
+    height = min_true_height_m(altitude, gust.config.altitude_error_bound, gust.config.altitude_error_share)
+    gust.memory.gust_drift_intensity[0] = max(
+        gust.config.drift_intensity_aloft[0], gust.config.drift_intensity_at_1_m[0] / height**1.5
+    )
     for g in range(1, 3):
-        air.memory.intensity[g] = max(air.config.intensity_aloft[g], air.config.intensity_at_1_m[g] / height)
+        gust.memory.gust_drift_intensity[g] = max(
+            gust.config.drift_intensity_aloft[g], gust.config.drift_intensity_at_1_m[g] / height
+        )
 
 
 @kernel
-def update_gust_estimate(air, y, attitude, dt, k):
-    """Start at frame k = 0, and update the gust at later frames; arguments as in `update_gust`."""
+def update_gust_estimate(gust, y, attitude, dt, k):
+    """Start at frame k = 0, and update the gust at later frames; arguments as in `update_gust_rotation`."""
     if k > 0:
-        update_gust(air, y, attitude, dt)
+        update_gust_rotation(gust, y, attitude, dt)
     else:
-        start_gust_estimate(air, y, attitude)
+        start_gust_estimate(gust, y, attitude)
 
 
 @kernel
-def fill_gust_effect(air, design, x, y, u):
-    """Fill `acceleration` (3,) rad/s2, the effect of the gust from this instant on, and `force`, m/s2.
+def fill_gust_effect(gust, design, x, y, u):
+    """Fill `gust_acceleration` (3,) rad/s2, the effect of the gust from this instant on, and `force`, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
-    if air.output.uses_accelerometers:
-        air.memory.force[:] = air.memory.measured
-    elif air.config.coarse:  # lift balances the weight, and turns with the bank
-        air.memory.force[0] = air.memory.force[1] = 0.0
-        air.memory.force[2] = -air.config.gravity / max(air.memory.level_to_body[2, 2], MIN_BANK_COSINE)
+    if gust.output.uses_accelerometers:
+        gust.memory.specific_force[:] = gust.memory.accelerometer_reading
+    elif gust.config.only_coarse_estimate:  # lift balances the weight, and turns with the bank
+        gust.memory.specific_force[0] = gust.memory.specific_force[1] = 0.0
+        gust.memory.specific_force[2] = -gust.config.gravity / max(
+            gust.memory.level_to_body[2, 2], MIN_BANK_COSINE
+        )
     else:
-        fill_specific_force(air, x, y, u, air.memory.force)
-    rate_damping(design, x, y, u, air.memory.scratch, air.output.damping)
+        fill_specific_force(gust, x, y, u, gust.memory.specific_force)
+    rate_damping(design, x, y, u, gust.memory.scratch, gust.output.rate_damping)
     for i in range(3):
-        known = air.output.axes[i, 1] * air.memory.gust[1] + air.output.axes[i, 2] * air.memory.gust[2]
-        air.memory.rotation[i] = known if air.output.measures_gust or air.config.coarse else 0.0
+        air_rotation = (
+            gust.output.gust_axes_in_body[i, 1] * gust.memory.air_rotation_in_level_axes[1]
+            + gust.output.gust_axes_in_body[i, 2] * gust.memory.air_rotation_in_level_axes[2]
+        )
+        gust.memory.air_rotation_in_body_axes[i] = (
+            air_rotation if gust.output.is_gust_measured or gust.config.only_coarse_estimate else 0.0
+        )
     for i in range(3):
-        moved = 0.0
+        acceleration = 0.0
         for j in range(3):
-            moved -= air.output.damping[i, j] * air.memory.rotation[j]
-        air.output.acceleration[i], air.output.coarse_acceleration[i] = (
-            (moved, 0.0) if air.output.measures_gust else (0.0, moved)
+            acceleration -= gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
+        gust.output.gust_acceleration[i], gust.output.coarse_gust_acceleration[i] = (
+            (acceleration, 0.0) if gust.output.is_gust_measured else (0.0, acceleration)
         )
 
 
 @kernel
-def begin_gust_sums(air, V, dt):
+def begin_gust_sums(gust, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
-    air.memory.acceleration_sum[:] = air.output.acceleration
-    add_axes_turn_variance(air, V, dt)
+    gust.memory.gust_angular_acceleration_sum[:] = gust.output.gust_acceleration
+    add_axes_turn_variance(gust, V, dt)
 
 
 @kernel
-def accumulate_gust_substep(air, design, x, y, u, attitude, dt):
+def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
     """Update gust and sums for an instant inside a frame, dt s after the instant before.
 
     Arguments as in `fill_gust_effect`; attitude (3,) rad.
     """
-    update_gust(air, y, attitude, dt)
-    fill_gust_effect(air, design, x, y, u)
+    update_gust_rotation(gust, y, attitude, dt)
+    fill_gust_effect(gust, design, x, y, u)
     for i in range(3):
-        air.memory.acceleration_sum[i] += air.output.acceleration[i]
-    add_axes_turn_variance(air, y[AIRSPEED], dt)
+        gust.memory.gust_angular_acceleration_sum[i] += gust.output.gust_acceleration[i]
+    add_axes_turn_variance(gust, y[AIRSPEED], dt)
 
 
 @kernel
-def store_accelerometers(air, force):
+def store_accelerometer_reading(gust, force):
     """Keep the reading of the accelerometers, force (3,) m/s2."""
-    air.memory.measured[:] = force
+    gust.memory.accelerometer_reading[:] = force
 
 
 @kernel
-def stop_gust_filter(air):
+def stop_gust_estimate(gust):
     """Stop estimating the gust."""
-    air.output.moving = 0
+    gust.output.is_turbulent = 0
 
 
 @kernel
-def stop_accelerometers(air):
+def stop_accelerometers(gust):
     """Stop using the accelerometers.
 
     Without a model of the forces the gust is then unmeasured, and all of its variance counts as unknown.
     """
-    air.output.uses_accelerometers = 0
-    if air.output.measures_gust and not air.config.has_force_model:
-        air.output.measures_gust, air.memory.unmeasured_share[:] = 0, 1.0
-        pitching, yawing = 0.5 * return_length(air, 1), 0.5 * return_length(air, 2)
+    gust.output.uses_accelerometers = 0
+    if gust.output.is_gust_measured and not gust.config.has_force_model:
+        gust.output.is_gust_measured, gust.memory.unmeasured_intensity_share[:] = 0, 1.0
+        half_pitch_length_m = 0.5 * gust_correlation_length(gust, 1)
+        half_yaw_length_m = 0.5 * gust_correlation_length(gust, 2)
         for i in range(3):
             for j in range(3):
-                air.memory.turn_variance_now[i, j] += (
-                    pitching * air.memory.intensity[1] * effect_product(air, air.output.axes, i, j, 1)
+                gust.memory.axes_turn_variance_now[i, j] += (
+                    half_pitch_length_m
+                    * gust.memory.gust_drift_intensity[1]
+                    * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 1)
                 )
-                air.memory.turn_variance_now[i, j] += (
-                    yawing * air.memory.intensity[2] * effect_product(air, air.output.axes, i, j, 2)
+                gust.memory.axes_turn_variance_now[i, j] += (
+                    half_yaw_length_m
+                    * gust.memory.gust_drift_intensity[2]
+                    * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 2)
                 )
-        air.memory.turn_frames = 3
+        gust.memory.n_axes_turn_frames = 3
 
 
 @kernel
-def unmeasured_share(air, g):
+def total_unmeasured_share(gust, g):
     """Share of the intensity of the gust about axis g that is unmeasured in this frame."""
     if g == 0:
-        return min(air.memory.unmeasured_share[g], 1.0)
-    off = (
-        air.config.error_gain
-        * (air.config.speed_variance + air.memory.initial_share * air.config.gust_variance)
-        / max(air.output.speed, 1.0) ** 2
-        if air.output.measures_gust
+        return min(gust.memory.unmeasured_intensity_share[g], 1.0)
+    speed_error_share = (
+        gust.config.unmeasured_share_per_speed_variance
+        * (
+            gust.config.speed_error_variance
+            + gust.memory.initial_gust_variance_share * gust.config.gust_velocity_variance
+        )
+        / max(gust.output.speed_relative_to_mean_air, 1.0) ** 2
+        if gust.output.is_gust_measured
         else 0.0
     )
     return min(
-        air.memory.unmeasured_share[g]
-        + off
-        + (air.memory.start_share if g == 1 else air.memory.turning_share),
+        gust.memory.unmeasured_intensity_share[g]
+        + speed_error_share
+        + (gust.memory.unmeasured_share_by_start if g == 1 else gust.memory.unmeasured_share_by_past_turns),
         1.0,
     )
 
 
 @kernel
-def low_frequency_power_ratio(air, g):
-    """Power of the gust about axis g at low frequency, over that with the return length of the rolling gust.
+def low_frequency_power_ratio(gust, g):
+    """Power of the gust about axis g at low frequency, over that with the correlation length of the rolling
+    gust.
 
     It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
     """
-    return (return_length(air, g) / air.config.rolling_length) ** 2 if air.config.coarse else 1.0
+    return (
+        (gust_correlation_length(gust, g) / gust.config.rolling_gust_correlation_length) ** 2
+        if gust.config.only_coarse_estimate
+        else 1.0
+    )
 
 
 @kernel
-def return_length(air, g):
-    """Return length of the gust about axis g, m: lag times speed, as in `design.dryden.rotation_lengths`."""
-    return air.config.rolling_length if g == 0 else (4.0 if g == 1 else 3.0) * air.config.span / pi
+def gust_lag_s(gust, g, V):
+    """Lag of the gust about axis g, s, at a speed V m/s: its correlation length over V."""
+    if g == 0:
+        return gust.config.rolling_gust_correlation_length / V
+    return (4.0 if g == 1 else 3.0) * gust.config.wing_span / (pi * V)
 
 
 @kernel
-def unmeasured_gust_drift(air, V, i, j, slow=False):
+def gust_correlation_length(gust, g):
+    """Correlation length of the gust about axis g, m, as in `design.rotation_lengths`: its lag at 1 m/s."""
+    return gust_lag_s(gust, g, 1.0)
+
+
+@kernel
+def unmeasured_gust_drift_intensity(gust, V, i, j, with_rolling_correlation_length=False):
     """Intensity, (rad/s2)2/s, of the drift of accelerations i and j by the unmeasured rotation; V m/s.
 
-    slow: that of a gust with the return length of the rolling gust and equal power at low frequency.
+    with_rolling_correlation_length: that of a gust with the correlation length of the rolling gust and equal
+    power at low frequency.
     """
     total = 0.0
     for g in range(3):
-        share = low_frequency_power_ratio(air, g) if slow else 1.0
+        power_ratio = low_frequency_power_ratio(gust, g) if with_rolling_correlation_length else 1.0
         total += (
-            effect_product(air, air.output.axes, i, j, g)
-            * unmeasured_share(air, g)
-            * air.memory.intensity[g]
-            * share
+            gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, g)
+            * total_unmeasured_share(gust, g)
+            * gust.memory.gust_drift_intensity[g]
+            * power_ratio
         )
-    return total * max(V, air.output.speed)
+    return total * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def add_axes_turn_variance(air, V, dt):
-    """Add to `turn_variance_now` the effect of the turn of the gusts' axes in dt s; V m/s."""
-    if not air.memory.axes_turn_fast:
+def add_axes_turn_variance(gust, V, dt):
+    """Add to `axes_turn_variance_now` the effect of the turn of the gusts' axes in dt s; V m/s."""
+    if not gust.memory.has_fast_axes_turn:
         return
-    rolling = 0.5 * (air.config.rolling_length / V) ** 2 * air.memory.intensity[0]
-    yawing = (
-        0.5 * (3.0 * air.config.span / (pi * V)) ** 2 * air.memory.intensity[2] * air.memory.turning_share
+    rolling_variance = 0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_drift_intensity[0]
+    yawing_variance = (
+        0.5
+        * gust_lag_s(gust, 2, V) ** 2
+        * gust.memory.gust_drift_intensity[2]
+        * gust.memory.unmeasured_share_by_past_turns
     )
     for i in range(3):
         for j in range(3):
-            roll, yaw = (
-                effect_product(air, air.memory.axes_rate, i, j, 0),
-                effect_product(air, air.memory.axes_rate, i, j, 2),
+            roll_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
+            yaw_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
+            gust.memory.axes_turn_variance_now[i, j] += (
+                dt * V * (rolling_variance * roll_product + yawing_variance * yaw_product)
             )
-            air.memory.turn_variance_now[i, j] += dt * V * (rolling * roll + yawing * yaw)
-    air.memory.turn_frames = 3
+    gust.memory.n_axes_turn_frames = 3
 
 
 @kernel
-def average_gust_frame(air, share):
-    """Fill `mean` and `turn_variance` for the elapsed frame; share: one over its number of instants.
+def fill_frame_mean_gust(gust, frame_share):
+    """Fill `mean_gust_acceleration` and `axes_turn_variance` for the elapsed frame.
 
-    Axes may turn in the middle of a frame. A part of the effect is then in this frame and the rest in the
-    next, so the variance counts in both frames.
+    frame_share: one over the number of instants. Axes may turn in the middle of a frame. A part of the
+    effect is then in this frame and the rest in the next, so the variance counts in both frames.
     """
     for i in range(3):
-        air.output.mean[i] = share * air.memory.acceleration_sum[i]
-    if air.memory.turn_frames > 0:
-        air.memory.turn_frames -= 1
+        gust.output.mean_gust_acceleration[i] = frame_share * gust.memory.gust_angular_acceleration_sum[i]
+    if gust.memory.n_axes_turn_frames > 0:
+        gust.memory.n_axes_turn_frames -= 1
         for i in range(3):
             for j in range(3):
-                air.output.turn_variance[i, j] = (
-                    air.memory.turn_variance_before[i, j] + air.memory.turn_variance_now[i, j]
+                gust.output.axes_turn_variance[i, j] = (
+                    gust.memory.axes_turn_variance_before[i, j] + gust.memory.axes_turn_variance_now[i, j]
                 )
-                air.memory.turn_variance_before[i, j], air.memory.turn_variance_now[i, j] = (
-                    air.memory.turn_variance_now[i, j],
-                    0.0,
-                )
+                gust.memory.axes_turn_variance_before[i, j] = gust.memory.axes_turn_variance_now[i, j]
+                gust.memory.axes_turn_variance_now[i, j] = 0.0
 
 
 @kernel
-def full_gust_drift(air, V, sensitivity, gust_on_forces):
+def full_gust_drift_intensity(gust, V, rate_sensitivity, force_gust_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    sensitivity, by_forces (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
+    sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces, about the
+    body axes.
     """
-    total, longest_s = 0.0, air.config.rolling_length / V
+    total, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
     for g in range(3):
-        by_both = abs(project_on_axis(sensitivity, air.output.axes, g)) + abs(
-            project_on_axis(gust_on_forces, air.output.axes, g)
-        )
-        total += by_both**2 * air.memory.intensity[g]
-        if air.memory.axes_turn_fast:
+        total_sensitivity = abs(
+            project_on_gust_axis(rate_sensitivity, gust.output.gust_axes_in_body, g)
+        ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
+        total += total_sensitivity**2 * gust.memory.gust_drift_intensity[g]
+        if gust.memory.has_fast_axes_turn:
             total += (
                 0.5
-                * longest_s
-                * longest_s
-                * air.memory.intensity[g]
-                * project_on_axis(sensitivity, air.memory.axes_rate, g) ** 2
+                * rolling_lag_s
+                * rolling_lag_s
+                * gust.memory.gust_drift_intensity[g]
+                * project_on_gust_axis(rate_sensitivity, gust.memory.gust_axes_rate, g) ** 2
             )
-    return total * max(V, air.output.speed)
+    return total * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def remaining_gust_drift(air, V, gust_on_rates, gust_on_forces):
+def remaining_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
 
-    gust_on_rates, gust_on_forces (3,) 1/s: gust sensitivities about the body axes. On the forces the whole
-    rotation acts.
+    rate_gust_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivities about the body axes. On the
+    forces the whole rotation acts.
     """
     total = 0.0
     for g in range(3):
-        of_rates = np.sqrt(unmeasured_share(air, g)) * abs(project_on_axis(gust_on_rates, air.output.axes, g))
+        unmeasured_sensitivity = np.sqrt(total_unmeasured_share(gust, g)) * abs(
+            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, g)
+        )
         total += (
-            of_rates + abs(project_on_axis(gust_on_forces, air.output.axes, g))
-        ) ** 2 * air.memory.intensity[g]
-    return total * max(V, air.output.speed)
+            unmeasured_sensitivity
+            + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
+        ) ** 2 * gust.memory.gust_drift_intensity[g]
+    return total * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def project_on_axis(sensitivity, axes, g):
+def project_on_gust_axis(sensitivity, axes, g):
     """Sensitivity to the gust about its axis g, from the sensitivity (3,) to rotation about the body axes."""
     return sensitivity[0] * axes[0, g] + sensitivity[1] * axes[1, g] + sensitivity[2] * axes[2, g]
 
 
 @kernel
-def effect_product(air, axes, i, j, g):
+def gust_effect_product(gust, axes, i, j, g):
     """Product of the effects of the gust about axis g on accelerations i and j, per (rad/s)2.
 
     axes (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
-    on_i, on_j = 0.0, 0.0
+    effect_on_i, effect_on_j = 0.0, 0.0
     for k in range(3):
-        on_i += air.output.damping[i, k] * axes[k, g]
-        on_j += air.output.damping[j, k] * axes[k, g]
-    return on_i * on_j
+        effect_on_i += gust.output.rate_damping[i, k] * axes[k, g]
+        effect_on_j += gust.output.rate_damping[j, k] * axes[k, g]
+    return effect_on_i * effect_on_j
 
 
-def configure_gusts(air: np.void, declared: Declared, mass: MassProperties) -> None:
+def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
     turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
-    air["output"]["moving"], air["config"]["has_force_model"] = (
-        turbulence.moves,
-        bool(aircraft.measurable_forces),
-    )
-    air["output"]["measures_gust"] = (
-        air["config"]["has_force_model"] or air["output"]["uses_accelerometers"]
+    gust["output"]["is_turbulent"] = turbulence.moves
+    gust["config"]["has_force_model"] = bool(aircraft.measurable_forces)
+    gust["output"]["is_gust_measured"] = (
+        gust["config"]["has_force_model"] or gust["output"]["uses_accelerometers"]
     )  # only where forces are known
-    air["config"]["coarse"] = air["output"]["moving"] and not air["output"]["measures_gust"]
-    fill_table(air["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
-    air["config"]["area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
-    air["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
-    air["config"]["span"] = span_m
-    air["config"]["intensity_aloft"], air["config"]["intensity_at_1_m"] = (
-        turbulence.rotation_walk(span_m),
-        turbulence.rotation_walk_at_1_m(span_m),
+    gust["config"]["only_coarse_estimate"] = (
+        gust["output"]["is_turbulent"] and not gust["output"]["is_gust_measured"]
     )
-    air["memory"]["intensity"], air["memory"]["unmeasured_share"] = (
-        air["config"]["intensity_aloft"],
-        UNMEASURED_SHARES if air["output"]["measures_gust"] else 1.0,
+    fill_table(gust["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
+    gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
+    gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
+    gust["config"]["wing_span"] = span_m
+    gust["config"]["drift_intensity_aloft"] = turbulence.rotation_walk(span_m)
+    gust["config"]["drift_intensity_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
+    gust["memory"]["gust_drift_intensity"], gust["memory"]["unmeasured_intensity_share"] = (
+        gust["config"]["drift_intensity_aloft"],
+        MIN_UNMEASURED_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
-    air["config"]["altitude_error"], air["config"]["altitude_slope"] = (
-        errors["altitude"].worst,
-        errors["altitude"].slope,
-    )
-    air["config"]["turbulence_length"] = SCALE_M
-    air["config"]["rolling_length"] = rotation_lengths(span_m)[0]
+    gust["config"]["altitude_error_bound"] = errors["altitude"].worst
+    gust["config"]["altitude_error_share"] = errors["altitude"].slope
+    gust["config"]["turbulence_scale_length"] = SCALE_M
+    gust["config"]["rolling_gust_correlation_length"] = rotation_lengths(span_m)[0]
 
 
-def add_gust_jitter(
+def add_gust_estimate_noise(
     statistical: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
 ) -> None:
-    """Add the noise of the gust estimate to the jitter of the detector.
+    """Add the noise of the gust estimate to the model noise of the detector.
 
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    flow, span_m = flow_angle_noise(errors, y[AIRSPEED]), float(statistical["air"]["config"]["span"])
-    if statistical["forces"]["known"] or statistical["air"]["output"]["uses_accelerometers"]:
-        flow += TWO_STEP_NOISE * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
-    if statistical["forces"]["known"]:
+    flow_angle_noise_std = level_flow_angle_noise_std(errors, y[AIRSPEED])
+    span_m = float(statistical["gust"]["config"]["wing_span"])
+    if statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]:
+        flow_angle_noise_std += (
+            ADAMS_BASHFORTH_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
+        )
+    if statistical["forces"]["in_use"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        by_force = np.sqrt(forces["accelerometer_variance"]) / np.abs(forces["vane"][:, 1])
-        statistical["forces"]["gust_noise"] = gust_estimate_noise(by_force, design, y, u, span_m)
-    for name in ("own_jitter", "jitter"):
-        statistical["noise"][name] += gust_estimate_noise(flow, design, y, u, span_m) ** 2
+        flow_angle_noise_by_forces = np.sqrt(forces["accelerometer_innovation_variance"]) / np.abs(
+            forces["vane_error_effect_per_rad"][:, 1]
+        )
+        statistical["forces"]["gust_estimate_noise_std"] = gust_estimate_noise_std_for(
+            flow_angle_noise_by_forces, design, y, u, span_m
+        )
+    for name in ("input_noise_variance_without_air_data", "input_noise_variance"):
+        statistical["noise"][name] += (
+            gust_estimate_noise_std_for(flow_angle_noise_std, design, y, u, span_m) ** 2
+        )
 
 
-def configure_speed_error(air: np.void, declared: Declared, level: float, airspeed_mps: float) -> None:
+def configure_speed_error(gust: np.void, declared: Declared, alarm_level: float, airspeed_mps: float) -> None:
     """Fill the decay rate of the gust velocity and the error variance of the speed; airspeed_mps: in trim.
 
-    level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of
+    alarm_level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of
     decay rate a, 1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the
     variance sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
     sigma, errors = declared.air.sigma_mps, declared.sensors
-    if not (air["output"]["moving"] and air["output"]["measures_gust"]):
+    if not (gust["output"]["is_turbulent"] and gust["output"]["is_gust_measured"]):
         return
-    return_rate, V = airspeed_mps / SCALE_M, errors["V"]
-    drift = (
-        2.0 * EARTH_RATE_RAD_S * airspeed_mps + MAX_PATH_SLOPE_RAD * EARTH_ACCELERATION_M_S2
+    gust_return_rate_per_s, airspeed_errors = airspeed_mps / SCALE_M, errors["V"]
+    acceleration_error = (
+        2.0 * EARTH_RATE_RAD_S * airspeed_mps + MAX_PATH_SLOPE_RAD * EARTH_ACCELERATION_BOUND_M_S2
     )  # Coriolis; gravity with place
-    drift += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
-    if air["output"]["uses_accelerometers"]:
-        drift += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
+    acceleration_error += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
+    if gust["output"]["uses_accelerometers"]:
+        acceleration_error += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
     else:
-        drift += GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
-    decay_rate = (2.0 * drift**2 * return_rate / sigma**2) ** (1.0 / 3.0)
-    air["config"]["gust_variance"], air["config"]["max_gust"], air["config"]["decay_rate"] = (
-        sigma**2,
-        MAX_GUST_SIGMA * sigma,
-        decay_rate,
+        acceleration_error += (
+            GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
+        )
+    gust_velocity_decay_rate = (2.0 * acceleration_error**2 * gust_return_rate_per_s / sigma**2) ** (
+        1.0 / 3.0
     )
-    air["config"]["speed_variance"] = (
-        sigma**2 * decay_rate / (decay_rate + return_rate) + (drift / decay_rate) ** 2 + V.random**2
+    gust["config"]["gust_velocity_variance"] = sigma**2
+    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_SIGMA * sigma
+    gust["config"]["gust_velocity_decay_rate"] = gust_velocity_decay_rate
+    gust["config"]["speed_error_variance"] = (
+        sigma**2 * gust_velocity_decay_rate / (gust_velocity_decay_rate + gust_return_rate_per_s)
+        + (acceleration_error / gust_velocity_decay_rate) ** 2
+        + airspeed_errors.random**2
     )
-    air["config"]["speed_variance"] += (V.steady + V.slope * airspeed_mps) ** 2
-    air["config"]["error_gain"] = speed_error_share(level)
+    gust["config"]["speed_error_variance"] += (
+        airspeed_errors.steady + airspeed_errors.slope * airspeed_mps
+    ) ** 2
+    gust["config"]["unmeasured_share_per_speed_variance"] = unmeasured_share_per_speed_variance(alarm_level)
 
 
-def speed_error_share(level: float) -> float:
+def unmeasured_share_per_speed_variance(alarm_level: float) -> float:
     """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
 
     The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2
@@ -635,4 +736,4 @@ def speed_error_share(level: float) -> float:
     noise. The product of two normal numbers exceeds x deviations with a probability of exp(-x). This equals
     that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
     """
-    return (0.5 * level) ** 2 / 4.0
+    return (0.5 * alarm_level) ** 2 / 4.0

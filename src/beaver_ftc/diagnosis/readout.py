@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
+from beaver_ftc.diagnosis.detection.likelihood import N_ONSET_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
 
 
@@ -17,98 +17,100 @@ class Estimator(NamedTuple):
     """An isolation estimator, of the hypothesis that one surface has lost effectiveness (kind LOSS) or is at
     a position (kind POSITION).
 
-    low, high: known set of its parameter. axes: those on which its residuals count. parity_direction (3,):
-    direction in which the fault has no effect, zero where it is not used.
+    theta_min, theta_max: known set of its parameter. active_axes: those on which its residuals count.
+    parity_direction (3,): direction in which the fault has no effect, zero where it is not used.
     """
 
-    kind: int
-    low: float
-    high: float
-    excluded: bool
-    axes: tuple[int, ...]
+    hypothesis_kind: int
+    theta_min: float
+    theta_max: float
+    is_excluded: bool
+    active_axes: tuple[int, ...]
     parity_direction: np.ndarray
 
 
 class Layout(NamedTuple):
-    """Of each surface the axis that it turns most, and the number of the estimator of its loss and of its
-    position, -1 where there is none."""
+    """Layout of the surfaces: the axis that each turns most, and the number of the estimator of its loss and
+    of its position, -1 where there is none."""
 
     dominant_axis: tuple[int, ...]
     loss_estimator: tuple[int, ...]
     position_estimator: tuple[int, ...]
 
 
-class TypesConfig(NamedTuple):
+class FaultTypesConfig(NamedTuple):
     """How fault types are examined.
 
-    single_instant: a frame, or block, shows one instant. instants: JSBSim frames in a frame. returns: a
-    released surface returns by its actuator. half_cycle_frames: blocks in half of the slowest oscillation.
-    block_frames: frames in a block, 1 where every frame is examined by itself; block_s: its duration.
+    is_single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
+    returns_via_actuator: a released surface returns by its actuator. slowest_half_cycle_frames: blocks in
+    half of the slowest oscillation. frames_per_block: frames in a block, 1 where every frame is examined by
+    itself; block_duration_s: its duration.
     """
 
-    single_instant: bool
-    instants: int
-    returns: bool
-    half_cycle_frames: int
-    block_frames: int
-    block_s: float
+    is_single_instant: bool
+    n_substeps: int
+    returns_via_actuator: bool
+    slowest_half_cycle_frames: int
+    frames_per_block: int
+    block_duration_s: float
     dt_s: float
 
 
 class Actuator(NamedTuple):
     """The actuator of a surface as fault types take it; rad, rad/s.
 
-    least_runaway_rad_s: of a hardover. slowest_step_rad: of a rate limit, in an instant. approach: share of
-    the way to the command that is made in an instant.
+    min_runaway_rate_rad_s: of a hardover. min_motion_per_substep_rad: of a rate limit, in an instant.
+    lag_share_per_substep: share of the way to the command that is made in an instant.
     """
 
     travel_low_rad: float
     travel_high_rad: float
-    least_runaway_rad_s: float
-    slowest_step_rad: float
-    approach: float
+    min_runaway_rate_rad_s: float
+    min_motion_per_substep_rad: float
+    lag_share_per_substep: float
 
 
-class SurfaceTypes(NamedTuple):
-    """What is concluded of the types of fault on one surface: excluded (types,), and its actuator."""
+class SurfaceFaultTypes(NamedTuple):
+    """The conclusion on the fault types of one surface: is_excluded (types,), and its actuator."""
 
     actuator: Actuator
-    excluded: np.ndarray
+    is_excluded: np.ndarray
 
 
-class Bound(NamedTuple):
+class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
-    eta_bar_rad_s2: bound on the model's error over the frame; noise_rad_s: change of a rate's reading by
-    errors of its gyro. inertia: share of the inertial coupling; constant_rad_s2; earth_rate_rad_s. Of gyros:
-    error offset + slope |rate|, of the offset what does not change, steady; zero where none is declared.
+    eta_bar_rad_s2: bound on the model's error over the frame; gyro_change_bound_rad_s: bound on the change
+    of a rate's reading by errors of its gyro. inertia_coupling_share; constant_bound_rad_s2;
+    earth_rate_rad_s. Of gyros: error gyro_error_offset + gyro_error_per_rate |rate|, of the offset what does
+    not change, gyro_constant_error; zero where none is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
-    noise_rad_s: np.ndarray
-    inertia: np.ndarray
-    constant_rad_s2: np.ndarray
+    gyro_change_bound_rad_s: np.ndarray
+    inertia_coupling_share: np.ndarray
+    constant_bound_rad_s2: np.ndarray
     earth_rate_rad_s: float
-    gyro_offset_rad_s: np.ndarray
-    gyro_steady_rad_s: np.ndarray
-    gyro_slope: np.ndarray
+    gyro_error_offset_rad_s: np.ndarray
+    gyro_constant_error_rad_s: np.ndarray
+    gyro_error_per_rate: np.ndarray
 
 
-class Air(NamedTuple):
-    """Gusts as the vanes see them. moving: turbulence is declared; seen: its effect is subtracted from the
-    innovation; acceleration_rad_s2 (3,): what the gust does now."""
+class GustReadout(NamedTuple):
+    """Gusts as the vanes see them. is_turbulent: turbulence is declared; is_gust_measured: its effect is
+    subtracted from the innovation; gust_acceleration_rad_s2 (3,): what the gust does now."""
 
-    moving: bool
-    seen: bool
-    acceleration_rad_s2: np.ndarray
+    is_turbulent: bool
+    is_gust_measured: bool
+    gust_acceleration_rad_s2: np.ndarray
 
 
-class MappedError(NamedTuple):
+class MappedModelError(NamedTuple):
     """The design model's error where the aircraft is now, from the map that the aircraft declares: whether
     the map covers the place, and its bound (3,) rad/s2."""
 
-    known: bool
-    bound_rad_s2: np.ndarray
+    is_inside_map: bool
+    error_bound_rad_s2: np.ndarray
 
 
 class Hypothesis(NamedTuple):
@@ -125,68 +127,70 @@ class Hypothesis(NamedTuple):
     score: float
 
 
-class Lanes(NamedTuple):
-    """By hypothesis and onset (hypotheses, N_SLOTS): score, direction of the loss that is tested (0: either),
-    and the part of the correlation that calm air and that gusts seen by the vanes explain."""
+class OnsetTests(NamedTuple):
+    """By hypothesis and onset (hypotheses, N_ONSET_SLOTS): score, direction of the loss that is tested (0:
+    either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
 
     score: np.ndarray
-    sense: np.ndarray
-    calm_prediction: np.ndarray
-    gust_response: np.ndarray
+    supporting_sign: np.ndarray
+    correlation_in_calm_air: np.ndarray
+    coarse_gust_part: np.ndarray
 
 
-class Block(NamedTuple):
+class FilterBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
-    axes: of its states. return_length: of the drift, m; 0 for none. drift_scale: factor on the variance of a
-    gust seen roughly. tolerance (regressors,): of the constants that are not known, 0 for one not used.
+    axis_indices: of its states. correlation_length: of the drift, m; 0 for none. drift_intensity_scale:
+    factor on the variance of a gust seen roughly. regressor_tolerance (regressors,): of the constants that
+    are not known, 0 for one not used.
     """
 
-    axes: tuple[int, ...]
-    return_length: float
-    drift_scale: float
-    tolerance: np.ndarray
+    axis_indices: tuple[int, ...]
+    correlation_length: float
+    drift_intensity_scale: float
+    regressor_tolerance: np.ndarray
     hypotheses: tuple[Hypothesis, ...]
-    lanes: Lanes
+    onset_tests: OnsetTests
 
 
 class SensorTest(NamedTuple):
-    """One redundancy test of the sensor monitor.
+    """One redundancy test of the sensor monitor, in the unit of its residual.
 
-    residual, of the elapsed step; filtered and bound (poles,): through the filters. rate, noise: part of the
-    bound that grows with time (per s) and that does not; air: share of `gust_change_bound` in it.
+    residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
+    second of the sample. gust_gain: effect on it of 1 m/s that a gust changes by. filtered_residual,
+    filtered_bound (poles,): through the filters.
     """
 
     residual: float
-    rate: float
-    noise: float
-    air: float
-    filtered: np.ndarray
-    bound: np.ndarray
+    bound_per_s: float
+    bound_per_sample: float
+    gust_gain: float
+    filtered_residual: np.ndarray
+    filtered_bound: np.ndarray
 
 
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; alarmed: an alarm of its own stands.
 
-    largest_test: number of the test nearest its bound, share: how near, 1 at the bound; test: its numbers.
-    named: number of the sensor that is named, -1 for none; replaced (sensors,): readings not used any more.
-    step_s; gusts (poles,): a gust's changes through the filters. predicted, error (sensors,): readings as
-    redundancy predicts them, and how far off each may be. engine (2,): speed rpm, manifold pressure inHg, as
-    the command predicts them. SI otherwise.
+    worst_test: index of the test with the largest ratio of residual to bound; worst_test_ratio: that ratio;
+    test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced (sensors,): whether a
+    reading is not used any more. sample_time_s: between two samples. gust_change_bound_mps (poles,): bound on
+    the changes of a gust through the filters. predicted_reading, reading_error_bound (sensors,): SI.
+    engine_command (2,): engine speed rpm, manifold pressure inHg, which the engine's sensors should read.
     """
 
     enabled: bool
     alarmed: bool
-    largest_test: int
-    share: float
+    worst_test: int
+    worst_test_ratio: float
     test: SensorTest
-    named: int
-    replaced: np.ndarray
-    step_s: float
-    gusts: np.ndarray
-    predicted: np.ndarray
-    error: np.ndarray
-    engine: np.ndarray
+    isolated_sensor: int
+    is_replaced: np.ndarray
+    sample_time_s: float
+    gust_change_bound_mps: np.ndarray
+    predicted_reading: np.ndarray
+    reading_error_bound: np.ndarray
+    engine_command: np.ndarray
 
 
 class DiagnosisReadout:
@@ -201,14 +205,14 @@ class DiagnosisReadout:
         return bool(self._fdi["config"]["enabled"])
 
     @cached_property
-    def scheme(self) -> int:
-        """Place of its scheme, as `state.scheme_number` says."""
-        return int(self._fdi["config"]["scheme"])
+    def scheme_number(self) -> int:
+        """Number of its scheme, as `state.scheme_number` says."""
+        return int(self._fdi["config"]["scheme_number"])
 
     @cached_property
-    def every_type(self) -> bool:
+    def diagnoses_all_types(self) -> bool:
         """Whether it examines faults of every type."""
-        return bool(self._fdi["config"]["every_type"])
+        return bool(self._fdi["config"]["diagnoses_all_types"])
 
     @cached_property
     def detected(self) -> bool:
@@ -221,9 +225,9 @@ class DiagnosisReadout:
         return float(self._fdi["verdict"]["detected_at_s"])
 
     @cached_property
-    def isolated(self) -> int:
+    def isolated_estimator(self) -> int:
         """Number of the estimator whose fault is isolated; NOT_ISOLATED or UNANTICIPATED of `state`."""
-        return int(self._fdi["verdict"]["isolated"])
+        return int(self._fdi["verdict"]["isolated_estimator"])
 
     @cached_property
     def layout(self) -> Layout:
@@ -231,78 +235,82 @@ class DiagnosisReadout:
         return Layout(*(tuple(self._fdi["layout"][name].tolist()) for name in Layout._fields))
 
     @cached_property
-    def excluded(self) -> np.ndarray:
+    def is_estimator_excluded(self) -> np.ndarray:
         """(estimators,): whether each is excluded."""
-        return estimators_of(self._fdi)["excluded"].astype(bool)
+        return estimator_records(self._fdi)["excluded"].astype(bool)
 
     @cached_property
     def estimators(self) -> tuple[Estimator, ...]:
         """The isolation estimators, in the bank's order; none where another scheme isolates."""
-        return tuple(map(_estimator, estimators_of(self._fdi)))
+        return tuple(map(_read_estimator, estimator_records(self._fdi)))
 
     @cached_property
-    def types_config(self) -> TypesConfig:
+    def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
         config = self._fdi["types"]["config"]
-        return TypesConfig(
-            bool(config["whole"]), int(config["instants"]), bool(config["released_returns"]),
-            int(config["half_cycle_frames"]),
-            int(config["length"]), float(config["block_s"]), float(config["dt"]),
+        return FaultTypesConfig(
+            bool(config["is_single_instant"]), int(config["n_substeps"]),
+            bool(config["returns_via_actuator"]),
+            int(config["slowest_half_cycle_frames"]),
+            int(config["frames_per_block"]), float(config["block_duration_s"]), float(config["dt"]),
         )  # fmt: skip
 
     @cached_property
-    def frames_in_block(self) -> int:
+    def n_frames_in_block(self) -> int:
         """Frames that the block in progress has so far."""
-        return int(self._fdi["types"]["block"]["filled"])
+        return int(self._fdi["types"]["block"]["n_frames"])
 
     @cached_property
-    def surfaces(self) -> tuple[SurfaceTypes, ...]:
-        """Of each surface its actuator, and which types are excluded on it."""
-        return tuple(map(_surface, self._fdi["types"]["surface"]))
+    def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
+        """Return for each surface its actuator and the types excluded on it."""
+        return tuple(map(_read_surface, self._fdi["types"]["surface"]))
 
     @cached_property
-    def bound(self) -> Bound:
+    def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
         bound = self._fdi["bound"]
         declared_errors = bound["declared_errors"]
-        known = bool(declared_errors["any"])
-        offset, steady, slope = (
-            declared_errors[name][:3].copy() if known else np.zeros(3)
-            for name in ("offset", "steady", "slope")
+        has_declared_errors = bool(declared_errors["has_declared_errors"])
+        gyro_error_offset, gyro_constant_error, gyro_error_per_rate = (
+            declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
+            for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
         )
-        return Bound(
-            eta_bar_rad_s2=bound["eta_bar"].copy(), noise_rad_s=bound["noise"].copy(),
-            inertia=bound["inertia"].copy(), constant_rad_s2=bound["constant"].copy(),
-            earth_rate_rad_s=float(bound["earth_rate"]), gyro_offset_rad_s=offset, gyro_steady_rad_s=steady,
-            gyro_slope=slope,
+        return DeclaredBounds(
+            eta_bar_rad_s2=bound["eta_bar"].copy(), gyro_change_bound_rad_s=bound["gyro_change_bound"].copy(),
+            inertia_coupling_share=bound["inertia_coupling"].copy(),
+            constant_bound_rad_s2=bound["constant_bound"].copy(),
+            earth_rate_rad_s=float(bound["earth_rate_rad_s"]), gyro_error_offset_rad_s=gyro_error_offset,
+            gyro_constant_error_rad_s=gyro_constant_error, gyro_error_per_rate=gyro_error_per_rate,
         )  # fmt: skip
 
     @cached_property
-    def air(self) -> Air:
+    def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        air = self._fdi["statistical"]["air"]["output"]
-        return Air(bool(air["moving"]), bool(air["measures_gust"]), air["acceleration"].copy())
+        gust = self._fdi["statistical"]["gust"]["output"]
+        return GustReadout(
+            bool(gust["is_turbulent"]), bool(gust["is_gust_measured"]), gust["gust_acceleration"].copy()
+        )
 
     @cached_property
-    def mapped_error(self) -> MappedError:
+    def mapped_error(self) -> MappedModelError:
         """The design model's error here, where the aircraft maps it."""
-        error = self._fdi["bound"]["error_map"]
-        return MappedError(not error["outside"], error["now"].copy())
+        error = self._fdi["bound"]["model_error_map"]
+        return MappedModelError(not error["is_outside_all_boxes"], error["error_now"].copy())
 
     @cached_property
-    def model_noise(self) -> np.ndarray:
+    def input_noise_variance(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["jitter"])
+        return np.array(self._fdi["statistical"]["noise"]["input_noise_variance"])
 
     @cached_property
     def alarm_level(self) -> float:
-        """Log likelihood ratio at which the statistical detector raises its alarm."""
-        return float(self._fdi["statistical"]["tests"]["alarm_level"])
+        """Statistic at which the statistical detector raises its alarm, standard deviations."""
+        return float(self._fdi["statistical"]["test_config"]["alarm_level"])
 
     @cached_property
-    def blocks(self) -> tuple[Block, ...]:
+    def filter_blocks(self) -> tuple[FilterBlock, ...]:
         """The filters of the statistical detector."""
-        return tuple(map(_block, self._fdi["statistical"]["block"]))
+        return tuple(map(_read_block, self._fdi["statistical"]["block"]))
 
     @cached_property
     def sensor_monitor(self) -> SensorMonitor:
@@ -310,68 +318,80 @@ class DiagnosisReadout:
         return read_sensor_monitor(self._fdi["sensor_monitor"])
 
 
-def estimators_of(fdi: np.void) -> np.ndarray:
+def estimator_records(fdi: np.void) -> np.ndarray:
     """The records of the estimators there are, not a copy."""
     isolation = fdi["isolation"]
-    return np.asarray(isolation["estimator"][: int(isolation["config"]["n"])])
+    return np.asarray(isolation["estimator"][: int(isolation["config"]["n_estimators"])])
 
 
-def run_statistical_tests(fdi: np.void, enabled: bool) -> None:
+def switch_statistical_tests(fdi: np.void, is_enabled: bool) -> None:
     """Switch the statistical tests on or off, for every scheme."""
-    fdi["statistical"]["tests"]["enabled"] = enabled
+    fdi["statistical"]["test_config"]["enabled"] = is_enabled
 
 
-def disable(fdi: np.void) -> None:
+def disable_diagnosis(fdi: np.void) -> None:
     """Stop the built-in diagnosis of surfaces and sensors from the next frame on: scheme `none` is in charge
     then. A plug-in goes on."""
     if fdi["config"]["enabled"]:
-        fdi["config"]["scheme"] = scheme_number("none")
+        fdi["config"]["scheme_number"] = scheme_number("none")
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
-def recorded_always(fdi: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
-    """The arrays of which a certificate wants every frame, not copies; n: how many estimators there are.
+def arrays_of_every_frame(
+    fdi: np.void, n_estimators: int, diagnoses_all_types: bool
+) -> dict[str, np.ndarray]:
+    """The arrays of which a certificate wants every frame, not copies.
 
-    eta_bar, noise: as of `Bound`. offset, slope, spread (n, 3): effect of each hypothesis' fault. excluded,
-    types: what is excluded. Of faults of every type: least and greatest order to each surface, and position
-    of a healthy one, rad.
+    eta_bar, noise: as of `DeclaredBounds`. offset, slope, spread (n_estimators, 3): effect of each
+    hypothesis' fault. excluded, types: what is excluded. Of faults of every type: least and greatest order to
+    each surface, and position of a healthy one, rad.
     """
-    estimators, surfaces = fdi["isolation"]["estimator"][:n], fdi["types"]["surface"]
+    estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     views = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["noise"],
-        "offset": estimators["effect"]["offset"], "slope": estimators["effect"]["Z"],
-        "spread": estimators["effect"]["spread"], "excluded": estimators["excluded"],
-        "types": surfaces["feasible"]["excluded"],
+        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_change_bound"],
+        "offset": estimators["effect"]["base_acceleration"], "slope": estimators["effect"]["regressor"],
+        "spread": estimators["effect"]["error_bound"], "excluded": estimators["excluded"],
+        "types": surfaces["feasible_sets"]["excluded"],
     }  # fmt: skip
-    if every_type:
+    if diagnoses_all_types:
         commands = surfaces["commands"]
-        views |= {"command_low": commands["low"], "command_high": commands["high"]}
-        views |= {name: commands[name] for name in ("least", "greatest")}
+        views |= {"command_low": commands["min_command"], "command_high": commands["max_command"]}
+        views |= {"least": commands["min_healthy_position"], "greatest": commands["max_healthy_position"]}
     return views
 
 
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
-OF_BLOCK = (
-    "keep", "pace", "state", "P_xx", "P_xd", "P_dd", "drift", "jitter", "noise", "calm_prediction",
-    "gust_response", "regressor_state", "regressor_response",
+RECORDED_BLOCK_FIELDS = (
+    "drift_decay_factor", "uncertainty_change_per_frame", "state", "P_xx", "P_xd", "P_dd", "drift_intensity",
+    "model_noise_variance", "gyro_noise_variance", "calm_air_prediction", "coarse_gust_response",
+    "regressor_filter_state", "regressor_response",
 )  # fmt: skip
 
 
-def recorded_until_alarm(fdi: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
-    """The arrays of which a certificate wants the frames up to the alarm, not copies; n: as above.
+def arrays_until_alarm(
+    fdi: np.void, n_estimators: int, has_statistical_detector: bool
+) -> dict[str, np.ndarray]:
+    """The arrays of which a certificate wants the frames up to the alarm, not copies.
 
     reach_low, reach_high: what each hypothesis' fault can have done to the detection filters. Of the
-    statistical detector: OF_BLOCK of each filter, signatures of its hypotheses, what is bounded besides, and
-    the gust as the vanes see it.
+    statistical detector: RECORDED_BLOCK_FIELDS of each filter, signatures of its hypotheses, what is bounded
+    besides, and the gust as the vanes see it.
     """
-    views = {name: fdi["isolation"]["estimator"][name][:n] for name in ("reach_low", "reach_high")}
-    if statistical:
+    estimators = fdi["isolation"]["estimator"][:n_estimators]
+    views = {
+        "reach_low": estimators["reachable_effect_low"],
+        "reach_high": estimators["reachable_effect_high"],
+    }
+    if has_statistical_detector:
         detector = fdi["statistical"]
-        blocks, air = detector["block"], detector["air"]["output"]
-        views |= {name: blocks[name] for name in OF_BLOCK}
-        views |= {"signature": blocks["hypothesis"]["signature"], "bounded": detector["noise"]["bounded"]}
-        views |= {"air": air["mean"], "leap": air["turn_variance"]}
+        blocks, gust = detector["block"], detector["gust"]["output"]
+        views |= {name: blocks[name] for name in RECORDED_BLOCK_FIELDS}
+        views |= {
+            "signature": blocks["hypothesis"]["signature"],
+            "bounded": detector["noise"]["uncertainty_bound"],
+        }
+        views |= {"air": gust["mean_gust_acceleration"], "leap": gust["axes_turn_variance"]}
     return views
 
 
@@ -380,44 +400,63 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
-def _estimator(fie: np.void) -> Estimator:
-    axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
-    ends = float(fie["low"]), float(fie["high"])
-    return Estimator(int(fie["kind"]), *ends, bool(fie["excluded"]), axes, fie["parity_direction"].copy())
+def _read_estimator(fie: np.void) -> Estimator:
+    active_axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
+    theta_range = float(fie["theta_min"]), float(fie["theta_max"])
+    return Estimator(
+        int(fie["hypothesis_kind"]),
+        *theta_range,
+        bool(fie["excluded"]),
+        active_axes,
+        fie["parity_direction"].copy(),
+    )
 
 
-def _surface(surface: np.void) -> SurfaceTypes:
-    names = "travel_low", "travel_high", "least_runaway_rate", "slowest_step", "approach"
-    actuator = Actuator(*(float(surface["actuator"][name]) for name in names))
-    return SurfaceTypes(actuator, surface["feasible"]["excluded"].astype(bool))
+def _read_surface(surface: np.void) -> SurfaceFaultTypes:
+    field_names = (
+        "travel_low",
+        "travel_high",
+        "min_runaway_rate",
+        "min_motion_per_substep",
+        "lag_share_per_substep",
+    )
+    actuator = Actuator(*(float(surface["actuator"][name]) for name in field_names))
+    return SurfaceFaultTypes(actuator, surface["feasible_sets"]["excluded"].astype(bool))
 
 
-def _block(block: np.void) -> Block:
-    hypotheses = tuple(map(_hypothesis, block["hypothesis"][: block["n_hypotheses"]]))
-    n = len(hypotheses)
-    lanes = (block["lanes"][name].reshape(-1, N_SLOTS)[:n].copy() for name in Lanes._fields)
-    return Block(
-        tuple(block["axis"][: block["n"]].tolist()),
-        float(block["return_length"]), float(block["drift_scale"]),
-        block["tolerance"][: block["n_regressors"]].copy(), hypotheses, Lanes(*lanes),
+def _read_block(block: np.void) -> FilterBlock:
+    hypotheses = tuple(map(_read_hypothesis, block["hypothesis"][: block["n_hypotheses"]]))
+    n_hypotheses = len(hypotheses)
+    onset_tests = (
+        block["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
+        for name in OnsetTests._fields
+    )
+    return FilterBlock(
+        tuple(block["axis"][: block["n_axes"]].tolist()),
+        float(block["correlation_length"]), float(block["drift_intensity_scale"]),
+        block["regressor_tolerance"][: block["n_regressors"]].copy(), hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip
 
 
-def _hypothesis(one: np.void) -> Hypothesis:
-    numbers = int(one["kind"]), int(one["surface"]), int(one["axis"])
-    return Hypothesis(*numbers, bool(one["raises_alarm"]), float(one["score"]))
+def _read_hypothesis(hypothesis: np.void) -> Hypothesis:
+    kind_surface_axis = int(hypothesis["kind"]), int(hypothesis["surface"]), int(hypothesis["axis"])
+    return Hypothesis(*kind_surface_axis, bool(hypothesis["raises_alarm"]), float(hypothesis["score"]))
 
 
 def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
-    """The sensor monitor, of its record (dtype `SENSOR_MONITOR`)."""
-    output, config, memory = monitor["output"], monitor["step"]["config"], monitor["step"]["memory"]
-    largest_test = int(output["largest_test"])
-    test = monitor["step"]["test"][largest_test]
-    residual, rate, noise, air = (float(test[name]) for name in ("residual", "rate", "noise", "air"))
-    of_test = SensorTest(residual, rate, noise, air, test["filtered"].copy(), test["bound"].copy())
+    """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
+    output, redundancy = monitor["output"], monitor["redundancy"]
+    config, memory = redundancy["config"], redundancy["memory"]
+    worst_test = int(output["worst_test"])
+    test = redundancy["test"][worst_test]
+    worst_sensor_test = SensorTest(
+        float(test["residual"]), float(test["bound_per_s"]), float(test["bound_per_sample"]),
+        float(test["gust_gain"]), test["filtered_residual"].copy(), test["filtered_bound"].copy(),
+    )  # fmt: skip
     return SensorMonitor(
-        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), largest_test, float(output["share"]),
-        of_test, int(output["named"]),
-        output["replaced"].astype(bool), float(config["h"]), config["gust_change_bound"].copy(),
-        memory["predicted"].copy(), memory["error"].copy(), memory["command"].copy(),
+        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test,
+        float(output["worst_test_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
+        output["is_replaced"].astype(bool), float(config["sample_time_s"]),
+        config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
+        memory["reading_error_bound"].copy(), memory["engine_command"].copy(),
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Records that several stages of the diagnosis share, and the numbers that stand for names.
 
-The number of a scheme is the place of its kernels in SCHEME_KERNELS, which plugins.yaml lists.
+The number of a scheme is the place of its kernels in SCHEME_PATHS, which plugins.yaml lists.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
-DAMAGE_POSSIBLE = 2  # value of `weakly_excluded`: declared damage may have excluded the others
+WEAKLY_EXCLUDED_BY_DAMAGE = 2  # value of `weakly_excluded`: declared damage may have excluded the others
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
-_AUTHORITIES = {
+_AUTHORITY_CODE_OF_NAME = {
     "either": EITHER_DETECTOR,
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
@@ -30,7 +30,7 @@ ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of
 @sized
 def plugin_verdict_dtype(n: int) -> np.dtype:
     """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
-    return record(detected=int, axis=int, isolated=int, theta=float, estimates=int, effectiveness=n)
+    return record(detected=int, axis=int, isolated=int, theta=float, has_effectiveness=int, effectiveness=n)
 
 
 @sized
@@ -43,56 +43,70 @@ def layout_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme: its number;
-# fault_class: that of its row (schemes/adaptive_estimators.py); authority: whose alarms count; every_type:
-# faults of every type; abrupt: a fault is declared to stay as it is; instants: of JSBSim, in a frame; dt s.
-CONFIG = record(
-    enabled=int, scheme=int, fault_class=int, authority=int, every_type=int, abrupt=int, instants=int,
+# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that;
+# isolation_variant: its number (schemes/adaptive_estimators.py); authority: whose alarms count;
+# diagnoses_all_types: faults of every type; abrupt: a fault is declared to stay as it is; n_substeps: JSBSim
+# frames in a frame; dt s.
+SHARED_CONFIG_RECORD = record(
+    enabled=int, scheme_number=int, isolation_variant=int, authority=int, diagnoses_all_types=int, abrupt=int,
+    n_substeps=int,
     dt=float,
 )  # fmt: skip
 
 
-def configure_shared(shared: np.void, scenario: Scenario) -> None:
+def configure_shared_config(shared_config: np.void, scenario: Scenario) -> None:
     """Fill what several stages go by (dtype CONFIG)."""
-    config = scenario.fdi
-    shared["enabled"], shared["dt"] = config.diagnoses, 1.0 / scenario.rate_hz
-    shared["scheme"] = scheme_number(config.scheme)
-    shared["authority"], shared["every_type"] = _AUTHORITIES[config.authority], config.fault_class == "all"
-    shared["abrupt"], shared["instants"] = config.fault_profile == "abrupt", scenario.substeps
+    fdi_config = scenario.fdi
+    shared_config["enabled"], shared_config["dt"] = fdi_config.diagnoses, 1.0 / scenario.rate_hz
+    shared_config["scheme_number"] = scheme_number(fdi_config.scheme)
+    shared_config["authority"], shared_config["diagnoses_all_types"] = (
+        _AUTHORITY_CODE_OF_NAME[fdi_config.authority],
+        fdi_config.fault_class == "all",
+    )
+    shared_config["abrupt"], shared_config["n_substeps"] = (
+        fdi_config.fault_profile == "abrupt",
+        scenario.substeps,
+    )
 
 
-def configure_layout(layout: np.void, members: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
-    """Fill in axes, groups and estimators of the surfaces; members: of the isolation (isolation.py)."""
-    index = {name: s for s, name in enumerate(aircraft.surfaces)}
-    layout["main"] = leading_surfaces(aircraft)
+def configure_layout(
+    layout: np.void, estimator_entries: Sequence[tuple[str, int, int]], aircraft: Aircraft
+) -> None:
+    """Fill in axes, groups and estimators of the surfaces; estimator_entries: of isolation.py."""
+    surface_index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    layout["main"] = main_surfaces(aircraft)
     layout["dominant_axis"] = aircraft.dominant_axis
     layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
-    for names in aircraft.groups.values():
-        if len(names) == 2:
-            one, other = (index[name] for name in names)
-            layout["partner"][one], layout["partner"][other] = other, one
-    for e, (_, kind, surface) in enumerate(members):
-        layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = e
+    for group_surfaces in aircraft.groups.values():
+        if len(group_surfaces) == 2:
+            first, second = (surface_index[name] for name in group_surfaces)
+            layout["partner"][first], layout["partner"][second] = second, first
+    for estimator_index, (_, kind, surface) in enumerate(estimator_entries):
+        layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = estimator_index
 
 
-def leading_surfaces(aircraft: Aircraft) -> list[int]:
+def main_surfaces(aircraft: Aircraft) -> list[int]:
     """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    leads = {
+    main_surface_of_axis = {
         aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
     }
     for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in leads:
+        if axis not in main_surface_of_axis:
             raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [leads[axis] for axis in range(3)]
+    return [main_surface_of_axis[axis] for axis in range(3)]
 
 
-_ROWS = compiled_rows(DETECTORS)
-_PLUGIN_KERNELS = f"{__package__}.schemes.adaptive_estimators:PLUGGED"  # of every Python plug-in
-SCHEME_KERNELS = (*dict.fromkeys(row["kernels"] for row in _ROWS.values()), _PLUGIN_KERNELS)
-PLUGIN_SCHEME = SCHEME_KERNELS.index(_PLUGIN_KERNELS)
+_DETECTOR_ROWS = compiled_rows(DETECTORS)
+_PLUGIN_SCHEME_PATH = f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
+SCHEME_PATHS = (*dict.fromkeys(row["kernels"] for row in _DETECTOR_ROWS.values()), _PLUGIN_SCHEME_PATH)
+PLUGIN_SCHEME_NUMBER = SCHEME_PATHS.index(_PLUGIN_SCHEME_PATH)
 
 
 def scheme_number(name: str) -> int:
-    """The place of a scheme's kernels among SCHEME_KERNELS."""
-    return SCHEME_KERNELS.index(_ROWS[name]["kernels"]) if name in _ROWS else PLUGIN_SCHEME
+    """The place of a scheme's kernels among SCHEME_PATHS."""
+    return (
+        SCHEME_PATHS.index(_DETECTOR_ROWS[name]["kernels"])
+        if name in _DETECTOR_ROWS
+        else PLUGIN_SCHEME_NUMBER
+    )

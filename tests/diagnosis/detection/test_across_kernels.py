@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from innovations import by_onset, lanes_of
+from innovations import by_onset, onset_tests_of
 from kernels import DT, holder, new_fdi
 from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.likelihood import LEAST_UNCERTAINTY_RAD_S2, STEP
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_SIZE, configure_views
+from beaver_ftc.diagnosis.detection.likelihood import MIN_UNCERTAINTY_BOUND_RAD_S2, STEP_FAULT
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_RECORD_SIZE, configure_views
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
@@ -17,7 +17,17 @@ AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)
 V = 45.0
 FLOW = np.array([0.05, 0.0, V, 1200.0, 0.1])  # alpha, beta, airspeed, pressure, dpt
-NAMES = ("n", "n_hypotheses", "n_regressors", "noise", "jitter", "drift", "P_dd", "regressor", "scratch")
+NAMES = (
+    "n_axes",
+    "n_hypotheses",
+    "n_regressors",
+    "gyro_noise_variance",
+    "model_noise_variance",
+    "drift_intensity",
+    "P_dd",
+    "regressor",
+    "frame_innovation",
+)
 
 
 @pytest.fixture
@@ -30,25 +40,37 @@ def fdi(rng):
     """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    statistical["tests"]["keep"], statistical["noise"]["walk_intensity"] = 0.9, 2.0
-    statistical["noise"]["jitter"], statistical["noise"]["bounded"] = (1e-6, 4e-6, 9e-6), (0.02, 0.03, 0.05)
+    statistical["test_config"]["evidence_decay_factor"], statistical["noise"]["relative_walk_intensity"] = (
+        0.9,
+        2.0,
+    )
+    statistical["noise"]["input_noise_variance"], statistical["noise"]["uncertainty_bound"] = (
+        (1e-6, 4e-6, 9e-6),
+        (0.02, 0.03, 0.05),
+    )
     for block, n, regressors in zip(statistical["block"], (1, 2, 2), (3, 4, 4), strict=True):
-        block["n_regressors"], block["level"] = regressors, 5.0
-        block["noise"][:n] = rng.uniform(1e-8, 1e-7, n)
+        block["n_regressors"], block["alarm_level"] = regressors, 5.0
+        block["gyro_noise_variance"][:n] = rng.uniform(1e-8, 1e-7, n)
         block["regressor"] = rng.normal(size=block["regressor"].shape)
-        block["tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
+        block["regressor_tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
     configure_views(statistical, load())
-    parity.configure_tones(statistical["tone_config"], 1e-8, V, 15.0, DT)
-    air = statistical["air"]
-    air["output"]["moving"], air["config"]["rolling_length"], air["memory"]["intensity"] = (
+    parity.configure_tone_tests(statistical["tone_config"], 1e-8, V, 15.0, DT)
+    air = statistical["gust"]
+    (
+        air["output"]["is_turbulent"],
+        air["config"]["rolling_gust_correlation_length"],
+        air["memory"]["gust_drift_intensity"],
+    ) = (
         1,
         34.0,
         rng.uniform(1e-5, 1e-4, 3),
     )
-    for name in ("damping", "axes", "axes_rate", "turn_variance"):
+    for name in ("rate_damping", "gust_axes_in_body", "gust_axes_rate", "axes_turn_variance"):
         holder(air, name)[name] = rng.normal(size=(3, 3))
-    air["output"]["turn_variance"] = air["output"]["turn_variance"] @ air["output"]["turn_variance"].T
-    fdi["bound"]["surface_error_per_rad"], fdi["bound"]["has_surface_errors"] = (
+    air["output"]["axes_turn_variance"] = (
+        air["output"]["axes_turn_variance"] @ air["output"]["axes_turn_variance"].T
+    )
+    fdi["bound"]["effectiveness_error_per_rad"], fdi["bound"]["has_surface_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
         1,
     )
@@ -78,52 +100,62 @@ def test_a_surface_that_moves_neither_leaves_the_direction_as_it_was(fdi):
 
 def declared_along(statistical, m):
     """Noise, jitter, bound, drift of the air and its leap along a direction, by quadratic forms."""
-    air, pitch, lateral = statistical["air"], *statistical["block"][:2]
-    noise = np.array([lateral["noise"][0], pitch["noise"][0], lateral["noise"][1]])
-    bound = np.abs(m) @ statistical["noise"]["bounded"]
-    gusts = air["output"]["damping"] @ air["output"]["axes"]
-    walk = gusts @ np.diag(air["memory"]["intensity"]) @ gusts.T
-    if air["memory"]["axes_turn_fast"]:
-        turned = air["output"]["damping"] @ air["memory"]["axes_rate"]
-        longest_s = air["config"]["rolling_length"] / V
-        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["intensity"]) @ turned.T
-    moves = float(air["output"]["moving"])
-    size = max(bound, LEAST_UNCERTAINTY_RAD_S2)
-    drift = statistical["noise"]["walk_intensity"] * size**2 + moves * V * m @ walk @ m
-    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["jitter"])) ** 2
-    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["turn_variance"] @ m
+    air, pitch, lateral = statistical["gust"], *statistical["block"][:2]
+    noise = np.array(
+        [
+            lateral["gyro_noise_variance"][0],
+            pitch["gyro_noise_variance"][0],
+            lateral["gyro_noise_variance"][1],
+        ]
+    )
+    bound = np.abs(m) @ statistical["noise"]["uncertainty_bound"]
+    gusts = air["output"]["rate_damping"] @ air["output"]["gust_axes_in_body"]
+    walk = gusts @ np.diag(air["memory"]["gust_drift_intensity"]) @ gusts.T
+    if air["memory"]["has_fast_axes_turn"]:
+        turned = air["output"]["rate_damping"] @ air["memory"]["gust_axes_rate"]
+        longest_s = air["config"]["rolling_gust_correlation_length"] / V
+        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["gust_drift_intensity"]) @ turned.T
+    moves = float(air["output"]["is_turbulent"])
+    size = max(bound, MIN_UNCERTAINTY_BOUND_RAD_S2)
+    drift = statistical["noise"]["relative_walk_intensity"] * size**2 + moves * V * m @ walk @ m
+    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["input_noise_variance"])) ** 2
+    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["axes_turn_variance"] @ m
 
 
 @pytest.mark.parametrize(
     ("changes", "swings"),
-    [({}, 0), ({}, 1), ({"moving": 0}, 1)],
+    [({}, 0), ({}, 1), ({"is_turbulent": 0}, 1)],
 )
 @pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
 def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][PAST_AILERON]
-    view["direction"][:3], statistical["air"]["memory"]["axes_turn_fast"], view["block"]["P_dd"][0, 0] = (
+    (
+        view["direction"][:3],
+        statistical["gust"]["memory"]["has_fast_axes_turn"],
+        view["block"]["P_dd"][0, 0],
+    ) = (
         mix,
         swings,
         0.7,
     )
     for name, value in changes.items():
-        holder(statistical["air"], name)[name] = value
+        holder(statistical["gust"], name)[name] = value
     Across.blur(view, statistical, V)
     noise, jitter, bound, drift, leap = declared_along(statistical, np.array(mix))
     block = view["block"]
-    assert block["noise"][0] == pytest.approx(noise)
-    assert block["jitter"][0] == pytest.approx(jitter)
-    assert view["bounded"][0] == pytest.approx(bound)
-    assert block["drift"][0, 0] == pytest.approx(drift)
+    assert block["gyro_noise_variance"][0] == pytest.approx(noise)
+    assert block["model_noise_variance"][0] == pytest.approx(jitter)
+    assert view["uncertainty_bound"][0] == pytest.approx(bound)
+    assert block["drift_intensity"][0, 0] == pytest.approx(drift)
     assert block["P_dd"][0, 0] == pytest.approx(0.7 + leap)
 
 
 def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][ROLL_AXIS]
-    statistical["noise"]["bounded"], statistical["air"]["output"]["moving"] = 0.0, 0
+    statistical["noise"]["uncertainty_bound"], statistical["gust"]["output"]["is_turbulent"] = 0.0, 0
     Across.blur(view, statistical, V)
-    assert view["bounded"][0] == 0.0
-    assert view["block"]["drift"][0, 0] == pytest.approx(2.0 * LEAST_UNCERTAINTY_RAD_S2**2)
+    assert view["uncertainty_bound"][0] == 0.0
+    assert view["block"]["drift_intensity"][0, 0] == pytest.approx(2.0 * MIN_UNCERTAINTY_BOUND_RAD_S2**2)
 
 
 def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
@@ -138,7 +170,7 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     ):
         views[v]["block"]["regressor"][:], views[v]["block"]["n_regressors"] = 9.0, 0
         if v == PAST_AILERON:
-            views[v]["direction"][:3], views[v]["surface"] = (-0.6, 0.0, 0.8), AXIS_VIEW
+            views[v]["direction"][:3], views[v]["orthogonal_to_surface"] = (-0.6, 0.0, 0.8), AXIS_VIEW
         Across.regress(fdi, views[v], np.ones(3), 0.0)
         found = views[v]["block"]["regressor"][:, 0]
         assert found[: len(expected)] == pytest.approx(expected)
@@ -160,10 +192,10 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
-    e = fdi["bound"]["surface_error_per_rad"][[0, 2], AILERON]
+    e = fdi["bound"]["effectiveness_error_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH * size)
+    least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE * size)
     shown = has_surface_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
@@ -174,7 +206,7 @@ def test_a_step_signs_as_one_and_a_loss_as_what_its_surface_gives_along_the_dire
     view["direction"][:3] = 0.5, 0.3, -0.7
     hypotheses = view["block"]["hypothesis"]
     view["block"]["n_hypotheses"], hypotheses["signature"] = 3, 9.0
-    hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP, LOSS), (FLAP, -1, AILERON)
+    hypotheses["kind"][:3], hypotheses["surface"][:3] = (LOSS, STEP_FAULT, LOSS), (FLAP, -1, AILERON)
     Across.sign(fdi, view, Gu)
     m = view["direction"][:3]
     assert hypotheses["signature"][:3, 0] == pytest.approx([m @ Gu[:, FLAP], 1.0, m @ Gu[:, AILERON]])
@@ -187,9 +219,11 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
     view = fdi["statistical"]["views"][PAST_RUDDER]
     moved = np.eye(3)[axis]
     view["direction"][:3] = moved
-    assert Across.is_sensitive_to(fdi, view, AILERON, 1e-6 * moved)
-    assert not Across.is_sensitive_to(fdi, view, AILERON, 1.0 - moved)
-    assert not Across.is_sensitive_to(fdi, view, RUDDER, moved), "across its own column it shows nothing"
+    assert Across.is_view_sensitive_to_fault(fdi, view, AILERON, 1e-6 * moved)
+    assert not Across.is_view_sensitive_to_fault(fdi, view, AILERON, 1.0 - moved)
+    assert not Across.is_view_sensitive_to_fault(fdi, view, RUDDER, moved), (
+        "across its own column it shows nothing"
+    )
 
 
 @pytest.mark.parametrize(
@@ -200,45 +234,47 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
 def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi, surface, blind):
     G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
     statistical, course = fdi["statistical"], np.cumsum(np.random.default_rng(surface).normal(size=20))
-    statistical["n_views"], statistical["tests"]["has_tolerances"] = 5, 0
+    statistical["n_views"], statistical["test_config"]["has_regressors"] = 5, 0
     for k in range(20):
         Across.observe(fdi, course[k] * G[:, surface], G, 0.05 * G, FLOW, k, False)
     for v, view in enumerate(statistical["views"][:5]):
-        felt = Across.is_sensitive_to(fdi, view, surface, G[:, surface])
+        felt = Across.is_view_sensitive_to_fault(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
-        assert (np.abs(view["block"]["lanes"]["correlation"]).max() > 1e-6) == felt
+        assert (np.abs(view["block"]["onset_tests"]["correlation"]).max() > 1e-6) == felt
 
 
-@pytest.mark.parametrize(("latched", "has_tolerances", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
-def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_tolerances, frame):
+@pytest.mark.parametrize(("latched", "has_regressors", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
+def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors, frame):
     """Each view as a block of its own that is given what matrices say of the frame."""
     statistical = fdi["statistical"]
-    statistical["tests"]["has_tolerances"], G, Gu = has_tolerances, *rng.normal(0.0, 3.0, (2, 3, 4))
+    statistical["test_config"]["has_regressors"], G, Gu = has_regressors, *rng.normal(0.0, 3.0, (2, 3, 4))
     innovation = rng.normal(size=3)
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
     for view in statistical["views"][:2]:
-        lanes, overlap = view["block"]["lanes"], view["block"]["overlap"]
-        for name in ("correlation", "information", "response"):
-            lanes[name] = rng.uniform(1.0, 2.0, lanes[name].shape)
+        onset_tests, overlap = view["block"]["onset_tests"], view["block"]["regressor_overlap"]
+        for name in ("correlation", "information", "signature_filter_state"):
+            onset_tests[name] = rng.uniform(1.0, 2.0, onset_tests[name].shape)
         overlap[:] = rng.uniform(1.0, 2.0, overlap.shape)
         alone.append(view.copy().view(np.recarray))
     Across.observe(fdi, innovation, G, Gu, FLOW, frame, latched)
     for view, own in zip(statistical["views"], alone, strict=False):
-        share = Across.turn(fdi, own, G) if own["surface"] >= 0 else 0.0
+        share = Across.turn(fdi, own, G) if own["orthogonal_to_surface"] >= 0 else 0.0
         block = own["block"]
         Across.blur(own, statistical, V)
-        if has_tolerances:
+        if has_regressors:
             Across.regress(fdi, own, innovation, share)
         Across.sign(fdi, own, Gu)
-        block["scratch"][0] = own["direction"][:3] @ innovation
+        block["frame_innovation"][0] = own["direction"][:3] @ innovation
         if not latched:
-            likelihood.reset_onset(block, likelihood.slot_to_reset(frame))
-        likelihood.update_block(block, own["bounded"], has_tolerances, DT, 0.9 if latched else 1.0)
+            likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(frame))
+        likelihood.update_block(block, own["uncertainty_bound"], has_regressors, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
-        for name in ("correlation", "information", "overlap", "coefficient_part", "score"):
-            assert lanes_of(view["block"], name) == pytest.approx(lanes_of(block, name), rel=1e-12), name
+        for name in ("correlation", "information", "regressor_overlap", "coefficient_error_part", "score"):
+            assert onset_tests_of(view["block"], name) == pytest.approx(
+                onset_tests_of(block, name), rel=1e-12
+            ), name
 
 
 def test_views_that_are_not_there_are_not_asked(fdi, rng):
@@ -247,15 +283,15 @@ def test_views_that_are_not_there_are_not_asked(fdi, rng):
     Across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
     after = fdi["statistical"]["views"]
     changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
-    assert changed == [True] + [False] * (USUAL_SIZE.views - 1)
+    assert changed == [True] + [False] * (USUAL_RECORD_SIZE.n_views - 1)
 
 
 def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical = fdi["statistical"]
-    statistical["tests"]["alarm_level"], fdi["layout"]["position_estimator"] = 5.0, range(4)
-    statistical["tests"]["enabled"] = fdi["config"]["every_type"] = 1
+    statistical["test_config"]["alarm_level"], fdi["layout"]["position_estimator"] = 5.0, range(4)
+    statistical["test_config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
-        fie["kind"], fie["surface"], fie["effect"]["Z"] = POSITION, s, np.eye(3, 4)[:, s]
+        fie["hypothesis_kind"], fie["surface"], fie["effect"]["regressor"] = POSITION, s, np.eye(3, 4)[:, s]
     view = statistical["views"][ROLL_AXIS]
     tried = int(view["block"]["n_hypotheses"])
     room = len(view["block"]["hypothesis"])
@@ -272,25 +308,29 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     """And across a column one tolerance more, which is of the column itself."""
     statistical = fdi["statistical"]
     pitch, lateral = statistical["block"][:2]
-    statistical["air"]["output"]["moving"] = 0  # else no view of pitch tries what answers the gusts
+    statistical["gust"]["output"]["is_turbulent"] = 0  # else no view of pitch tries what answers the gusts
     for b, block in enumerate((pitch, lateral)):
-        block["level"], block["noise_share"], block["pace"] = 5.0 + b, 0.5 + b, 0.01 + b
+        block["alarm_level"], block["noise_share_of_alarm_level"], block["uncertainty_change_per_frame"] = (
+            5.0 + b,
+            0.5 + b,
+            0.01 + b,
+        )
     configure_views(statistical, load())
     for v, view in enumerate(statistical["views"][:5]):
         axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
         block, n = view["block"], int(axes["n_regressors"])
-        for name in ("level", "noise_share", "pace"):
+        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_per_frame"):
             assert block[name] == axes[name]
-        assert (block["n"], block["keep"]) == (1, 1.0)
+        assert (block["n_axes"], block["drift_decay_factor"]) == (1, 1.0)
         assert block["n_regressors"] == n + column
-        assert block["tolerance"][:n].tolist() == axes["tolerance"][:n].tolist()
-        assert block["tolerance"][n] == float(column)
-        assert block["P_xx"][0, 0] == axes["noise"].max()
+        assert block["regressor_tolerance"][:n].tolist() == axes["regressor_tolerance"][:n].tolist()
+        assert block["regressor_tolerance"][n] == float(column)
+        assert block["P_xx"][0, 0] == axes["gyro_noise_variance"].max()
         assert block["P_dd"][0, 0] == 1.0
         tried = block["hypothesis"][: block["n_hypotheses"]]
         losses = {PITCH_AXIS: [ELEVATOR, FLAP], PAST_AILERON: [RUDDER], PAST_RUDDER: [AILERON]}
         assert tried["surface"].tolist() == [-1, *losses.get(v, [AILERON, RUDDER])]
-        assert tried["kind"].tolist() == [STEP] + [LOSS] * (len(tried) - 1)
-        sense = by_onset(block, "sense")
+        assert tried["kind"].tolist() == [STEP_FAULT] + [LOSS] * (len(tried) - 1)
+        sense = by_onset(block, "supporting_sign")
         assert (sense[:, : len(tried)] == -1.0 * (tried["kind"] == LOSS)).all()
         assert (sense[:, len(tried) :] == 0.0).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kernels import DT, POLES, estimator, new_fdi, on, weights
 
-from beaver_ftc.diagnosis.bounds import poles_for_noise
+from beaver_ftc.diagnosis.bounds import detection_poles_for_noise
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.schema import Scenario
@@ -17,17 +17,19 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
     noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["noise_before"] = eta[k], noise[k]
-        fdi["bound"]["noise"] = noise[k + 1]
+        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_change_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["gyro_change_bound"] = noise[k + 1]
         on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
-    assert fdi["bound"]["frame"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
+    assert fdi["bound"]["frame_innovation_bound"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
     for m, decay in enumerate(np.exp(-POLES * DT)):
         w = weights(decay, frames)
         assert fdi["bank"]["output"]["residual"][m] == pytest.approx(DT * w @ innovation)
-        assert fdi["bank"]["memory"]["eta"][m] == pytest.approx(DT * w @ eta)
-        assert fdi["bank"]["memory"]["noise"][m] == pytest.approx((1.0 - decay) * w @ noise[:-1])
+        assert fdi["bank"]["memory"]["threshold_uncertainty_part"][m] == pytest.approx(DT * w @ eta)
+        assert fdi["bank"]["memory"]["threshold_gyro_error_part"][m] == pytest.approx(
+            (1.0 - decay) * w @ noise[:-1]
+        )
         whole = DT * w @ eta + (1.0 - decay) * w @ noise[:-1] + noise[-1]
         assert fdi["bank"]["output"]["threshold"][m] == pytest.approx(whole)
 
@@ -50,27 +52,30 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
         on(filters.bank_alarm_axis, with_shares([1.0, -1.0, 1.0], *CALM[:2])) == -1
     )  # at its bound is within
     assert on(filters.bank_alarm_axis, with_shares(*LEAVES)) == 1
-    assert [filters.nearest_filter(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
-    assert on(filters.largest_share, with_shares(*LEAVES)) == pytest.approx(1.5)
+    assert [filters.filter_nearest_to_alarm(with_shares(*LEAVES)["bank"], i) for i in range(3)] == [2, 1, 2]
+    assert on(filters.max_residual_threshold_ratio, with_shares(*LEAVES)) == pytest.approx(1.5)
 
 
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["output"]["closest"][:3], alarm["score"] = (0.6, 0.0, 0.0), 0.4
-    filters.note_closest_approach(fdi["bank"])
-    statistical.note_closest_approach(alarm)
-    assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.6, 1.5, 1.2])
-    assert alarm["closest"] == 0.4
+    fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3], alarm["score_over_alarm_level"] = (
+        (0.6, 0.0, 0.0),
+        0.4,
+    )
+    filters.update_max_threshold_ratios(fdi["bank"])
+    statistical.update_max_score(alarm)
+    assert fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
+    assert alarm["max_score_over_alarm_level"] == 0.4
     silent = new_fdi()
-    filters.note_closest_approach(silent["bank"])
-    assert not silent["bank"]["output"]["closest"].any()
-    assert on(filters.largest_share, silent) == 0.0
+    filters.update_max_threshold_ratios(silent["bank"])
+    assert not silent["bank"]["output"]["max_threshold_ratio_so_far"].any()
+    assert on(filters.max_residual_threshold_ratio, silent) == 0.0
 
 
 def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it():
     fdi = new_fdi()
-    fdi["isolation"]["config"]["n"] = 2
+    fdi["isolation"]["config"]["n_estimators"] = 2
     fdi["isolation"]["estimator"]["surface"][:2] = 2, 1
     G = np.array([[0, 0, 3.0, 0], [0, 5.0, 0, 0], [0, 0, -4.0, 0]])
     on(filters.set_parity_directions, fdi, G)
@@ -82,7 +87,11 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
     fdi = new_fdi()
     fie = estimator(fdi, low=low, high=high)
-    fie["effect"]["offset"], fie["effect"]["Z"], fie["effect"]["spread"] = offset, Z, spread
+    fie["effect"]["base_acceleration"], fie["effect"]["regressor"], fie["effect"]["error_bound"] = (
+        offset,
+        Z,
+        spread,
+    )
     fie["parity_direction"] = across
     return fdi, fie
 
@@ -93,15 +102,15 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     rng = np.random.default_rng(seed)
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
-        on(filters.advance_reach, fdi, fie)
+        on(filters.advance_reachable_residuals, fdi, fie)
     effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
-    at_ends = [effect["offset"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
+    at_ends = [effect["base_acceleration"] + theta * effect["regressor"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
-    spread = np.abs(across) @ effect["spread"]
+    spread = np.abs(across) @ effect["error_bound"]
     for m, decay in enumerate(np.exp(-POLES * DT)):
         kept = DT * weights(decay, 3).sum()
-        assert fie["reach_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
-        assert fie["reach_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
+        assert fie["reachable_effect_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
+        assert fie["reachable_effect_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
 
 
 @pytest.mark.parametrize("m", range(3))
@@ -110,11 +119,15 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
 def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     def explained(beyond, ignored_axes=False):
         fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
-        fie["reach_low"], fie["reach_high"], fdi["bank"]["output"]["threshold"] = -0.3, 0.5, 0.1
+        fie["reachable_effect_low"], fie["reachable_effect_high"], fdi["bank"]["output"]["threshold"] = (
+            -0.3,
+            0.5,
+            0.1,
+        )
         fie["ignored_axes"][axis] = ignored_axes
         limit = -0.4 if side < 0 else 0.6
         fdi["bank"]["output"]["residual"][m, axis] = limit + side * beyond
-        return bool(on(filters.reach_explains, fdi, fie, True))
+        return bool(on(filters.are_residuals_reachable, fdi, fie, True))
 
     assert explained(-1e-9)
     assert not explained(1e-9)
@@ -124,16 +137,16 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
 @pytest.mark.parametrize("side", [-1, 1])
 def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     fdi, fie = reach_of(0.0, 0.0, 0.0)
-    fie["reach_low"][:, :3], fie["reach_high"][:, :3] = -9.0, 9.0
-    fie["reach_low"][:, 3], fie["reach_high"][:, 3] = -0.2, 0.3
+    fie["reachable_effect_low"][:, :3], fie["reachable_effect_high"][:, :3] = -9.0, 9.0
+    fie["reachable_effect_low"][:, 3], fie["reachable_effect_high"][:, 3] = -0.2, 0.3
     fdi["bank"]["output"]["threshold"][:3] = 0.1
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):
         fdi["bank"]["output"]["residual"][1] = (limit + side * beyond) * fie[
             "parity_direction"
         ]  # a unit vector
-        assert bool(on(filters.reach_explains, fdi, fie, True)) == within
-        assert on(filters.reach_explains, fdi, fie, False)
+        assert bool(on(filters.are_residuals_reachable, fdi, fie, True)) == within
+        assert on(filters.are_residuals_reachable, fdi, fie, False)
 
 
 def test_a_filter_without_a_bound_has_no_share_of_it():
@@ -141,17 +154,17 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     fdi = with_shares(*LEAVES)
     fdi["bank"]["output"]["threshold"][0] = 0.0
     with np.errstate(divide="ignore"):
-        assert on(filters.largest_share, fdi) == pytest.approx(1.5)
-        assert [filters.nearest_filter(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.note_closest_approach(fdi["bank"])
-    assert fdi["bank"]["output"]["closest"][:3] == pytest.approx([0.0, 1.5, 1.2])
+        assert on(filters.max_residual_threshold_ratio, fdi) == pytest.approx(1.5)
+        assert [filters.filter_nearest_to_alarm(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
+        filters.update_max_threshold_ratios(fdi["bank"])
+    assert fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3] == pytest.approx([0.0, 1.5, 1.2])
     assert on(filters.bank_alarm_axis, fdi) == 0
 
 
 def test_of_filters_that_are_equally_near_the_published_one_is_named():
-    assert filters.nearest_filter(new_fdi()["bank"], 0) == 0
-    assert filters.nearest_filter(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
-    assert filters.nearest_filter(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
+    assert filters.filter_nearest_to_alarm(new_fdi()["bank"], 0) == 0
+    assert filters.filter_nearest_to_alarm(with_shares(*[[0.0] * 3] * 3)["bank"], 1) == 0
+    assert filters.filter_nearest_to_alarm(with_shares(*[[0.5] * 3] * 3)["bank"], 1) == 0
 
 
 @pytest.mark.parametrize("size", [9.0, 0.3])
@@ -174,13 +187,13 @@ def test_poles_are_those_asked_for_and_those_that_noise_asks_for(noisy, several)
     asked |= {"sharpen": {"pole_bank": several}}
     scenario, fdi = Scenario.model_validate({"name": "x", "fdi": asked}), new_fdi()
     config = scenario.fdi
-    fdi["bank"]["config"]["decay"] = 0.0
+    fdi["bank"]["config"]["decay_factor"] = 0.0
     filters.configure_bank(fdi["bank"], config, Declared.of(scenario), DT)
     bound = max(config.bounds.constant_rad_s2.as_tuple())
-    for_noise = poles_for_noise(SensorErrors(config.bounds.sensors), bound)
+    for_noise = detection_poles_for_noise(SensorErrors(config.bounds.sensors), bound)
     assert bool(for_noise) is noisy
     poles = [2.5, *([11.0, 0.7, *for_noise] if several else [])]
     apart(poles=poles)
-    assert fdi["bank"]["config"]["n"] == len(poles)
-    assert fdi["bank"]["config"]["decay"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
-    assert not fdi["bank"]["config"]["decay"][len(poles) :].any()
+    assert fdi["bank"]["config"]["n_filters"] == len(poles)
+    assert fdi["bank"]["config"]["decay_factor"][: len(poles)] == pytest.approx(np.exp(-DT * np.array(poles)))
+    assert not fdi["bank"]["config"]["decay_factor"][len(poles) :].any()

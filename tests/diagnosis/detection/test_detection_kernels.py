@@ -1,28 +1,32 @@
-"""Detection estimator, network and belief, a kernel at a time: sums over instants and frames by NumPy."""
+"""Detection estimator, network and prediction, a kernel at a time: sums over instants and frames by NumPy."""
 
 import numpy as np
 import pytest
 from kernels import DT, fill, new_fdi, on
 
-from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis import expectation as beliefs
+from beaver_ftc.diagnosis import conclusion, model_prediction
 from beaver_ftc.diagnosis.detection import filters as detection_filters
-from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES, BETA_CENTRES, N_BASIS, NETWORK
+from beaver_ftc.diagnosis.detection.filters import (
+    ALPHA_CENTRES_RAD,
+    BETA_CENTRES_RAD,
+    N_BASIS_FUNCTIONS,
+    NETWORK_RECORD,
+)
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
-    return fill(np.zeros(1, NETWORK).view(np.recarray)[0], **fields)
+    return fill(np.zeros(1, NETWORK_RECORD).view(np.recarray)[0], **fields)
 
 
 @pytest.mark.parametrize("alpha", [-0.3, -0.1, 0.0, 0.13, 0.5, 0.9])
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
-    out = np.zeros(N_BASIS)
-    detection_filters.fill_basis(alpha, beta, out)
+    out = np.zeros(N_BASIS_FUNCTIONS)
+    detection_filters.fill_basis_functions(alpha, beta, out)
     parts = []
-    for place, centres in ((alpha, ALPHA_CENTRES), (beta, BETA_CENTRES)):
+    for place, centres in ((alpha, ALPHA_CENTRES_RAD), (beta, BETA_CENTRES_RAD)):
         inside = np.clip(place, centres[0], centres[-1])
         parts.append(np.exp(-0.5 * ((inside - centres) / (centres[1] - centres[0])) ** 2))
     both = np.concatenate(parts)
@@ -33,26 +37,30 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
-    assert detection_filters.dead_zone(residual, 0.3) == pytest.approx(left)
+    assert detection_filters.apply_dead_zone(residual, 0.3) == pytest.approx(left)
 
 
 def test_the_output_is_the_weights_on_the_basis():
     rng = np.random.default_rng(1)
-    record = new_network(weights=rng.normal(size=(3, N_BASIS)))
+    record = new_network(weights=rng.normal(size=(3, N_BASIS_FUNCTIONS)))
     detection_filters.evaluate_network(record, 0.1, -0.05)
-    assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["basis"])
+    assert record["output"] == pytest.approx(record["memory"]["weights"] @ record["memory"]["basis_values"])
 
 
 @pytest.mark.parametrize("leaking", [False, True])
 def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
     rng = np.random.default_rng(2)
-    before = 0.1 * rng.normal(size=(3, N_BASIS))
+    before = 0.1 * rng.normal(size=(3, N_BASIS_FUNCTIONS))
     record = new_network(
-        gain=30.0, leak_per_s=2.0, weight_limit=9.0, weights=before, basis=rng.uniform(0, 1, N_BASIS)
+        learning_gain=30.0,
+        leak_per_s=2.0,
+        weight_limit=9.0,
+        weights=before,
+        basis_values=rng.uniform(0, 1, N_BASIS_FUNCTIONS),
     )
     detection_filters.train_network(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
     kept = np.exp(-2.0 * DT) if leaking else 1.0
-    learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["memory"]["basis"])
+    learnt = DT * 30.0 * np.outer([0.3, -0.2, 0.0], record["memory"]["basis_values"])
     assert record["memory"]["weights"] == pytest.approx(kept * before + learnt)
     record["config"]["weight_limit"] = 0.05
     detection_filters.train_network(record, np.array([0.5, -0.4, 0.1]), np.full(3, 0.2), leaking, DT)
@@ -62,12 +70,14 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
-    fdi["bound"]["noise"] = 0.1, 0.2, 0.3
-    on(detection_filters.begin_fdae, fdi, np.array([1.0, 2.0, 3.0]))
+    fdi["bound"]["gyro_change_bound"] = 0.1, 0.2, 0.3
+    on(detection_filters.start_fdae, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["fdae"]["memory"]["threshold_noise"] == pytest.approx([0.1, 0.2, 0.3])
-    on(detection_filters.begin_bank, fdi)
-    assert fdi["bank"]["memory"]["noise"][:3] == pytest.approx(np.tile([0.1, 0.2, 0.3], (3, 1)))
+    assert fdi["fdae"]["memory"]["threshold_gyro_error_part"] == pytest.approx([0.1, 0.2, 0.3])
+    on(detection_filters.start_bank, fdi)
+    assert fdi["bank"]["memory"]["threshold_gyro_error_part"][:3] == pytest.approx(
+        np.tile([0.1, 0.2, 0.3], (3, 1))
+    )
 
 
 @pytest.mark.parametrize(
@@ -85,7 +95,7 @@ def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi["config"]["authority"] = authority
     fdi["bank"]["output"]["threshold"][:3], fdi["bank"]["output"]["residual"][1, 2] = 0.1, 0.1 * filters
     (
-        fdi["statistical"]["alarm"]["score"],
+        fdi["statistical"]["alarm"]["score_over_alarm_level"],
         fdi["statistical"]["alarm"]["axis"],
         fdi["fdae"]["memory"]["xhat"],
     ) = (
@@ -111,25 +121,25 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     rng, frames, fdi = np.random.default_rng(3), 15, new_fdi()
     decay = np.exp(-np.array([2.0, 3.0, 4.0]) * DT)
     record = fdi["fdae"]
-    record["config"]["decay"], fdi["verdict"]["detected"] = decay, detected
+    record["config"]["decay_factor"], fdi["verdict"]["detected"] = decay, detected
     record["network"]["output"] = output = np.array([0.1, -0.2, 0.3])
     (
-        record["network"]["config"]["gain"],
-        record["network"]["memory"]["basis"],
+        record["network"]["config"]["learning_gain"],
+        record["network"]["memory"]["basis_values"],
         record["network"]["config"]["weight_limit"],
     ) = 1.0, 1.0, 100.0
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["noise_before"] = eta[k], noise[k]
-        fdi["bound"]["noise"], record["output"]["residual"] = noise[k + 1], 99.0
+        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_change_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["gyro_change_bound"], record["output"]["residual"] = noise[k + 1], 99.0
         on(detection_filters.predict_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
     assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))
     sums = DT * (w * eta).sum(axis=0), ((1.0 - decay) * w * noise[:-1]).sum(axis=0)
-    assert record["memory"]["threshold_eta"] == pytest.approx(sums[0])
-    assert record["memory"]["threshold_noise"] == pytest.approx(sums[1])
+    assert record["memory"]["threshold_uncertainty_part"] == pytest.approx(sums[0])
+    assert record["memory"]["threshold_gyro_error_part"] == pytest.approx(sums[1])
     assert record["output"]["threshold"] == pytest.approx(sums[0] + sums[1] + noise[-1])
     assert record["network"]["memory"]["weights"].any() == detected
 
@@ -137,16 +147,16 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
 def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     fdi, out = new_fdi(), np.zeros(3)
     record = fdi["fdae"]
-    record["network"]["output"], record["config"]["pole"] = 0.1, (2.0, 3.0, 4.0)
+    record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["threshold_noise"], fdi["bound"]["noise"] = 0.1, 0.2
-    on(detection_filters.fdae_unknown_acceleration, fdi, out)
+    record["memory"]["threshold_gyro_error_part"], fdi["bound"]["gyro_change_bound"] = 0.1, 0.2
+    on(detection_filters.fill_fdae_unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 
-def new_belief(share):
-    record = np.zeros(1, beliefs.belief_dtype(4)).view(np.recarray)[0]
-    record["share"] = share
+def new_prediction(share):
+    record = np.zeros(1, model_prediction.prediction_dtype(4)).view(np.recarray)[0]
+    record["frame_share_per_instant"] = share
     return record
 
 
@@ -160,53 +170,62 @@ def instants(count, seed=5):
 @pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("has_surface_errors", [0, 1])
 def test_means_over_a_frame_are_of_its_instants(count, has_surface_errors):
-    fdi, record = new_fdi(), new_belief(1.0 / count)
-    fdi["bound"]["has_surface_errors"], fdi["config"]["every_type"] = has_surface_errors, 1
+    fdi, record = new_fdi(), new_prediction(1.0 / count)
+    fdi["bound"]["has_surface_errors"], fdi["config"]["diagnoses_all_types"] = has_surface_errors, 1
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
-    record["sums"]["own"], record["sums"]["surface_error_per_rad"] = (
+    record["sums"]["surface_error_at_command"], record["sums"]["effectiveness_error_per_rad"] = (
         (99.0, 99.0) if has_surface_errors else (0.0, 0.0)
     )
-    fdi["bound"]["noise"] = 0.1, 0.2, 0.3
+    fdi["bound"]["gyro_change_bound"] = 0.1, 0.2, 0.3
     measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
     measured["x"] = 1.0, 2.0, 3.0
     seen = instants(count)
     for k, (f, G, u, eta_bar, per_rad) in enumerate(seen):
         record["f"], record["G"], record["u"] = f, G, u
-        fdi["bound"]["eta_bar_now"], fdi["bound"]["declared_errors"]["per_rad"] = eta_bar, np.abs(per_rad)
+        fdi["bound"]["eta_bar_now"], fdi["bound"]["declared_errors"]["acceleration_error_per_rad"] = (
+            eta_bar,
+            np.abs(per_rad),
+        )
         if k == 0:
-            beliefs.begin_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"], measured)
+            model_prediction.begin_frame_sums(
+                record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"], measured
+            )
         else:
-            beliefs.add_instant_to_sums(record, fdi["bound"], fdi["layout"], fdi["config"]["every_type"])
-    beliefs.fill_frame_means(record, fdi["bound"])
+            model_prediction.add_instant_to_sums(
+                record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"]
+            )
+    model_prediction.fill_frame_means(record, fdi["bound"])
     Gu = np.array([G * u for _, G, u, _, _ in seen])
-    mean = record["means"]
+    mean = record["frame_means"]
     assert record["x_before"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["bound"]["noise_before"] == pytest.approx([0.1, 0.2, 0.3])
+    assert fdi["bound"]["gyro_change_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
     assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
     assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
     assert mean["acceleration"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["surface_error_per_rad"] == pytest.approx(own if has_surface_errors else 0.0)
-    assert fdi["bound"]["own"] == pytest.approx(at_command if has_surface_errors else 0.0)
+    assert fdi["bound"]["effectiveness_error_per_rad"] == pytest.approx(own if has_surface_errors else 0.0)
+    assert fdi["bound"]["surface_error_at_command"] == pytest.approx(
+        at_command if has_surface_errors else 0.0
+    )
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
     assert mean["Gu_spread"] == pytest.approx(spread)
     own_axis = np.array([G[(0, 1, 2, 1), range(4)] for _, G, *_ in seen])
-    assert mean["G_least"] == pytest.approx(own_axis.min(axis=0))
-    assert mean["G_most"] == pytest.approx(own_axis.max(axis=0))
+    assert mean["G_min"] == pytest.approx(own_axis.min(axis=0))
+    assert mean["G_max"] == pytest.approx(own_axis.max(axis=0))
     deflections = np.array([u for _, _, u, *_ in seen])
-    assert mean["u_least"] == pytest.approx(deflections.min(axis=0))
-    assert mean["u_most"] == pytest.approx(deflections.max(axis=0))
+    assert mean["u_min"] == pytest.approx(deflections.min(axis=0))
+    assert mean["u_max"] == pytest.approx(deflections.max(axis=0))
 
 
 def test_a_command_is_followed_by_surfaces_that_were_where_they_were():
-    record = new_belief(1.0)
+    record = new_prediction(1.0)
     record["u"], record["actuators"]["approach"] = (0.1, 0.2, 0.3, 0.0), 1.0
     record["actuators"]["step"], record["actuators"]["low"], record["actuators"]["high"] = np.inf, -1.0, 1.0
-    beliefs.move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
+    model_prediction.move_healthy_surfaces(record, np.array([0.4, 0.5, -0.6, 0.2]))
     assert record["u_before"] == pytest.approx([0.1, 0.2, 0.3, 0.0])
     assert record["u"] == pytest.approx(record["commanded"])
     assert record["commanded"] == pytest.approx([0.4, 0.5, -0.6, 0.2])
@@ -219,8 +238,8 @@ def test_an_estimator_forgets_by_the_frame_however_many_instants_it_has(substeps
     asked = {"fdi": {"detection_pole_per_s": 2.2}, "control": control, "rate_hz": 40, "substeps": substeps}
     record = new_fdi()["fdae"]
     detection_filters.configure_fdae(record, Scenario.model_validate({"name": "x", **asked}))
-    assert np.unique(record["config"]["pole"]).tolist() == [2.2]
-    assert np.unique(record["config"]["decay"]) == pytest.approx([np.exp(-2.2 / 40.0)])
+    assert np.unique(record["config"]["pole_per_s"]).tolist() == [2.2]
+    assert np.unique(record["config"]["decay_factor"]) == pytest.approx([np.exp(-2.2 / 40.0)])
     network = record["network"]
-    names = "gain", "leak_per_s", "weight_limit"
+    names = "learning_gain", "leak_per_s", "weight_limit"
     assert [float(network["config"][name]) for name in names] == [91.0, 0.7, 3.3]

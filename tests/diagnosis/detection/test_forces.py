@@ -31,7 +31,9 @@ def test_jsbsim_s_forces_are_those_of_the_aircraft_s_file():
     for k in range(300):
         loop.sample_references(k, 1)
         loop.fly_frames(1, 1 if k else 0)
-        left.append((*forces["component"]["innovation"], *forces["component"]["inertial"]))
+        left.append(
+            (*forces["component"]["innovation"], *forces["component"]["innovation_at_inertial_flow_angle"])
+        )
     loop.release()
     assert np.abs(loop.frames["measured"]["force"][0]).max() > 8.0
     assert np.abs(left)[:, :2].max() < 1e-4

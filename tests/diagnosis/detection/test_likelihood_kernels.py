@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from innovations import block_of, by_onset, lanes_of, with_hypotheses
+from innovations import block_of, by_onset, onset_tests_of, with_hypotheses
 from kernels import new_fdi
 from statistics_of import Statistical, put
 
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA3,
-    ENDING,
-    GROWING,
+    ALPHA_CUBED_EFFECT,
+    GROWING_LOSS,
+    LOSS_END,
     MAX_HYPOTHESES,
-    N_LANES,
-    N_SLOTS,
-    STEP,
+    N_ONSET_SLOTS,
+    N_ONSET_TESTS_PER_GROUP,
+    STEP_FAULT,
 )
 from beaver_ftc.diagnosis.state import LOSS
 
@@ -36,50 +36,52 @@ def through(block, accelerations):
     out, state, shown = np.zeros(2), np.zeros(4), []
     for acceleration in accelerations:
         likelihood.whiten(block, state, np.append(acceleration, 0.0)[:2], DT, out)
-        shown.append(out[: block["n"]].copy())
+        shown.append(out[: block["n_axes"]].copy())
     return np.array(shown)
 
 
 def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
-    expected = [min((k & -k).bit_length() - 1, N_SLOTS - 1) for k in range(1, 2**11)]
-    assert [likelihood.slot_to_reset(k) for k in range(1, 2**11)] == expected
-    assert likelihood.slot_to_reset(0) == N_SLOTS - 1
+    expected = [min((k & -k).bit_length() - 1, N_ONSET_SLOTS - 1) for k in range(1, 2**11)]
+    assert [likelihood.onset_slot_to_reset(k) for k in range(1, 2**11)] == expected
+    assert likelihood.onset_slot_to_reset(0) == N_ONSET_SLOTS - 1
 
 
 def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
-    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP)
+    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
     names = (
         "correlation",
         "information",
-        "constant_part",
-        "variation_part",
-        "paced_part",
-        "calm_prediction",
-        "growth_left",
-        "response",
-        "weight",
-        "overlap",
+        "constant_uncertainty_part",
+        "varying_uncertainty_part",
+        "bounded_rate_uncertainty_part",
+        "correlation_in_calm_air",
+        "remaining_growth",
+        "signature_filter_state",
+        "correlation_weight",
+        "regressor_overlap",
     )
     for name in names[:-1]:
-        block["lanes"][name] = 3.0
-    block["overlap"] = 3.0
-    likelihood.reset_onset(block, 4)
+        block["onset_tests"][name] = 3.0
+    block["regressor_overlap"] = 3.0
+    likelihood.reset_onset_slot(block, 4)
     for name in names:
         kept = by_onset(block, name)
         assert (np.delete(kept, 4, axis=-2) == 3.0).all(), name
-        cleared = kept[:2, 4] if name == "overlap" else kept[..., 4, :]
-        assert (cleared == (1.0 if name == "growth_left" else 0.0)).all(), name
+        cleared = kept[:2, 4] if name == "regressor_overlap" else kept[..., 4, :]
+        assert (cleared == (1.0 if name == "remaining_growth" else 0.0)).all(), name
 
 
 def test_of_a_constant_the_filter_leaves_what_stay_says():
     """One axis, a drift that returns: after its transient a constant of eta_bar shows as g_0."""
     block = steady_block(1)
     likelihood.fill_uncertainty_response(block, np.array([0.3, 9.0, 9.0]), DT)
-    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(block["constant_response"][:1])
+    assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(
+        block["constant_uncertainty_response"][:1]
+    )
     still = steady_block(1, keep=1.0)
     likelihood.fill_uncertainty_response(still, np.array([0.3, 0.0, 0.0]), DT)
-    assert not still["constant_response"].any()  # a walk takes in all that is constant
+    assert not still["constant_uncertainty_response"].any()  # a walk takes in all that is constant
 
 
 @pytest.mark.parametrize("axes", [1, 2])
@@ -88,108 +90,145 @@ def test_a_steps_transient_sums_to_the_inverse_gain(axes):
     block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
     likelihood.fill_uncertainty_response(block, bounded, DT)
     sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
-    expected = likelihood.RINGING * np.abs(sums) @ bounded[:axes]
-    assert block["transient_response"][:axes] == pytest.approx(expected, rel=1e-6)
+    expected = likelihood.RINGING_FACTOR * np.abs(sums) @ bounded[:axes]
+    assert block["transient_uncertainty_response"][:axes] == pytest.approx(expected, rel=1e-6)
     assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
 
 
 def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     rng, frames, keep = np.random.default_rng(4), 12, 0.9
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP)
-    block["constant_response"], block["transient_response"], block["pace"] = (0.1, 0.2), (0.3, 0.4), 0.05
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP_FAULT)
+    (
+        block["constant_uncertainty_response"],
+        block["transient_uncertainty_response"],
+        block["uncertainty_change_per_frame"],
+    ) = (
+        (0.1, 0.2),
+        (0.3, 0.4),
+        0.05,
+    )
     w = rng.normal(size=(frames, 2))
     block["K_x"] = block["S_inverse"] = np.eye(2)  # a filter that forgets at once: g_s is the signature
-    lanes, lane = block["lanes"][0], 2
+    onset_tests, lane = block["onset_tests"][0], 2
     for each in w:
-        lanes["shaped_signature"][:, lane] = each
-        likelihood.accumulate_correlations(block, lanes, N_SLOTS, 1.0, keep)
+        onset_tests["signature_for_onset"][:, lane] = each
+        likelihood.accumulate_correlations(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
-    constant_part, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
-    paced_part = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert lanes["constant_part"][lane] == pytest.approx(constant_part)
-    assert lanes["variation_part"][lane] == pytest.approx(swings)
-    assert lanes["paced_part"][lane] == pytest.approx(paced_part)
+    constant_uncertainty_part, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
+    bounded_rate_uncertainty_part = old @ np.abs(w) @ [0.3, 0.4] * 0.05
+    assert onset_tests["constant_uncertainty_part"][lane] == pytest.approx(constant_uncertainty_part)
+    assert onset_tests["varying_uncertainty_part"][lane] == pytest.approx(swings)
+    assert onset_tests["bounded_rate_uncertainty_part"][lane] == pytest.approx(bounded_rate_uncertainty_part)
     last = np.abs(w[-1]) @ [0.3, 0.4]
-    allowed = likelihood.uncertainty_part(lanes, lane, *block["transient_response"])
-    assert allowed == pytest.approx(constant_part + min(swings + last, paced_part))
-    lanes["paced_part"][lane] = 99.0
-    allowed = likelihood.uncertainty_part(lanes, lane, *block["transient_response"])
-    assert allowed == pytest.approx(constant_part + swings + last)
+    allowed = likelihood.max_uncertainty_part(onset_tests, lane, *block["transient_uncertainty_response"])
+    assert allowed == pytest.approx(
+        constant_uncertainty_part + min(swings + last, bounded_rate_uncertainty_part)
+    )
+    onset_tests["bounded_rate_uncertainty_part"][lane] = 99.0
+    allowed = likelihood.max_uncertainty_part(onset_tests, lane, *block["transient_uncertainty_response"])
+    assert allowed == pytest.approx(constant_uncertainty_part + swings + last)
 
 
 def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
-    """Every lane by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its share."""
+    """Every onset test by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its
+    share."""
     rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
-    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP)
+    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
-    block["K_x"], block["K_d"], block["S_inverse"], block["keep"] = K_x, K_d, S, kept
+    block["K_x"], block["K_d"], block["S_inverse"], block["drift_decay_factor"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
     block["innovation"], block["regressor_response"][:2] = seen, regressors
-    for name in ("shaped_signature", "response", "correlation", "information", "coefficient_part"):
-        block["lanes"][name] = rng.normal(size=block["lanes"][name].shape)
-    block["overlap"] = rng.normal(size=block["overlap"].shape)
-    kept_by_name = ("shaped_signature", "response", "correlation", "information", "overlap")
-    before = {name: lanes_of(block, name) for name in kept_by_name}
-    for lanes, overlap in zip(block["lanes"], block["overlap"], strict=True):
-        likelihood.accumulate_correlations(block, lanes, N_LANES, dt, keep)
-        likelihood.accumulate_overlap(block, lanes, overlap, N_LANES, keep)
-    lane = {name: lanes_of(block, name) for name in (*kept_by_name, "weight", "coefficient_part")}
-    x, d = before["response"][:2], before["response"][2:]
-    r = x + dt * (before["shaped_signature"] - d)
+    for name in (
+        "signature_for_onset",
+        "signature_filter_state",
+        "correlation",
+        "information",
+        "coefficient_error_part",
+    ):
+        block["onset_tests"][name] = rng.normal(size=block["onset_tests"][name].shape)
+    block["regressor_overlap"] = rng.normal(size=block["regressor_overlap"].shape)
+    kept_by_name = (
+        "signature_for_onset",
+        "signature_filter_state",
+        "correlation",
+        "information",
+        "regressor_overlap",
+    )
+    before = {name: onset_tests_of(block, name) for name in kept_by_name}
+    for onset_tests, overlap in zip(block["onset_tests"], block["regressor_overlap"], strict=True):
+        likelihood.accumulate_correlations(block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep)
+        likelihood.accumulate_regressor_overlap(block, onset_tests, overlap, N_ONSET_TESTS_PER_GROUP, keep)
+    lane = {
+        name: onset_tests_of(block, name)
+        for name in (*kept_by_name, "correlation_weight", "coefficient_error_part")
+    }
+    x, d = before["signature_filter_state"][:2], before["signature_filter_state"][2:]
+    r = x + dt * (before["signature_for_onset"] - d)
     w = S @ r
-    assert lane["response"] == pytest.approx(np.vstack([r - K_x @ r, kept * d + K_d @ r]))
-    assert lane["weight"] == pytest.approx(w)
+    assert lane["signature_filter_state"] == pytest.approx(np.vstack([r - K_x @ r, kept * d + K_d @ r]))
+    assert lane["correlation_weight"] == pytest.approx(w)
     assert lane["correlation"] == pytest.approx(keep * before["correlation"] + seen @ w)
     assert lane["information"] == pytest.approx(keep * before["information"] + (w * r).sum(axis=0))
-    overlaps = keep * before["overlap"][:2] + regressors @ w
-    assert lane["overlap"][:2] == pytest.approx(overlaps)
-    assert lane["overlap"][2:] == pytest.approx(before["overlap"][2:])
-    assert lane["coefficient_part"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
+    overlaps = keep * before["regressor_overlap"][:2] + regressors @ w
+    assert lane["regressor_overlap"][:2] == pytest.approx(overlaps)
+    assert lane["regressor_overlap"][2:] == pytest.approx(before["regressor_overlap"][2:])
+    assert lane["coefficient_error_part"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
 
 
 @pytest.mark.parametrize(
-    ("calm_agreement", "size", "share"),
+    ("calm_air_cross_correlation", "size", "share"),
     [
         (
             0.0,
             500.0,
-            lambda calm_agreement, size: (calm_agreement + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0),
+            lambda calm_air_cross_correlation, size: (
+                (calm_air_cross_correlation + 4.0 + 2.0 * np.sqrt(size + 4.0)) / (size + 4.0)
+            ),
         ),
-        (-900.0, 500.0, lambda calm_agreement, size: 0.0),
-        (900.0, 500.0, lambda calm_agreement, size: 1.0),
+        (-900.0, 500.0, lambda calm_air_cross_correlation, size: 0.0),
+        (900.0, 500.0, lambda calm_air_cross_correlation, size: 1.0),
     ],
 )
 def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_lately_has(
-    calm_agreement, size, share
+    calm_air_cross_correlation, size, share
 ):
     block = steady_block()
-    for name in ("n", "keep", "noise", "jitter", "P_xx", "P_dd"):
+    for name in (
+        "n_axes",
+        "drift_decay_factor",
+        "gyro_noise_variance",
+        "model_noise_variance",
+        "P_xx",
+        "P_dd",
+    ):
         block["no_gust_filter"][name] = block[name]
-    block["no_gust_filter"]["drift"][:] = 0.1 * TOGETHER
+    block["no_gust_filter"]["drift_intensity"][:] = 0.1 * TOGETHER
     alone = block["no_gust_filter"].copy()
-    block["innovation"], block["scratch"] = (0.003, -0.001), (0.4, -0.2)
-    block["calm_agreement"], block["calm_information"] = calm_agreement, size
+    block["innovation"], block["frame_innovation"] = (0.003, -0.001), (0.4, -0.2)
+    block["calm_air_cross_correlation"], block["calm_air_information"] = calm_air_cross_correlation, size
     inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
-    likelihood.whiten_without_gust(block, DT)
-    likelihood.predict_calm_air(block, DT)
+    likelihood.whiten_by_no_gust_filter(block, DT)
+    likelihood.fill_calm_air_prediction(block, DT)
     likelihood.advance_covariance(alone, DT)
     likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])
     foretold = g - alone["innovation"]
     kept = np.exp(-DT / 2.0)
-    calm_agreement, size = (
-        kept * calm_agreement + foretold @ inverse @ g,
+    calm_air_cross_correlation, size = (
+        kept * calm_air_cross_correlation + foretold @ inverse @ g,
         kept * size + foretold @ inverse @ foretold,
     )
-    assert (block["calm_agreement"], block["calm_information"]) == pytest.approx(
-        (calm_agreement, size), rel=1e-12
+    assert (block["calm_air_cross_correlation"], block["calm_air_information"]) == pytest.approx(
+        (calm_air_cross_correlation, size), rel=1e-12
     )
-    assert block["calm_prediction"] == pytest.approx(share(calm_agreement, size) * foretold, rel=1e-12)
+    assert block["calm_air_prediction"] == pytest.approx(
+        share(calm_air_cross_correlation, size) * foretold, rel=1e-12
+    )
     assert block["no_gust_filter"]["state"] == pytest.approx(alone["state"], rel=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "sided"), [(LOSS, -1.0), (ENDING, 1.0), (STEP, 0.0)])
+@pytest.mark.parametrize(("kind", "sided"), [(LOSS, -1.0), (LOSS_END, 1.0), (STEP_FAULT, 0.0)])
 def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind, sided):
     for foreseen in (3.0, -3.0):
         scores = []
@@ -198,9 +237,9 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
             for name, value in {
                 "correlation": sided * 8.0 or 8.0,
                 "information": 4.0,
-                "calm_prediction": it,
+                "correlation_in_calm_air": it,
             }.items():
-                block["lanes"][name][0, :N_SLOTS] = value
+                block["onset_tests"][name][0, :N_ONSET_SLOTS] = value
             likelihood.evaluate_hypotheses(block)
             scores.append(block["hypothesis"][0]["score"])
         assert scores[0] == pytest.approx(4.0)
@@ -209,40 +248,44 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
 
 def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
     rng = np.random.default_rng(9)
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP, tolerance=(0.1, 0.2))
-    block["level"], block["regressor"][:2] = 4.0, rng.normal(size=(2, 2))
-    names = (*block["lanes"].dtype.names, "overlap")
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP_FAULT, tolerance=(0.1, 0.2))
+    block["alarm_level"], block["regressor"][:2] = 4.0, rng.normal(size=(2, 2))
+    names = (*block["onset_tests"].dtype.names, "regressor_overlap")
     for name in names[:-1]:
-        block["lanes"][name] = rng.uniform(1.0, 2.0, block["lanes"][name].shape)
-    block["overlap"] = rng.uniform(1.0, 2.0, block["overlap"].shape)
-    before = {name: lanes_of(block, name) for name in names}
-    block["hypothesis"]["signature"], block["scratch"] = rng.normal(size=2), rng.normal(size=2)
-    likelihood.reset_onset(block, 3)
+        block["onset_tests"][name] = rng.uniform(1.0, 2.0, block["onset_tests"][name].shape)
+    block["regressor_overlap"] = rng.uniform(1.0, 2.0, block["regressor_overlap"].shape)
+    before = {name: onset_tests_of(block, name) for name in names}
+    block["hypothesis"]["signature"], block["frame_innovation"] = rng.normal(size=2), rng.normal(size=2)
+    likelihood.reset_onset_slot(block, 3)
     likelihood.update_block(block, np.full(3, 0.1), True, DT, 0.9)
     for name in names:
-        assert (lanes_of(block, name) == before[name])[..., 2 * N_SLOTS :].all(), name
+        assert (onset_tests_of(block, name) == before[name])[..., 2 * N_ONSET_SLOTS :].all(), name
 
 
 def test_a_lane_without_information_comes_to_nothing():
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *MAX_HYPOTHESES * (LOSS,))
-    block["lanes"]["sense"], block["lanes"]["correlation"], block["level"] = -1.0, -5.0, 4.0
-    block["lanes"]["information"][:, ::2] = 2.0
+    block["onset_tests"]["supporting_sign"], block["onset_tests"]["correlation"], block["alarm_level"] = (
+        -1.0,
+        -5.0,
+        4.0,
+    )
+    block["onset_tests"]["information"][:, ::2] = 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        for lanes in block["lanes"]:
-            likelihood.evaluate_lanes(block, lanes, N_LANES, True, False)
-    for name, nothing in (("score", 0.0), ("min_llr", 0.0), ("max_llr", 0.0), ("llr", -1.0)):
-        assert (lanes_of(block, name)[1::2] == nothing).all()
-        assert (lanes_of(block, name)[::2] > 0.0).all()
+        for onset_tests in block["onset_tests"]:
+            likelihood.evaluate_onset_tests(block, onset_tests, N_ONSET_TESTS_PER_GROUP, True, False)
+    for name, nothing in (("score", 0.0), ("llr_lower_bound", 0.0), ("llr_upper_bound", 0.0), ("llr", -1.0)):
+        assert (onset_tests_of(block, name)[1::2] == nothing).all()
+        assert (onset_tests_of(block, name)[::2] > 0.0).all()
 
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    block["hypothesis"]["growth_decay"], block["lanes"]["growth_left"] = 0.8, 1.0
+    block["hypothesis"]["growth_decay_factor"], block["onset_tests"]["remaining_growth"] = 0.8, 1.0
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
-        likelihood.shape_signature(block["hypothesis"][0], block["lanes"][0], 0)
-        found.append(by_onset(block, "shaped_signature")[:, 3, 0].copy())
+        likelihood.fill_signatures_for_onsets(block["hypothesis"][0], block["onset_tests"][0], 0)
+        found.append(by_onset(block, "signature_for_onset")[:, 3, 0].copy())
     return np.array(found)
 
 
@@ -250,19 +293,19 @@ def test_a_loss_grows_stays_or_gives_back_what_it_was():
     k = np.arange(5)
     signature = np.column_stack([1.0 + k, -2.0 * k])
     assert shapes(LOSS) == pytest.approx(signature)
-    assert shapes(STEP) == pytest.approx(signature)
-    assert shapes(GROWING) == pytest.approx((1.0 - 0.8 ** (k + 1.0))[:, None] * signature)
-    assert shapes(ENDING) == pytest.approx(np.tile(signature[0], (5, 1)))
+    assert shapes(STEP_FAULT) == pytest.approx(signature)
+    assert shapes(GROWING_LOSS) == pytest.approx((1.0 - 0.8 ** (k + 1.0))[:, None] * signature)
+    assert shapes(LOSS_END) == pytest.approx(np.tile(signature[0], (5, 1)))
 
 
 @pytest.mark.parametrize(
     ("kind", "sided", "score"),
     [
         (LOSS, True, -1.0),
-        (GROWING, True, -1.0),
-        (ENDING, True, 1.0),
-        (STEP, False, 1.0),
-        (ALPHA3, False, 1.0),
+        (GROWING_LOSS, True, -1.0),
+        (LOSS_END, True, 1.0),
+        (STEP_FAULT, False, 1.0),
+        (ALPHA_CUBED_EFFECT, False, 1.0),
     ],
 )
 def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
@@ -270,37 +313,37 @@ def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
     assert bool(likelihood.is_one_sided(kind)) == sided
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     for sign in (1.0, -1.0):
-        lanes = block["lanes"][0]
-        lanes["correlation"][0], lanes["information"][0] = 3.0 * sign, 9.0
-        likelihood.evaluate_lanes(block, lanes, N_SLOTS, True, False)
-        assert lanes["score"][0] == pytest.approx(score * sign if sided else 1.0)
+        onset_tests = block["onset_tests"][0]
+        onset_tests["correlation"][0], onset_tests["information"][0] = 3.0 * sign, 9.0
+        likelihood.evaluate_onset_tests(block, onset_tests, N_ONSET_SLOTS, True, False)
+        assert onset_tests["score"][0] == pytest.approx(score * sign if sided else 1.0)
 
 
-@pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA3, 0.5), (STEP, 0.5)])
+@pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA_CUBED_EFFECT, 0.5), (STEP_FAULT, 0.5)])
 def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    lane = block["lanes"][0]
-    lane["sense"], lane["correlation"], lane["information"] = (
-        likelihood.SUPPORTING_SIGN[kind],
+    lane = block["onset_tests"][0]
+    lane["supporting_sign"], lane["correlation"], lane["information"] = (
+        likelihood.SUPPORTING_SIGN_BY_KIND[kind],
         -7.0 * 9.0,
         81.0,
     )
-    lane["constant_part"] = 6.0 * 9.0
-    likelihood.evaluate_lanes(block, lane, N_SLOTS, True, True)
-    assert lane["min_llr"][0] == pytest.approx(certain)
-    likelihood.evaluate_lanes(block, lane, N_SLOTS, True, False)
-    assert lane["min_llr"][0] == pytest.approx(24.5)
-    likelihood.evaluate_lanes(block, lane, N_SLOTS, False, True)
-    assert lane["min_llr"][0] == pytest.approx(0.5)
+    lane["constant_uncertainty_part"] = 6.0 * 9.0
+    likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, True)
+    assert lane["llr_lower_bound"][0] == pytest.approx(certain)
+    likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, False)
+    assert lane["llr_lower_bound"][0] == pytest.approx(24.5)
+    likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, False, True)
+    assert lane["llr_lower_bound"][0] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("kind", [LOSS, STEP])
+@pytest.mark.parametrize("kind", [LOSS, STEP_FAULT])
 @pytest.mark.parametrize("evidence", [-1.0, 0.0, 0.5, 3.9, 4.0, 6.0])
 def test_the_log_likelihood_ratio_is_the_largest_of_any_theta_allowed(kind, evidence):
     theta = np.linspace(0.0, 1.0 if kind == LOSS else 9.0, 9001)
     largest = np.max(theta * evidence - 0.5 * theta**2 * 4.0)
-    assert likelihood.log_likelihood_ratio(kind == LOSS, evidence, 4.0) == pytest.approx(
+    assert likelihood.max_log_likelihood_ratio(kind == LOSS, evidence, 4.0) == pytest.approx(
         max(largest, 0.0), abs=1e-6
     )
 
@@ -311,7 +354,7 @@ def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_with
     theta, D = np.linspace(-1.0, 0.0, 100001), 9.0
     posterior = theta * N - 0.5 * theta**2 * D - 0.5 * 12.0 * (theta + 0.5) ** 2
     assert likelihood.estimate_theta(LOSS, N, D) == pytest.approx(theta[posterior.argmax()], abs=2e-5)
-    assert likelihood.estimate_theta(STEP, N, D) == pytest.approx(N / 9.0)
+    assert likelihood.estimate_theta(STEP_FAULT, N, D) == pytest.approx(N / 9.0)
 
 
 def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
@@ -321,17 +364,21 @@ def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_all
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 
-def judged(kind=LOSS, has_tolerances=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
+def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
-    block["level"], block["noise_share"] = 1.0, 0.5
-    onsets, lanes, overlap = [1, 5], block["lanes"][0], block["overlap"][0]
-    lanes["correlation"][onsets], lanes["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
-    lanes["correlation"][7] = -99.0  # nothing is known of that onset
-    overlap[:2, 1], overlap[:2, 5], lanes["constant_part"][onsets] = (1.0, -2.0), (-3.0, 4.0), rooms
+    block["alarm_level"], block["noise_share_of_alarm_level"] = 1.0, 0.5
+    onsets, onset_tests, overlap = [1, 5], block["onset_tests"][0], block["regressor_overlap"][0]
+    onset_tests["correlation"][onsets], onset_tests["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
+    onset_tests["correlation"][7] = -99.0  # nothing is known of that onset
+    overlap[:2, 1], overlap[:2, 5], onset_tests["constant_uncertainty_part"][onsets] = (
+        (1.0, -2.0),
+        (-3.0, 4.0),
+        rooms,
+    )
     hypothesis = block["hypothesis"][0]
-    hypothesis["score"], hypothesis["min_llr"], hypothesis["max_llr"] = 99.0, 99.0, at_most
-    if has_tolerances:
-        likelihood.accumulate_overlap(block, lanes, overlap, N_SLOTS, 1.0)
+    hypothesis["score"], hypothesis["llr_lower_bound"], hypothesis["llr_upper_bound"] = 99.0, 99.0, at_most
+    if has_regressors:
+        likelihood.accumulate_regressor_overlap(block, onset_tests, overlap, N_ONSET_SLOTS, 1.0)
     likelihood.evaluate_hypotheses(block, memory)
     return hypothesis
 
@@ -339,49 +386,59 @@ def judged(kind=LOSS, has_tolerances=False, memory=0.0, rooms=(0.0, 0.0), at_mos
 def test_a_hypothesis_is_worth_its_best_onset():
     hypothesis = judged()
     assert hypothesis["score"] == pytest.approx(1.5)  # 3 / 2 beside 5 / 4
-    assert hypothesis["min_llr"] == hypothesis["max_llr"] == pytest.approx(9.0 / 8.0)
-    assert hypothesis["theta"] == pytest.approx(max((-3.0 - 6.0) / 16.0, -1.0))
-    assert hypothesis["information"] == 4.0
+    assert hypothesis["llr_lower_bound"] == hypothesis["llr_upper_bound"] == pytest.approx(9.0 / 8.0)
+    assert hypothesis["theta_estimate"] == pytest.approx(max((-3.0 - 6.0) / 16.0, -1.0))
+    assert hypothesis["theta_information"] == 4.0
 
 
 def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
-    hypothesis = judged(has_tolerances=True)  # slack 0.5 and 1.1
+    hypothesis = judged(has_regressors=True)  # slack 0.5 and 1.1
     assert hypothesis["score"] == pytest.approx(max(2.5 / 2.0, 3.9 / 4.0))
-    assert hypothesis["min_llr"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
-    assert hypothesis["max_llr"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
+    assert hypothesis["llr_lower_bound"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
+    assert hypothesis["llr_upper_bound"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))
 
 
 def test_what_a_bounded_uncertainty_explains_is_held_against_the_evidence():
     hypothesis = judged(rooms=(0.25, 0.5))
     assert hypothesis["score"] == pytest.approx(max(3.0 / 2.0, 5.0 / 4.0))
-    assert hypothesis["min_llr"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
-    assert hypothesis["max_llr"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
+    assert hypothesis["llr_lower_bound"] == pytest.approx(max(2.75**2 / 8.0, 4.5**2 / 32.0))
+    assert hypothesis["llr_upper_bound"] == pytest.approx(max(3.25**2 / 8.0, 5.5**2 / 32.0))
 
 
 def test_where_a_loss_may_end_what_was_explained_is_remembered_and_uncertainty_casts_no_doubt():
     hypothesis = judged(rooms=(0.25, 0.5), memory=0.9, at_most=10.0)
-    assert hypothesis["max_llr"] == pytest.approx(9.0)
-    assert hypothesis["min_llr"] == pytest.approx(9.0 / 8.0)
-    assert judged(memory=0.0, at_most=10.0)["max_llr"] == pytest.approx(9.0 / 8.0)
+    assert hypothesis["llr_upper_bound"] == pytest.approx(9.0)
+    assert hypothesis["llr_lower_bound"] == pytest.approx(9.0 / 8.0)
+    assert judged(memory=0.0, at_most=10.0)["llr_upper_bound"] == pytest.approx(9.0 / 8.0)
 
 
 def detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["tests"]["alarm_level"], record["tests"]["naming_level"], record["tests"]["keep"] = 5.0, 4.0, 0.9
+    (
+        record["test_config"]["alarm_level"],
+        record["test_config"]["isolation_llr_margin"],
+        record["test_config"]["evidence_decay_factor"],
+    ) = (
+        5.0,
+        4.0,
+        0.9,
+    )
     put(record, **fields)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n"], block["axis"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
+        block["n_axes"], block["axis"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
     return fdi, record
 
 
 def test_signatures_are_what_surfaces_gave_steps_and_the_cubic_moment():
     _, record = detector()
     for hypothesis, (kind, surface, axis) in zip(
-        record["block"][1]["hypothesis"], ((LOSS, 2, 2), (STEP, -1, 2), (STEP, -1, 0)), strict=False
+        record["block"][1]["hypothesis"],
+        ((LOSS, 2, 2), (STEP_FAULT, -1, 2), (STEP_FAULT, -1, 0)),
+        strict=False,
     ):
         hypothesis["kind"], hypothesis["surface"], hypothesis["axis"] = kind, surface, axis
-    record["block"][0]["hypothesis"]["kind"][:3] = LOSS, STEP, ALPHA3
+    record["block"][0]["hypothesis"]["kind"][:3] = LOSS, STEP_FAULT, ALPHA_CUBED_EFFECT
     record["block"][0]["hypothesis"]["surface"][:3] = 1, -1, -1
     record["block"][0]["hypothesis"]["axis"][:3] = 1, 1, 1
     Gu = np.arange(12.0).reshape(3, 4)
@@ -395,14 +452,14 @@ def with_scores(*scores, alarms=1):
     _, record = detector(detected_at_s=-1.0)
     for block, values in zip(record["block"], scores, strict=True):
         block["hypothesis"]["score"][:3], block["hypothesis"]["raises_alarm"][:3] = values, alarms
-        block["hypothesis"]["axis"][:3], block["hypothesis"]["log_column"][:3] = (0, 1, 2), (0, 1, 2)
+        block["hypothesis"]["axis"][:3], block["hypothesis"]["log_column_index"][:3] = (0, 1, 2), (0, 1, 2)
     return record
 
 
 def test_the_alarm_is_the_largest_share_of_the_level():
     record = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.9), (0.5, 1.5, 2.5))
     Statistical.score(record, 7.0)
-    assert record["alarm"]["score"] == pytest.approx(4.9 / 5.0)
+    assert record["alarm"]["score_over_alarm_level"] == pytest.approx(4.9 / 5.0)
     assert record["alarm"]["axis"] == 2
     assert record["alarm"]["detected_at_s"] == -1.0
     record["block"][1]["hypothesis"]["score"][0] = 6.0
@@ -410,15 +467,15 @@ def test_the_alarm_is_the_largest_share_of_the_level():
     Statistical.score(record, 9.0)
     assert (record["alarm"]["axis"], record["alarm"]["detected_at_s"]) == (0, 8.0)
     Statistical.score(record, 10.0, False)  # where the model's error is not known
-    assert record["alarm"]["score"] == 0.0
+    assert record["alarm"]["score_over_alarm_level"] == 0.0
     silent = with_scores((9.0,) * 3, (9.0,) * 3, (9.0,) * 3, alarms=0)
     Statistical.score(silent, 7.0)
-    assert silent["alarm"]["score"] == 0.0
+    assert silent["alarm"]["score_over_alarm_level"] == 0.0
 
 
 def test_the_log_has_each_test_as_its_largest_share():
     record, row = with_scores((1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (0.5, 1.5, 2.5)), np.full(6, 9.0)
-    record["tests"]["n_log_columns"] = 4
+    record["test_config"]["n_score_columns"] = 4
     Statistical.record(record, row)
     assert row == pytest.approx([9.0, 9.0, 0.6, 0.4, 0.8, 0.0])
     record["block"]["hypothesis"]["raises_alarm"] = 0
@@ -431,14 +488,14 @@ def test_the_estimate_of_a_loss_is_the_surest():
     for b, (theta, information) in enumerate(((-0.9, 1.0), (-0.4, 5.0), (-0.3, 2.0))):
         hypothesis = record["block"][b]["hypothesis"][1]
         hypothesis["kind"], hypothesis["surface"] = LOSS, 2
-        hypothesis["theta"], hypothesis["information"] = theta, information
+        hypothesis["theta_estimate"], hypothesis["theta_information"] = theta, information
     record["block"][2]["hypothesis"][0] = record["block"][2]["hypothesis"][1]
-    record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["information"][0] = (
-        STEP,
+    record["block"][2]["hypothesis"]["kind"][0], record["block"][2]["hypothesis"]["theta_information"][0] = (
+        STEP_FAULT,
         9.0,
     )
-    assert statistical.estimated_loss(record["block"], 2) == (-0.4, 5.0)
-    assert statistical.estimated_loss(record["block"], 1) == (0.0, 0.0)
+    assert statistical.estimate_loss(record["block"], 2) == (-0.4, 5.0)
+    assert statistical.estimate_loss(record["block"], 1) == (0.0, 0.0)
 
 
 def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0, 0.0, 0.0), **keys):
@@ -447,16 +504,22 @@ def contested(loss=1.0, step=0.0, other=0.0, growing=0.0, ending=0.0, pitch=(0.0
     fdi, record = detector()
     fdi["layout"]["loss_estimator"] = 0, -1, 1, -1
     fdi["isolation"]["estimator"]["excluded"][0] = keys.get("other_excluded", 0)
-    fdi["config"]["abrupt"], record["tests"]["share"] = keys.get("abrupt", 0), 1.0 / keys.get("instants", 1)
+    fdi["config"]["abrupt"], record["test_config"]["frame_share_per_instant"] = (
+        keys.get("abrupt", 0),
+        1.0 / keys.get("instants", 1),
+    )
     for b, values in ((1, (loss, step, other, growing, ending)), (2, (99.0, 0.0, 0.0, 0.0, 0.0))):
         block = record["block"][b]
         block["n_hypotheses"] = 5
-        block["hypothesis"]["kind"][:5] = LOSS, STEP, LOSS, GROWING, ENDING
+        block["hypothesis"]["kind"][:5] = LOSS, STEP_FAULT, LOSS, GROWING_LOSS, LOSS_END
         block["hypothesis"]["surface"][:5] = 2, -1, 0, 2, 2
-        block["hypothesis"]["min_llr"][:5] = block["hypothesis"]["max_llr"][:5] = values
+        block["hypothesis"]["llr_lower_bound"][:5] = block["hypothesis"]["llr_upper_bound"][:5] = values
     block = record["block"][0]
-    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, ENDING), (-1, 2, 2)
-    block["hypothesis"]["min_llr"][:3] = block["hypothesis"]["max_llr"][:3] = pitch
+    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (
+        (STEP_FAULT, LOSS, LOSS_END),
+        (-1, 2, 2),
+    )
+    block["hypothesis"]["llr_lower_bound"][:3] = block["hypothesis"]["llr_upper_bound"][:3] = pitch
     return bool(Statistical.excludes(fdi, 2, keys.get("ends", False)))
 
 
@@ -504,8 +567,11 @@ def test_a_loss_shows_where_it_explains_better_than_all_else_by_the_naming_level
         record["block"][b]["n_hypotheses"] = 0
     block = record["block"][1]
     block["n_hypotheses"] = 3
-    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (STEP, LOSS, GROWING), (-1, 2, 2)
-    block["hypothesis"]["min_llr"][:3] = at_least
+    block["hypothesis"]["kind"][:3], block["hypothesis"]["surface"][:3] = (
+        (STEP_FAULT, LOSS, GROWING_LOSS),
+        (-1, 2, 2),
+    )
+    block["hypothesis"]["llr_lower_bound"][:3] = at_least
     assert bool(Statistical.shows(fdi, 2)) == shown
     assert not Statistical.shows(fdi, 0)
 
@@ -523,15 +589,18 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     _, record = detector()
     rng = np.random.default_rng(b)
     surprise, mean = rng.normal(size=3), rng.normal(size=3)
-    record["air"]["output"]["mean"], record["air"]["output"]["acceleration"] = mean, (0.1, 0.2, 0.3)
+    record["gust"]["output"]["mean_gust_acceleration"], record["gust"]["output"]["gust_acceleration"] = (
+        mean,
+        (0.1, 0.2, 0.3),
+    )
     gains = rng.normal(size=(2, 2))
-    record["block"]["K_d"], record["block"]["keep"] = gains, 1.0
-    Statistical.track_residual_mean(record, surprise, DT)
+    record["block"]["K_d"], record["block"]["drift_decay_factor"] = gains, 1.0
+    Statistical.filter_residual_mean(record, surprise, DT)
     axes = [(1,), (0, 2)][b]
     left = DT * (surprise - mean)[list(axes)]
     drift = gains[: len(axes), : len(axes)] @ left
-    assert record["block"][b]["residual_state"][2 : 2 + len(axes)] == pytest.approx(drift)
-    assert not record["block"][2]["residual_state"].any()
+    assert record["block"][b]["residual_filter_state"][2 : 2 + len(axes)] == pytest.approx(drift)
+    assert not record["block"][2]["residual_filter_state"].any()
     out = np.zeros(3)
     Statistical.unknown_acceleration(record, out)
     assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])
@@ -541,10 +610,10 @@ def test_a_loss_is_open_until_its_estimator_is_excluded():
     fdi, _ = detector()
     estimators, loss_estimator = fdi["isolation"]["estimator"], np.array([-1, 1, -1, -1])
     estimators["excluded"][:2] = 1, 0
-    assert statistical.is_not_excluded(estimators, loss_estimator, 1)
-    assert statistical.is_not_excluded(estimators, loss_estimator, 3)
+    assert statistical.is_loss_not_excluded(estimators, loss_estimator, 1)
+    assert statistical.is_loss_not_excluded(estimators, loss_estimator, 3)
     estimators["excluded"][1] = 1
-    assert not statistical.is_not_excluded(estimators, loss_estimator, 1)
+    assert not statistical.is_loss_not_excluded(estimators, loss_estimator, 1)
 
 
 def test_what_is_just_as_much_excludes_nothing():
@@ -571,7 +640,7 @@ def test_of_equal_shares_the_first_says_the_axis():
 
 def test_a_loss_that_nothing_tries_does_not_show():
     fdi, record = detector()
-    record["tests"]["naming_level"] = 0.5
+    record["test_config"]["isolation_llr_margin"] = 0.5
     for b in range(3):
         record["block"][b]["n_hypotheses"] = 0
     assert not Statistical.shows(fdi, 2)

@@ -8,14 +8,20 @@ import pytest
 from innovations import LEVEL_FLIGHT, TRAVEL_RAD, Detector, by_onset, gust_jitter
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.air import Dryden, rotation_lengths
+from beaver_ftc.design import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import coefficient_slopes, design_record, inertia_coefficients, jacobian
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis import gusts
-from beaver_ftc.diagnosis.bounds import error_map_dtype, inertia_coefficient_errors
-from beaver_ftc.diagnosis.detection import noise_model, statistical
-from beaver_ftc.diagnosis.detection.likelihood import ALPHA3, ENDING, GROWING, N_SLOTS, STEP
+from beaver_ftc.diagnosis.bounds import error_map_dtype, max_inertia_coefficient_errors
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection.likelihood import (
+    ALPHA_CUBED_EFFECT,
+    GROWING_LOSS,
+    LOSS_END,
+    N_ONSET_SLOTS,
+    STEP_FAULT,
+)
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.loop.assembly import configure_design
@@ -53,7 +59,7 @@ def test_gusts_drift_as_the_specification_has_them(turbulence):
 def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
     """eta_bar omega sqrt(2 sqrt 2 / i w0), w0 = (i / n)^(1/4); so fast that it hardly grows beside a loss."""
     eta_bar, omega, noise, level, dt = 0.02, 500.0, 1e-3, 6.0, 1e-3
-    i = noise_model.walk_intensity(eta_bar, omega, noise, level, dt) * eta_bar**2
+    i = statistical.derive_relative_walk_intensity(eta_bar, omega, noise, level, dt) * eta_bar**2
     ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
     walk = sqrt(i**2 - ramp**2)
     w0 = (walk / (noise**2 * dt)) ** 0.25
@@ -63,34 +69,35 @@ def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
 def test_what_grows_beside_a_loss_takes_half_the_level():
     """eta_bar sqrt(omega / i) times 1.204, where next to nothing is left of the swing."""
     eta_bar, omega, level = 0.02, 3.0, 6.0
-    i = noise_model.walk_intensity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
+    i = statistical.derive_relative_walk_intensity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
     assert 1.204 * eta_bar * sqrt(omega / i) == pytest.approx(level / 2, rel=1e-4)
 
 
 def test_without_noise_the_frame_rate_is_the_bandwidth():
     eta_bar, omega, level, dt = 0.02, 50.0, 6.0, 0.05
-    i = noise_model.walk_intensity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
+    i = statistical.derive_relative_walk_intensity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
     assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) * dt / i) == pytest.approx(level / 2)
 
 
 def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
     none, least, more = (
-        noise_model.walk_intensity(bound, 10.0, 1e-4, 6.0, 0.01) for bound in (0.0, 1e-3, 2e-3)
+        statistical.derive_relative_walk_intensity(bound, 10.0, 1e-4, 6.0, 0.01)
+        for bound in (0.0, 1e-3, 2e-3)
     )
     assert none == least != more
 
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
     record = np.zeros(1, statistical_dtype())[0]
-    record["noise"]["walk_intensity"], record["tests"]["alarm_level"] = rapidity, 6.0
-    return noise_model.drift_return_length(record, V, rate_hz, moving * rolling)
+    record["noise"]["relative_walk_intensity"], record["test_config"]["alarm_level"] = rapidity, 6.0
+    return statistical.drift_correlation_length(record, V, rate_hz, moving * rolling)
 
 
 def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
     """eta_bar sqrt(T / 2 i) / tau over the longest window; no later than the rolling gust does."""
     rapidity, rate_hz = 3.0, 50.0
     tau = returning(rapidity, moving=0) / V
-    longest_s = 2 ** (N_SLOTS - 1) / rate_hz
+    longest_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
     assert sqrt(longest_s / (2.0 * rapidity)) / tau == pytest.approx(6.0 / 2)
     assert returning(rapidity, rolling=2.0) == 2.0
     assert returning(rapidity, rolling=1e6) == pytest.approx(tau * V)
@@ -112,23 +119,24 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
         return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["raises_alarm"])) for h in found}
 
     assert hypotheses(pitch) == {
-        (LOSS, ELEVATOR, 1, 1), (STEP, -1, 1, 1), (ALPHA3, -1, 1, 0), (GROWING, ELEVATOR, 1, 0),
-        (ENDING, ELEVATOR, 1, 0),
+        (LOSS, ELEVATOR, 1, 1), (STEP_FAULT, -1, 1, 1), (ALPHA_CUBED_EFFECT, -1, 1, 0), (GROWING_LOSS,
+        ELEVATOR, 1, 0),
+        (LOSS_END, ELEVATOR, 1, 0),
     }  # fmt: skip
     for block in lateral:
         assert hypotheses(block) == {
-            (LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP, -1, 0, 1), (STEP, -1, 2, 1),
-            (GROWING, AILERON, 0, 0), (ENDING, AILERON, 0, 0), (GROWING, RUDDER, 2, 0),
-            (ENDING, RUDDER, 2, 0),
+            (LOSS, AILERON, 0, 1), (LOSS, RUDDER, 2, 1), (STEP_FAULT, -1, 0, 1), (STEP_FAULT, -1, 2, 1),
+            (GROWING_LOSS, AILERON, 0, 0), (LOSS_END, AILERON, 0, 0), (GROWING_LOSS, RUDDER, 2, 0),
+            (LOSS_END, RUDDER, 2, 0),
         }  # fmt: skip
-    assert [int(block["n"]) for block in alone.blocks] == [1, 2, 2]
-    assert [block["axis"][: block["n"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
+    assert [int(block["n_axes"]) for block in alone.blocks] == [1, 2, 2]
+    assert [block["axis"][: block["n_axes"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
     for block in alone.blocks:
         for h in block["hypothesis"][: block["n_hypotheses"]]:
             if h["raises_alarm"]:
                 place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
-                assert h["log_column"] == place
-    assert alone.detector["tests"]["n_log_columns"] == 6
+                assert h["log_column_index"] == place
+    assert alone.detector["test_config"]["n_score_columns"] == 6
     assert alone.detector["block"]["n_hypotheses"].all()
 
 
@@ -136,67 +144,69 @@ def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
     gyros = {"p": (0.1, 0.3), "q": (0.2, 0.5), "r": (0.05, 0.4)}
     sensors = {k: {"noise_std_deg_s": n, "quantum_deg_s": q} for k, (n, q) in gyros.items()}
     blocks = Detector(50.0, bounds={"sensors": sensors}).blocks
-    axes = [axis for block in blocks for axis in block["axis"][: block["n"]]]
+    axes = [axis for block in blocks for axis in block["axis"][: block["n_axes"]]]
     assert axes == [1, 0, 2, 0, 2]
     for block in blocks:
-        for i in range(block["n"]):
+        for i in range(block["n_axes"]):
             noise, quantum = gyros["pqr"[block["axis"][i]]]
             variance = radians(1.0) ** 2 * (noise**2 + quantum**2 / 12.0)
-            assert block["noise"][i] == pytest.approx(variance, rel=1e-9)
-            assert block["P_xx"][i, i] == block["noise"][i]
+            assert block["gyro_noise_variance"][i] == pytest.approx(variance, rel=1e-9)
+            assert block["P_xx"][i, i] == block["gyro_noise_variance"][i]
             assert block["P_dd"][i, i] == 1.0
     start = configure_design(Scenario.model_validate(GIVEN), TRAVEL_RAD)[0]["fdi"]["statistical"]
     assert not start["block"]["n_hypotheses"].any(), "before a trim nothing of it is set up"
     ideal = Detector(50.0).blocks[1]
-    assert ideal["noise"] == pytest.approx([1e-18, 1e-18])
+    assert ideal["gyro_noise_variance"] == pytest.approx([1e-18, 1e-18])
 
 
 def test_the_times_and_levels_of_a_detector(alone):
     record, blocks = alone.detector, alone.blocks
-    assert record["tests"]["keep"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
+    assert record["test_config"]["evidence_decay_factor"] == pytest.approx(exp(-1.0 / (50.0 * 4.0)))
     assert record["alarm"]["detected_at_s"] == -1.0
-    assert record["tests"]["enabled"] == 1
+    assert record["test_config"]["enabled"] == 1
     for block in blocks:
-        assert block["level"] == record["tests"]["alarm_level"]
-        assert block["noise_share"] == 0.5
-        assert block["pace"] == pytest.approx(15.0 / 50.0)
-        assert block["hypothesis"]["growth_decay"] == pytest.approx(exp(-1.5 / 50.0))
+        assert block["alarm_level"] == record["test_config"]["alarm_level"]
+        assert block["noise_share_of_alarm_level"] == 0.5
+        assert block["uncertainty_change_per_frame"] == pytest.approx(15.0 / 50.0)
+        assert block["hypothesis"]["growth_decay_factor"] == pytest.approx(exp(-1.5 / 50.0))
     for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
-        assert [block["noise_share"] for block in Detector(50.0, bounds=bounds).blocks] == [chance] * 3
+        assert [block["noise_share_of_alarm_level"] for block in Detector(50.0, bounds=bounds).blocks] == [
+            chance
+        ] * 3
 
 
 def test_a_loss_declared_constant_neither_grows_nor_ends():
     blocks = Detector(50.0, fault_profile="abrupt").blocks
     kinds = [set(block["hypothesis"]["kind"][: block["n_hypotheses"]]) for block in blocks]
-    assert all(not {GROWING, ENDING} & found for found in kinds)
-    assert all(LOSS in found and STEP in found for found in kinds)
+    assert all(not {GROWING_LOSS, LOSS_END} & found for found in kinds)
+    assert all(LOSS in found and STEP_FAULT in found for found in kinds)
 
 
 def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
-    air, last = alone.detector["air"], alone.blocks[-1]
+    air, last = alone.detector["gust"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
-    assert air["config"]["rolling_length"] == pytest.approx(rolling)
-    assert last["return_length"] == pytest.approx(
-        noise_model.drift_return_length(alone.detector, V, 50.0, rolling)
+    assert air["config"]["rolling_gust_correlation_length"] == pytest.approx(rolling)
+    assert last["correlation_length"] == pytest.approx(
+        statistical.drift_correlation_length(alone.detector, V, 50.0, rolling)
     )
-    assert last["drift_scale"] == pytest.approx((rolling / last["return_length"]) ** 2)
-    assert [float(block["drift_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
-    assert air["output"]["moving"] == 1
-    assert air["config"]["area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
-    assert air["memory"]["unmeasured_share"] == pytest.approx([1.0, 0.003, 0.03])
-    assert air["config"]["span"] == SPAN_M
+    assert last["drift_intensity_scale"] == pytest.approx((rolling / last["correlation_length"]) ** 2)
+    assert [float(block["drift_intensity_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
+    assert air["output"]["is_turbulent"] == 1
+    assert air["config"]["wing_area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
+    assert air["memory"]["unmeasured_intensity_share"] == pytest.approx([1.0, 0.003, 0.03])
+    assert air["config"]["wing_span"] == SPAN_M
     assert air["config"]["gravity"] == pytest.approx(9.80665)
-    assert Detector(50.0).detector["air"]["output"]["moving"] == 0
+    assert Detector(50.0).detector["gust"]["output"]["is_turbulent"] == 0
 
 
 def test_where_nothing_diagnoses_nothing_is_enabled():
-    assert Detector(50.0, statistical=None).detector["tests"]["enabled"] == 0
+    assert Detector(50.0, statistical=None).detector["test_config"]["enabled"] == 0
 
 
 def _tolerance(**bounds):
     design = design_record()[0]
     given = Bounds.model_validate(bounds)
-    return bound_kernels.coefficient_tolerances(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
+    return bound_kernels.moment_term_tolerances(declared_in(given, AIRCRAFT), design, MASS, Y, np.zeros(4))
 
 
 SIZE = np.array([abs(term.value) for term in AIRCRAFT.moments])
@@ -242,18 +252,18 @@ def test_a_gyro_scales_its_own_axis_once_and_its_terms_elsewhere(axis):
 
 def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
     nominal = np.abs([inertia_coefficients(MASS)])[0]
-    share = (inertia_coefficient_errors(0.05, MASS) / nominal)[[2, 7, 11]].max()
+    share = (max_inertia_coefficient_errors(0.05, MASS) / nominal)[[2, 7, 11]].max()
     assert _tolerance(inertia=0.05) == pytest.approx(share * SIZE)
 
 
 def test_blocks_get_the_tolerances_of_their_axes():
     alone = Detector(50.0, bounds={"coefficients": 0.1})
-    assert alone.detector["tests"]["has_tolerances"] == 1
+    assert alone.detector["test_config"]["has_regressors"] == 1
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = SIZE[np.isin(AXIS, axes)]
         assert block["n_regressors"] == of_it.size
-        assert block["tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
-    assert Detector(50.0).detector["tests"]["has_tolerances"] == 0
+        assert block["regressor_tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
+    assert Detector(50.0).detector["test_config"]["has_regressors"] == 0
 
 
 def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
@@ -279,8 +289,8 @@ def as_set_up(bounds):
     """The detector before it is made ready for its first frame."""
     alone = Detector(50.0)
     given = {**GIVEN, "fdi": {"statistical": {}, "bounds": bounds}}
-    design, config = alone.frames[0]["belief"]["design"], Scenario.model_validate(given).fdi
-    noise_model.configure_statistics(
+    design, config = alone.frames[0]["prediction"]["design"], Scenario.model_validate(given).fdi
+    statistical.configure_statistical_detector(
         alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
     )
     return alone.detector
@@ -297,18 +307,20 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
         noise, _, quantum = getattr(given.sensors, name).noise_bias_quantum
         jitter += slope**2 * (noise**2 + quantum**2 / 12.0)
     still, gusty = as_set_up(UNEVEN), as_set_up({**UNEVEN, "turbulence": "light"})
-    assert still["noise"]["jitter"] == pytest.approx(jitter)
+    assert still["noise"]["input_noise_variance"] == pytest.approx(jitter)
     seen = gust_jitter(given.sensors, design_record()[0], SPAN_M)
-    assert gusty["noise"]["jitter"] == pytest.approx(jitter + seen**2)
-    assert still["noise"]["deflection"] == pytest.approx(radians(0.5) * np.abs(G).sum(axis=1))
+    assert gusty["noise"]["input_noise_variance"] == pytest.approx(jitter + seen**2)
+    assert still["noise"]["deflection_error_effect_bound"] == pytest.approx(
+        radians(0.5) * np.abs(G).sum(axis=1)
+    )
 
 
 def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
     record = Detector(50.0, bounds=UNEVEN).detector
-    expected = noise_model.walk_intensity(
-        0.05, 15.0, radians(0.2), float(record["tests"]["alarm_level"]), 0.02
+    expected = statistical.derive_relative_walk_intensity(
+        0.05, 15.0, radians(0.2), float(record["test_config"]["alarm_level"]), 0.02
     )
-    assert record["noise"]["walk_intensity"] == pytest.approx(expected)
+    assert record["noise"]["relative_walk_intensity"] == pytest.approx(expected)
 
 
 def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
@@ -324,12 +336,12 @@ def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
 @pytest.mark.parametrize(("instants", "share"), [(0, 1.0), (1, 1.0), (4, 0.25)])
 def test_means_over_a_frame_are_shared_among_its_instants(instants, share):
     alone, config = Detector(50.0), Scenario.model_validate(GIVEN).fdi
-    alone.fdi["config"]["instants"] = instants
-    design = alone.frames[0]["belief"]["design"]
-    noise_model.configure_statistics(
+    alone.fdi["config"]["n_substeps"] = instants
+    design = alone.frames[0]["prediction"]["design"]
+    statistical.configure_statistical_detector(
         alone.fdi, config, Declared.by(config, AIRCRAFT), design, MASS, LEVEL_FLIGHT, 50.0
     )
-    assert alone.detector["tests"]["share"] == share
+    assert alone.detector["test_config"]["frame_share_per_instant"] == share
 
 
 def test_an_elevator_off_trim_is_in_what_constants_multiply():
@@ -339,13 +351,13 @@ def test_an_elevator_off_trim_is_in_what_constants_multiply():
     alone, design = Detector(50.0), design_record()[0]
     scenario = Scenario.model_validate({**GIVEN, "fdi": {"statistical": {}, "bounds": config.model_dump()}})
     start = np.zeros(3), Y, u
-    noise_model.configure_statistics(
+    statistical.configure_statistical_detector(
         alone.fdi, scenario.fdi, Declared.of(scenario), design, MASS, start, 50.0
     )
-    total = bound_kernels.coefficient_tolerances(declared_in(config, AIRCRAFT), design, MASS, Y, u)
+    total = bound_kernels.moment_term_tolerances(declared_in(config, AIRCRAFT), design, MASS, Y, u)
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = total[np.isin(AXIS, axes)]
-        assert block["tolerance"][: of_it.size] == pytest.approx(of_it)
+        assert block["regressor_tolerance"][: of_it.size] == pytest.approx(of_it)
 
 
 def test_a_sense_is_kept_for_every_onset(alone):
@@ -353,14 +365,14 @@ def test_a_sense_is_kept_for_every_onset(alone):
     for block in alone.blocks:
         n = int(block["n_hypotheses"])
         kinds = block["hypothesis"]["kind"][:n]
-        signs = [{LOSS: -1.0, GROWING: -1.0, ENDING: 1.0}.get(int(kind), 0.0) for kind in kinds]
-        sense = by_onset(block, "sense")
+        signs = [{LOSS: -1.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}.get(int(kind), 0.0) for kind in kinds]
+        sense = by_onset(block, "supporting_sign")
         assert (sense[:, :n] == signs).all()
         assert not sense[:, n:].any()
 
 
 def test_forces_are_those_the_file_has_a_sensor_for(alone):
-    table = alone.detector["air"]["memory"]["force_table"]
+    table = alone.detector["gust"]["memory"]["force_table"]
     values = table["value"][: len(AIRCRAFT.measurable_forces)]
     assert sorted(values) == sorted(term.value for term in AIRCRAFT.measurable_forces)
 
@@ -373,26 +385,26 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     )
     statistical, design, dt = np.zeros(1, statistical_dtype())[0], design_record()[0], 0.02
     forces = statistical["forces"]
-    statistical["air"]["config"]["span"] = SPAN_M
-    forces["known"], forces["component"]["accelerometer_variance"] = known, (0.3**2, 0.2**2)
-    forces["component"]["vane"][:, 1] = -6.0, 50.0
-    gusts.add_gust_jitter(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
+    statistical["gust"]["config"]["wing_span"] = SPAN_M
+    forces["in_use"], forces["component"]["accelerometer_innovation_variance"] = known, (0.3**2, 0.2**2)
+    forces["component"]["vane_error_effect_per_rad"][:, 1] = -6.0, 50.0
+    gusts.add_gust_estimate_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = bound_kernels.gust_estimate_noise(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert np.sqrt(statistical["noise"]["jitter"]) == pytest.approx(added, rel=0.02)
+    added = bound_kernels.gust_estimate_noise_std_for(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    assert np.sqrt(statistical["noise"]["input_noise_variance"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    expected = bound_kernels.gust_estimate_noise(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert forces["gust_noise"] == pytest.approx(expected)
+    expected = bound_kernels.gust_estimate_noise_std_for(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    assert forces["gust_estimate_noise_std"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])
 def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, pace):
     """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
     aircraft = SimpleNamespace(model_error_rad_s2=error)
-    assert noise_model.uncertainty_pace(Statistical(uncertainty_rad_s=15.0), aircraft, 0.02) == pytest.approx(
-        pace
-    )
+    assert statistical.uncertainty_change_per_frame(
+        Statistical(uncertainty_rad_s=15.0), aircraft, 0.02
+    ) == pytest.approx(pace)
 
 
 def test_where_no_vane_shows_it_pitch_reckons_with_a_gust_no_weaker_at_any_frequency():
@@ -415,18 +427,22 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
-    record.noise.pace = 0.02
+    record.noise.base_uncertainty_change_per_frame = 0.02
     rng = np.random.default_rng(1)
     steps = rng.dirichlet(np.ones(20)) * 0.25
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
-        u = error_map.before.copy()
+        u = error_map.surface_positions_before.copy()
         u[way] += step * (error_map.travel_high - error_map.travel_low)[way]
-        statistical.update_pace(record.noise, record.block, error_map, u)
-        assert [block.pace for block in record.block] == pytest.approx([0.02 + 2.0 * step / 0.25] * 3)
-    statistical.update_pace(record.noise, record.block, error_map, error_map.before.copy())
-    assert record.block[0].pace == pytest.approx(0.02)
-    statistical.update_pace(record.noise, record.block, error_map, error_map.travel_low.copy())
-    assert record.block[0].pace == 2.0
+        statistical.update_uncertainty_change(record.noise, record.block, error_map, u)
+        assert [block.uncertainty_change_per_frame for block in record.block] == pytest.approx(
+            [0.02 + 2.0 * step / 0.25] * 3
+        )
+    statistical.update_uncertainty_change(
+        record.noise, record.block, error_map, error_map.surface_positions_before.copy()
+    )
+    assert record.block[0].uncertainty_change_per_frame == pytest.approx(0.02)
+    statistical.update_uncertainty_change(record.noise, record.block, error_map, error_map.travel_low.copy())
+    assert record.block[0].uncertainty_change_per_frame == 2.0
 
 
 def test_a_surface_that_stands_still_again_moves_no_error():
@@ -434,9 +450,9 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
-    record.noise.pace, paces = 0.02, []
+    record.noise.base_uncertainty_change_per_frame, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
-        statistical.update_pace(record.noise, record.block, error_map, np.array(u))
-        paces.append(float(record.block[1].pace))
+        statistical.update_uncertainty_change(record.noise, record.block, error_map, np.array(u))
+        paces.append(float(record.block[1].uncertainty_change_per_frame))
     shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
     assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])

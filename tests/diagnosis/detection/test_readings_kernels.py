@@ -6,8 +6,8 @@ from innovations import Detector, misread
 from statistics_of import Statistical
 
 from beaver_ftc.design.model import KW_TO_DPT, response
-from beaver_ftc.diagnosis.detection import noise_model
-from beaver_ftc.diagnosis.detection.likelihood import N_READINGS
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection.likelihood import N_INPUT_READINGS
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.diagnosis import Bounds
 
@@ -33,11 +33,11 @@ def rates(design, x, y, u):
     return f + G @ u
 
 
-def moved(design, x, y, u, which, thin_air_kw):
+def moved(design, x, y, u, which, density_power_error_kw):
     """What the accelerations change by per unit of a reading, by central differences."""
     there = []
     for error in (STEPS[which], -STEPS[which]):
-        told = misread(y, which, error, thin_air_kw) if which < POWER else y.copy()
+        told = misread(y, which, error, density_power_error_kw) if which < POWER else y.copy()
         told[4] += KW_TO_DPT * error / (y[3] * y[2]) if which == POWER else 0.0
         there.append(rates(design, x, told, u))
     return (there[0] - there[1]) / (2 * STEPS[which])
@@ -46,7 +46,7 @@ def moved(design, x, y, u, which, thin_air_kw):
 def at(state, **bounds):
     """A detector that has looked at a state, its design model, and the state as arrays."""
     alone = Detector(100.0, bounds=bounds)
-    design, flown_there = alone.frames[0]["belief"]["design"], tuple(map(np.array, state))
+    design, flown_there = alone.frames[0]["prediction"]["design"], tuple(map(np.array, state))
     Statistical.prepare(alone.detector, alone.fdi, design, *flown_there)
     return alone, design, flown_there
 
@@ -55,37 +55,39 @@ def at(state, **bounds):
 def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
     alone, design, flown_there = at(state, sensors=BIASES)
     declared_errors = alone.fdi["bound"]["declared_errors"]
-    for which in range(N_READINGS):
-        found = moved(design, *flown_there, which, float(declared_errors["thin_air_kw"]))
-        error = STEADY[which] if which < POWER else float(declared_errors["engine_kw"])
+    for which in range(N_INPUT_READINGS):
+        found = moved(design, *flown_there, which, float(declared_errors["density_power_error_kw"]))
+        error = STEADY[which] if which < POWER else float(declared_errors["engine_power_error_kw"])
         for block in alone.blocks:
-            n, axes = int(block["n_regressors"]) - N_READINGS + which, block["axis"][: block["n"]]
-            assert block["tolerance"][n] == pytest.approx(error)
+            n, axes = int(block["n_regressors"]) - N_INPUT_READINGS + which, block["axis"][: block["n_axes"]]
+            assert block["regressor_tolerance"][n] == pytest.approx(error)
             assert block["regressor"][n, : len(axes)] == pytest.approx(found[axes], rel=1e-5, abs=1e-9)
 
 
 @pytest.mark.parametrize("state", STATES)
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
-    thin, detector = float(alone.fdi["bound"]["declared_errors"]["thin_air_kw"]), alone.detector
-    expected = detector["noise"]["own_jitter"].copy()
-    for which in range(N_READINGS):
-        expected += (moved(design, *flown_there, which, thin) * detector["noise"]["reading"][which]) ** 2
-    assert detector["noise"]["jitter"] == pytest.approx(expected, rel=1e-5)
+    thin, detector = float(alone.fdi["bound"]["declared_errors"]["density_power_error_kw"]), alone.detector
+    expected = detector["noise"]["input_noise_variance_without_air_data"].copy()
+    for which in range(N_INPUT_READINGS):
+        expected += (
+            moved(design, *flown_there, which, thin) * detector["noise"]["reading_noise_std"][which]
+        ) ** 2
+    assert detector["noise"]["input_noise_variance"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
-        axes = block["axis"][: block["n"]]
-        assert block["jitter"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
+        axes = block["axis"][: block["n_axes"]]
+        assert block["model_noise_variance"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
 
 
 def test_without_errors_of_the_air_data_nothing_is_read():
     alone = Detector(100.0, bounds={"coefficients": 0.05})
-    assert alone.detector["noise"]["read"] == 0
-    assert Detector(100.0).detector["tests"]["has_tolerances"] == 0
+    assert alone.detector["noise"]["has_reading_errors"] == 0
+    assert Detector(100.0).detector["test_config"]["has_regressors"] == 0
     gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
     record = alone.detector
     declared_errors = alone.fdi["bound"]["declared_errors"]
     before = record["block"]["n_regressors"].copy()
-    noise_model.configure_readings(record, SensorErrors(gyros), declared_errors)
+    statistical.configure_reading_regressors(record, SensorErrors(gyros), declared_errors)
     assert list(record["block"]["n_regressors"]) == list(before)
     assert gyros.p.random_error == pytest.approx(np.radians(0.1))
 
@@ -97,11 +99,11 @@ def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():
     kept = []
     for mean in (np.zeros(3), gust):
         alone = Detector(100.0, bounds={"turbulence": "light"})
-        alone.detector["air"]["output"]["mean"] = mean
+        alone.detector["gust"]["output"]["mean_gust_acceleration"] = mean
         alone.watch(innovations + mean, Gu, np.ones(2))
-        kept.append([block["lanes"] for block in alone.blocks])
+        kept.append([block["onset_tests"] for block in alone.blocks])
     still, moving = kept
-    assert any(np.abs(lane["onset_signature"]).max() > 0.01 for lane in still)
+    assert any(np.abs(lane["signature_at_loss_end"]).max() > 0.01 for lane in still)
     for one, other in zip(still, moving, strict=True):
         for name in one.dtype.names:
             assert other[name] == pytest.approx(one[name], abs=1e-9), name

@@ -11,7 +11,13 @@ from statistics_of import Across
 
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, FREQUENCIES_RAD_S, MEMORY_S, N_TONES, VANE_VIEW
+from beaver_ftc.diagnosis.detection.parity import (
+    AXIS_VIEW,
+    N_TONE_FREQUENCIES,
+    TONE_FREQUENCIES_RAD_S,
+    TONE_MEMORY_S,
+    VANE_VIEW,
+)
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
@@ -28,32 +34,37 @@ def rng():
 def view(rng):
     view = new_fdi()["statistical"]["views"][0]
     block = view["block"]
-    block["n"], block["n_regressors"], block["keep"], block["noise_share"] = 1, 3, 1.0, 0.5
+    (
+        block["n_axes"],
+        block["n_regressors"],
+        block["drift_decay_factor"],
+        block["noise_share_of_alarm_level"],
+    ) = 1, 3, 1.0, 0.5
     block["S_inverse"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
-    block["tolerance"][:3], view["bounded"] = rng.uniform(0.1, 0.2, 3), 0.05
+    block["regressor_tolerance"][:3], view["uncertainty_bound"] = rng.uniform(0.1, 0.2, 3), 0.05
     return view
 
 
 @pytest.fixture
 def tone_config():
     tone_config = new_fdi()["statistical"]["tone_config"]
-    parity.configure_tones(tone_config, CHANCE, V, PACE, DT)
+    parity.configure_tone_tests(tone_config, CHANCE, V, PACE, DT)
     return tone_config
 
 
-def listen(view, tone_config, samples, regressors=None, heard=True, has_tolerances=False, alarm_level=6.0):
+def listen(view, tone_config, samples, regressors=None, heard=True, has_regressors=False, alarm_level=6.0):
     for k, sample in enumerate(samples):
         view["block"]["innovation"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        parity.update_tones(view, tone_config, alarm_level, heard, has_tolerances, DT)
+        parity.update_tone_tests(view, tone_config, alarm_level, heard, has_regressors, DT)
 
 
 def resonance(samples):
     """The sums written out: of every two samples, the last one fresh, for each frequency."""
     sums = np.asarray(samples).reshape(-1, EVERY).sum(axis=1)
     age_s = EVERY * DT * np.arange(len(sums))[::-1]
-    return np.exp(np.multiply.outer(1j * FREQUENCIES_RAD_S - 1.0 / MEMORY_S, age_s)) @ sums
+    return np.exp(np.multiply.outer(1j * TONE_FREQUENCIES_RAD_S - 1.0 / TONE_MEMORY_S, age_s)) @ sums
 
 
 def as_complex(pair):
@@ -62,37 +73,39 @@ def as_complex(pair):
 
 def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_config, samples, regressors, has_tolerances=True)
-    found = view["tones"]
-    assert as_complex(found["tone"]) == pytest.approx(resonance(2.0 * samples))
+    listen(view, tone_config, samples, regressors, has_regressors=True)
+    found = view["tone_tests"]
+    assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
-        assert as_complex(found["overlap"][j]) == pytest.approx(resonance(2.0 * regressors[:, j]))
-    faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / MEMORY_S).sum()
-    assert found["information"] == pytest.approx(EVERY * faded)
-    assert not found["overlap"][3:].any()
+        assert as_complex(found["regressor_overlap"][j]) == pytest.approx(resonance(2.0 * regressors[:, j]))
+    faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
+    assert found["correlation_variance"] == pytest.approx(EVERY * faded)
+    assert not found["regressor_overlap"][3:].any()
 
 
 def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
     listen(view, tone_config, [50.0])
-    assert (view["tones"]["score"], view["tones"]["information"]) == (0.0, 0.0)
+    assert (view["tone_tests"]["score"], view["tone_tests"]["correlation_variance"]) == (0.0, 0.0)
     listen(view, tone_config, [50.0])
-    assert view["tones"]["score"] > 0.0
-    assert (view["tones"]["count"], view["tones"]["sum"]) == (0, 0.0)
+    assert view["tone_tests"]["score"] > 0.0
+    assert (view["tone_tests"]["frames_since_update"], view["tone_tests"]["innovation_sum"]) == (0, 0.0)
 
 
 def test_what_is_not_heard_lets_the_rest_fade(view, tone_config, rng):
     samples = rng.normal(size=20)
     listen(view, tone_config, samples)
-    then = np.abs(as_complex(view["tones"]["tone"]))
+    then = np.abs(as_complex(view["tone_tests"]["correlation"]))
     listen(view, tone_config, np.full(10, 1e6), heard=False)
-    assert np.abs(as_complex(view["tones"]["tone"])) == pytest.approx(then * exp(-10 * DT / MEMORY_S))
+    assert np.abs(as_complex(view["tone_tests"]["correlation"])) == pytest.approx(
+        then * exp(-10 * DT / TONE_MEMORY_S)
+    )
 
 
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
 def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
     block = view["block"]
-    block["K_x"][0, 0], block["K_d"][0, 0], block["keep"] = K_x, K_d, keep
+    block["K_x"][0, 0], block["K_d"][0, 0], block["drift_decay_factor"] = K_x, K_d, keep
     out, response = np.zeros(2), []
     for k in range(6000):
         likelihood.whiten(block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out)
@@ -103,22 +116,24 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = parity.whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = parity.tone_whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
 def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, tone_config):
     bounds = [0.05, 0.02, 0.0, 0.09] * 8
     for bound in bounds:
-        view["bounded"] = bound
+        view["uncertainty_bound"] = bound
         listen(view, tone_config, np.zeros(EVERY))
-    angle = FREQUENCIES_RAD_S * DT
-    passed = np.array([parity.whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    angle = TONE_FREQUENCIES_RAD_S * DT
+    passed = np.array([parity.tone_whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
-    faded = EVERY * np.exp(-age_s / MEMORY_S) * bounds
-    beat = np.abs(np.exp(np.multiply.outer(2j * FREQUENCIES_RAD_S, age_s)) @ faded)
-    mean = parity.bounded_gain_at(FREQUENCIES_RAD_S, PACE)
-    assert view["tones"]["uncertainty_part"] == pytest.approx(2.0 * passed * mean * (faded.sum() + beat))
+    faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
+    beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)
+    mean = parity.max_bounded_uncertainty_gain(TONE_FREQUENCIES_RAD_S, PACE)
+    assert view["tone_tests"]["max_uncertainty_part"] == pytest.approx(
+        2.0 * passed * mean * (faded.sum() + beat)
+    )
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=40), st.floats(0.1, 3.0))
@@ -141,7 +156,7 @@ def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, 
     triangle = np.arcsin(np.cos(phase))  # of slope one
     wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
     assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        parity.bounded_gain_at(np.array([x]), 1.0)[0], rel=1e-6
+        parity.max_bounded_uncertainty_gain(np.array([x]), 1.0)[0], rel=1e-6
     )
 
 
@@ -155,25 +170,33 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = parity.bounded_gain_at(np.array([x]), 1.0)[0]
+    most = parity.max_bounded_uncertainty_gain(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
-    record = new_fdi()["statistical"]["views"][0]["tones"]
-    record["overlap"][0, :, 4], size = parts, np.hypot(*parts)
+    record = new_fdi()["statistical"]["views"][0]["tone_tests"]
+    record["regressor_overlap"][0, :, 4], size = parts, np.hypot(*parts)
     parity.fill_coefficient_part(record, np.array([0.3]), 1)
-    assert 0.3 * size * (1.0 - 1e-12) <= record["coefficient_part"][4] <= 0.3 * 1.0825 * size + 1e-300
-    assert record["coefficient_part"][5] == 0.0
+    assert 0.3 * size * (1.0 - 1e-12) <= record["coefficient_error_part"][4] <= 0.3 * 1.0825 * size + 1e-300
+    assert record["coefficient_error_part"][5] == 0.0
 
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
-    record = view["tones"]
-    record["overlap"][:] = 9.0
-    record["overlap"][:2, 0], record["overlap"][:2, 1], record["coefficient_part"] = -3.0, 0.0, 7.0
+    record = view["tone_tests"]
+    record["regressor_overlap"][:] = 9.0
+    (
+        record["regressor_overlap"][:2, 0],
+        record["regressor_overlap"][:2, 1],
+        record["coefficient_error_part"],
+    ) = (
+        -3.0,
+        0.0,
+        7.0,
+    )
     parity.fill_coefficient_part(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["coefficient_part"] == pytest.approx(np.full(N_TONES, 0.9))
+    assert record["coefficient_error_part"] == pytest.approx(np.full(N_TONE_FREQUENCIES, 0.9))
 
 
 def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_config, rng):
@@ -181,7 +204,9 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
     noise = rng.normal(size=(4000, 300))
     loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
     age_s = EVERY * DT * np.arange(150)
-    root = np.sqrt(tone_config["noise_variance"] * EVERY * np.exp(-2.0 * age_s / MEMORY_S).sum())
+    root = np.sqrt(
+        tone_config["larger_part_variance_share"] * EVERY * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
+    )
     for x in (1.0, 2.0, 3.0):
         share = np.mean(loud / root > x, axis=0)
         assert (share < exp(-0.5 * x * x) + 3.0 * sqrt(exp(-0.5 * x * x) / 4000)).all()
@@ -189,27 +214,41 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
 
 
 def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_config):
-    record = view["tones"]
-    record["information"], record["tone"][0, 3], record["tone"][1, 3] = 100.0, 60.0, 80.0
-    record["coefficient_part"][3], record["tone"][0, 7], tone_config["noise_variance"][:] = 10.0, 12.0, 0.6
-    parity.fill_score(record, tone_config, 6.0)
-    root = sqrt(100.0 * tone_config["noise_variance"][3])
+    record = view["tone_tests"]
+    record["correlation_variance"], record["correlation"][0, 3], record["correlation"][1, 3] = (
+        100.0,
+        60.0,
+        80.0,
+    )
+    (
+        record["coefficient_error_part"][3],
+        record["correlation"][0, 7],
+        tone_config["larger_part_variance_share"][:],
+    ) = (
+        10.0,
+        12.0,
+        0.6,
+    )
+    parity.fill_tone_score(record, tone_config, 6.0)
+    root = sqrt(100.0 * tone_config["larger_part_variance_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["uncertainty_part"][3] = 200.0
-    parity.fill_score(record, tone_config, 6.0)
+    record["max_uncertainty_part"][3] = 200.0
+    parity.fill_tone_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
-    record["tone"][:] = 0.0
-    parity.fill_score(record, tone_config, 6.0)
+    record["correlation"][:] = 0.0
+    parity.fill_tone_score(record, tone_config, 6.0)
     assert record["score"] == 0.0
 
 
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
 def test_a_tone_is_heard_on_the_grid_and_between(view, tone_config, frequency_rad_s):
-    view["bounded"] = 0.0
+    view["uncertainty_bound"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
     listen(view, tone_config, samples, alarm_level=LEVEL)
-    whole = 0.8 / 2.0 * MEMORY_S / DT / sqrt(0.5 * 0.5 * MEMORY_S / DT)  # amplitude over its deviation
-    assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
+    whole = (
+        0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
+    )  # amplitude over its deviation
+    assert 0.6 * whole < view["tone_tests"]["score"] < 1.1 * whole
 
 
 def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone_config):
@@ -238,10 +277,10 @@ def test_an_aircraft_that_has_all_but_stopped_or_tumbles_is_not_listened_to(tone
 
 def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 2, 3.0
-    view["tones"]["score"] = 2.0
-    assert parity.largest_score(view) == 3.0
-    view["tones"]["score"] = 4.0
-    assert parity.largest_score(view) == 4.0
+    view["tone_tests"]["score"] = 2.0
+    assert parity.max_test_score(view) == 3.0
+    view["tone_tests"]["score"] = 4.0
+    assert parity.max_test_score(view) == 4.0
 
 
 @pytest.mark.parametrize(
@@ -257,16 +296,34 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):
     statistical = new_fdi()["statistical"]
-    statistical["tests"]["alarm_level"], statistical["tests"]["naming_level"], statistical["n_views"] = (
+    (
+        statistical["test_config"]["alarm_level"],
+        statistical["test_config"]["isolation_llr_margin"],
+        statistical["n_views"],
+    ) = (
         5.0,
         12.5,
         2,
     )
-    statistical["air"]["output"]["uses_accelerometers"] = statistical["forces"]["known"] = 1
+    statistical["gust"]["output"]["uses_accelerometers"] = statistical["forces"]["in_use"] = 1
     view, clearing = statistical["views"][:2]
-    clearing["immune_to_vane"], clearing["plane"], clearing["peak_score"] = 1, (YAW, SIDE_FORCE), 50.0
-    view["confirmed_by"], view["peak_score"] = SIDE_FORCE, 9.0
-    view["surface"], view["plane"], view["inertial"], view["tones"]["score"] = surface, plane, inertial, 4.0
+    clearing["is_immune_to_vane_error"], clearing["plane_axes"], clearing["decaying_peak_score"] = (
+        1,
+        (YAW, SIDE_FORCE),
+        50.0,
+    )
+    view["confirming_force"], view["decaying_peak_score"] = SIDE_FORCE, 9.0
+    (
+        view["orthogonal_to_surface"],
+        view["plane_axes"],
+        view["uses_inertial_flow_angle"],
+        view["tone_tests"]["score"],
+    ) = (
+        surface,
+        plane,
+        inertial,
+        4.0,
+    )
     view["block"]["n_hypotheses"], view["block"]["hypothesis"]["score"] = 1, 9.0
     for i, share in mix.items():
         view["direction"][i] = share

@@ -22,11 +22,11 @@ WALKS = ("one axis", "two axes")
 def _whitened(block, innovations, dt):
     out = np.zeros((len(innovations), 2))
     filter_all(block, innovations, dt, out)
-    return out[:, : block["n"]]
+    return out[:, : block["n_axes"]]
 
 
 def _parts(block):
-    n = int(block["n"])
+    n = int(block["n_axes"])
     return {
         name: np.array(block[name][:n, :n]) for name in ("P_xx", "P_xd", "P_dd", "S_inverse", "K_x", "K_d")
     }
@@ -42,10 +42,10 @@ def test_it_is_the_textbook_filter_while_noise_and_drift_change(case, rate_hz, s
     rate = np.zeros(n)
     for _ in range(60):
         root = rng.normal(size=(n, n))
-        block["drift"][:n, :n] = 0.1 * root @ root.T
-        block["jitter"][:n] = rng.uniform(0, 0.01, n)
-        plain.Q[:n, :n] = np.diag(dt**2 * block["jitter"][:n])
-        plain.Q[n:, n:] = dt * block["drift"][:n, :n]
+        block["drift_intensity"][:n, :n] = 0.1 * root @ root.T
+        block["model_noise_variance"][:n] = rng.uniform(0, 0.01, n)
+        plain.Q[:n, :n] = np.diag(dt**2 * block["model_noise_variance"][:n])
+        plain.Q[n:, n:] = dt * block["drift_intensity"][:n, :n]
         acceleration = rng.normal(size=n)
         rate = rate + dt * acceleration
         expected = plain.step(rate)

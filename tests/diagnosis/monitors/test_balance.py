@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from beaver_ftc.diagnosis.monitors import engine_symmetry
+from beaver_ftc.diagnosis import monitors
 from telling import apart
 
 ENGINES = {"one": (0.2, -5.0), "two": (0.5, 1.5), "three": (0.3, 4.0)}  # share of the thrust; right_m
@@ -16,4 +16,4 @@ def test_thrust_on_the_right_turns_the_nose_to_the_left(named, arm):
     apart(engines=list(ENGINES.values()))
     effectors = {name: SimpleNamespace(share=ENGINES[name][0], right_m=ENGINES[name][1]) for name in named}
     aircraft = SimpleNamespace(effectors=effectors, geometry=SimpleNamespace(span_m=12.0, chord_m=2.0))
-    assert engine_symmetry.mean_arm(aircraft) == pytest.approx(arm / 12.0)
+    assert monitors.mean_thrust_arm(aircraft) == pytest.approx(arm / 12.0)

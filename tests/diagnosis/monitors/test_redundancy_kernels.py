@@ -8,25 +8,25 @@ from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
-    ALPHA_FLOW,
-    ANGLE,
+    ALPHA_FLOW_TEST,
+    ANGLE_TEST,
     BETA,
-    BETA_FLOW,
-    CLIMB,
-    DENSITY,
-    MANIFOLD_PRESSURE,
+    BETA_FLOW_TEST,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    MANIFOLD_PRESSURE_TEST,
     QDYN,
-    RPM,
-    SPEED,
-    STEP,
-    TEST,
+    REDUNDANCY_RECORD,
+    RPM_TEST,
+    SPEED_TEST,
+    TEST_RECORD,
     THETA,
-    TURN,
+    TURN_TEST,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 H, GRAVITY, DRIFT, GUST = 0.02, 9.8, 2e-4, 0.7
-FLOWS = (ALPHA_FLOW, BETA_FLOW)
+FLOWS = (ALPHA_FLOW_TEST, BETA_FLOW_TEST)
 
 
 def as_rotation(angles):
@@ -44,15 +44,15 @@ def reading(
 
 
 def new_step():
-    step = np.zeros(1, STEP)[0]
+    relations = np.zeros(1, REDUNDANCY_RECORD)[0]
     (
-        step["config"]["h"],
-        step["config"]["gravity"],
-        step["config"]["drift"],
-        step["config"]["max_gust_speed"],
-        step["config"]["max_airspeed"],
+        relations["config"]["sample_time_s"],
+        relations["config"]["gravity_m_s2"],
+        relations["config"]["attitude_drift_rad_s"],
+        relations["config"]["max_gust_speed_mps"],
+        relations["config"]["max_airspeed_mps"],
     ) = H, GRAVITY, DRIFT, GUST, 80.0
-    return step
+    return relations
 
 
 def velocity_of(signal):
@@ -68,20 +68,20 @@ def test_a_look_keeps_attitude_velocity_and_acceleration(seed):
     signal = reading(
         attitude=rng.uniform(-1.2, 1.2, 3), alpha=rng.uniform(-0.3, 0.3), beta=rng.uniform(-0.3, 0.3)
     )
-    step, force = new_step(), rng.normal(size=3)
-    step["memory"]["error"], step["memory"]["previous_error"] = 0.2, 0.1
-    redundancy.store_sample(step, signal, force)
+    relations, force = new_step(), rng.normal(size=3)
+    relations["memory"]["reading_error_bound"], relations["memory"]["previous_error_bound"] = 0.2, 0.1
+    redundancy.store_sample(relations, signal, force)
     rotation = as_rotation(signal[PHI : PHI + 3])
     kept = Rotation.from_quat(
-        [*step["memory"]["previous_attitude"][1:], step["memory"]["previous_attitude"][0]]
+        [*relations["memory"]["previous_quaternion"][1:], relations["memory"]["previous_quaternion"][0]]
     )
     acceleration = force + rotation.inv().apply([0, 0, GRAVITY])
     assert (kept.inv() * rotation).magnitude() < 1e-14
-    assert step["memory"]["previous"] == pytest.approx(signal)
-    assert step["memory"]["velocity"] == pytest.approx(velocity_of(signal), rel=1e-12)
-    assert step["memory"]["acceleration"] == pytest.approx(acceleration, rel=1e-12)
-    assert (step["memory"]["previous_error"] == 0.2).all()
-    assert (step["memory"]["earlier_error"] == 0.1).all()
+    assert relations["memory"]["previous_reading"] == pytest.approx(signal)
+    assert relations["memory"]["body_velocity"] == pytest.approx(velocity_of(signal), rel=1e-12)
+    assert relations["memory"]["body_acceleration"] == pytest.approx(acceleration, rel=1e-12)
+    assert (relations["memory"]["previous_error_bound"] == 0.2).all()
+    assert (relations["memory"]["error_bound_two_samples_ago"] == 0.1).all()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -89,22 +89,30 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
     """Velocity by Adams and Bashforth's second order, then seen from axes that have turned."""
     rng = np.random.default_rng(seed)
     signal = reading(attitude=rng.uniform(-1.0, 1.0, 3), rates=rng.uniform(-0.5, 0.5, 3))
-    step, before = new_step(), rng.normal(size=3)
-    redundancy.store_sample(step, signal, rng.normal(size=3))
-    step["memory"]["previous_acceleration"], now = before, step["memory"]["acceleration"].copy()
-    step["memory"]["size"], step["memory"]["earlier_sizes"] = 3.0, (2.0, 1.0)
-    redundancy.predict_readings(step)
-    assert step["memory"]["size"] == pytest.approx(np.linalg.norm(1.5 * now - 0.5 * before))
-    assert step["memory"]["earlier_sizes"].tolist() == [3.0, 2.0]
-    assert step["memory"]["previous_size"] == pytest.approx(np.linalg.norm(before))
+    relations, before = new_step(), rng.normal(size=3)
+    redundancy.store_sample(relations, signal, rng.normal(size=3))
+    relations["memory"]["previous_body_acceleration"], now = (
+        before,
+        relations["memory"]["body_acceleration"].copy(),
+    )
+    relations["memory"]["acceleration_magnitude"], relations["memory"]["earlier_acceleration_magnitudes"] = (
+        3.0,
+        (2.0, 1.0),
+    )
+    redundancy.predict_readings(relations)
+    assert relations["memory"]["acceleration_magnitude"] == pytest.approx(
+        np.linalg.norm(1.5 * now - 0.5 * before)
+    )
+    assert relations["memory"]["earlier_acceleration_magnitudes"].tolist() == [3.0, 2.0]
+    assert relations["memory"]["previous_acceleration_magnitude"] == pytest.approx(np.linalg.norm(before))
     size = np.linalg.norm(signal[:3])
     by = Rotation.from_rotvec(signal[:3] / size * 2.0 * np.arctan(0.5 * H * size))
     attitude = (as_rotation(signal[PHI : PHI + 3]) * by).as_euler("ZYX")[::-1]
     v = by.inv().apply(velocity_of(signal) + H * (1.5 * now - 0.5 * before))
-    predicted = step["memory"]["predicted"]
+    predicted = relations["memory"]["predicted_reading"]
     assert predicted[PHI : PHI + 3] == pytest.approx(attitude, abs=1e-13)
-    assert step["memory"]["velocity"] == pytest.approx(v, rel=1e-12)
-    assert step["memory"]["previous_acceleration"] == pytest.approx(by.inv().apply(now), rel=1e-12)
+    assert relations["memory"]["body_velocity"] == pytest.approx(v, rel=1e-12)
+    assert relations["memory"]["previous_body_acceleration"] == pytest.approx(by.inv().apply(now), rel=1e-12)
     assert predicted[AIRSPEED] == pytest.approx(np.linalg.norm(v))
     assert predicted[ALPHA] == pytest.approx(np.arctan(v[2] / v[0]))
     assert predicted[BETA] == pytest.approx(np.arcsin(v[1] / np.linalg.norm(v)))
@@ -115,28 +123,28 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
 @pytest.mark.parametrize("i", range(3))
 def test_what_each_angle_turns_the_axes_by(i):
     """By a small step of the angle, as a rotation vector in body axes."""
-    step, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
-    step["memory"]["previous"][PHI : PHI + 3] = angles
+    relations, angles, small = new_step(), np.array([0.4, -0.3, 2.0]), 1e-6
+    relations["memory"]["previous_reading"][PHI : PHI + 3] = angles
     moved = angles + small * (np.arange(3) == i)
     one, other = (Rotation.from_euler("ZYX", of[::-1]) for of in (angles, moved))
     turned = (one.inv() * other).as_rotvec() / small
-    assert [redundancy.axis_turn_per_angle(step, axis, i) for axis in range(3)] == pytest.approx(
+    assert [redundancy.body_turn_per_euler_angle(relations, axis, i) for axis in range(3)] == pytest.approx(
         turned, abs=1e-5
     )
 
 
 def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
     out = np.zeros(3)
-    redundancy.rotate_to_new_axes(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
+    redundancy.rotate_to_turned_axes(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
     assert out == pytest.approx([1.0, -2.0, 3.0])
 
 
 def compared(now, signal, predicted, then):
-    step = new_step()
-    redundancy.fill_quaternion(*now, step["memory"]["now"])
-    step["memory"]["predicted"], step["memory"]["previous"] = predicted, then
-    redundancy.fill_residuals(step, signal)
-    return step["test"]["residual"].copy()
+    relations = new_step()
+    redundancy.fill_quaternion(*now, relations["memory"]["predicted_quaternion"])
+    relations["memory"]["predicted_reading"], relations["memory"]["previous_reading"] = predicted, then
+    redundancy.fill_residuals(relations, signal)
+    return relations["test"]["residual"].copy()
 
 
 def test_residuals_are_readings_less_predictions():
@@ -147,27 +155,29 @@ def test_residuals_are_readings_less_predictions():
     predicted[PHI : PHI + 3] = now + 2.0 * np.pi * np.array([0, 0, 1])
     then[[QDYN, AIRSPEED]] = 1000.0, 40.0
     residual = compared(now, signal, predicted, then)
-    assert residual[TURN : TURN + 3] == pytest.approx([1e-4, -2e-4, 3e-4], rel=1e-6)
-    assert residual[ANGLE : ANGLE + 3] == pytest.approx(attitude - now, abs=1e-14)
-    assert residual[[SPEED, ALPHA_FLOW, BETA_FLOW, CLIMB]] == pytest.approx([0.3, 0.01, -0.02, 4.0])
+    assert residual[TURN_TEST : TURN_TEST + 3] == pytest.approx([1e-4, -2e-4, 3e-4], rel=1e-6)
+    assert residual[ANGLE_TEST : ANGLE_TEST + 3] == pytest.approx(attitude - now, abs=1e-14)
+    assert residual[[SPEED_TEST, ALPHA_FLOW_TEST, BETA_FLOW_TEST, CLIMB_TEST]] == pytest.approx(
+        [0.3, 0.01, -0.02, 4.0]
+    )
     denser = (signal[QDYN] / signal[AIRSPEED] ** 2) / (1000.0 / 1600.0)
-    assert residual[DENSITY] == pytest.approx(np.log(denser))
+    assert residual[DENSITY_TEST] == pytest.approx(np.log(denser))
 
 
 def test_a_pressure_that_is_gone_shows_and_stays_finite():
     signal, then = reading(), reading()
     signal[QDYN] = 0.0
     dense = then[QDYN] / then[AIRSPEED] ** 2
-    assert compared((0, 0, 0), signal, reading(), then)[DENSITY] == pytest.approx(np.log(1e-9 / dense))
-    assert compared((0, 0, 0), then, reading(), signal)[DENSITY] == pytest.approx(np.log(dense / 1e-9))
+    assert compared((0, 0, 0), signal, reading(), then)[DENSITY_TEST] == pytest.approx(np.log(1e-9 / dense))
+    assert compared((0, 0, 0), then, reading(), signal)[DENSITY_TEST] == pytest.approx(np.log(dense / 1e-9))
 
 
 def test_an_attitude_and_its_opposite_quaternion_are_the_same():
     one, other = np.zeros(4), np.zeros(4)
     redundancy.fill_quaternion(0.1, 0.2, 3.1, one)
     redundancy.fill_quaternion(0.1, 0.2, 3.1001, other)
-    near = [redundancy.angle_between(one, other, axis) for axis in (1, 2, 3)]
-    assert [redundancy.angle_between(one, -other, axis) for axis in (1, 2, 3)] == pytest.approx(near)
+    near = [redundancy.small_rotation_angle(one, other, axis) for axis in (1, 2, 3)]
+    assert [redundancy.small_rotation_angle(one, -other, axis) for axis in (1, 2, 3)] == pytest.approx(near)
     assert np.linalg.norm(near) == pytest.approx(1e-4, rel=1e-6)
 
 
@@ -179,7 +189,8 @@ def test_the_rotation_between_two_attitudes_takes_the_short_way(seed):
     scalar_first = [np.roll(turn.as_quat(), 1) for turn in (one, other)]
     for side in (1.0, -1.0):
         found = [
-            redundancy.angle_between(scalar_first[0], side * scalar_first[1], axis) for axis in (1, 2, 3)
+            redundancy.small_rotation_angle(scalar_first[0], side * scalar_first[1], axis)
+            for axis in (1, 2, 3)
         ]
         assert found == pytest.approx(2.0 * between[:3])
 
@@ -207,40 +218,48 @@ def three_looks(seed):
 
 def residuals(looks):
     """The record after three looks, and the residuals (RPM,) of the last."""
-    step = new_step()
-    step["config"]["drift"] = step["config"]["max_gust_speed"] = 0.0
-    redundancy.store_sample(step, looks[0], looks[0, AX:])
-    step["memory"]["previous_acceleration"] = step["memory"]["acceleration"]
-    redundancy.predict_readings(step)
-    redundancy.store_sample(step, looks[1], looks[1, AX:])
-    redundancy.predict_readings(step)
-    redundancy.fill_residuals(step, looks[2])
-    return step, step["test"]["residual"][:RPM].copy()
+    relations = new_step()
+    relations["config"]["attitude_drift_rad_s"] = relations["config"]["max_gust_speed_mps"] = 0.0
+    redundancy.store_sample(relations, looks[0], looks[0, AX:])
+    relations["memory"]["previous_body_acceleration"] = relations["memory"]["body_acceleration"]
+    redundancy.predict_readings(relations)
+    redundancy.store_sample(relations, looks[1], looks[1, AX:])
+    redundancy.predict_readings(relations)
+    redundancy.fill_residuals(relations, looks[2])
+    return relations, relations["test"]["residual"][:RPM_TEST].copy()
 
 
-def allowed(step, signal, sensor, steady, changing):
+def allowed(relations, signal, sensor, steady, changing):
     """(rate, noise) (RPM,) where these errors of one sensor are declared."""
-    step["config"]["steady"], step["memory"]["changing"] = 0.0, 0.0
-    for name in ("error", "previous_error", "earlier_error"):
-        step["memory"][name] = 0.0
-        step["memory"][name][sensor] = steady + changing
-    step["config"]["steady"][sensor], step["memory"]["changing"][sensor] = steady, changing
-    redundancy.bound_residuals(step, signal)
-    return step["test"]["rate"][:RPM].copy(), step["test"]["noise"][:RPM].copy()
+    relations["config"]["constant_error"], relations["memory"]["reading_error_change_bound"] = 0.0, 0.0
+    for name in ("reading_error_bound", "previous_error_bound", "error_bound_two_samples_ago"):
+        relations["memory"][name] = 0.0
+        relations["memory"][name][sensor] = steady + changing
+    (
+        relations["config"]["constant_error"][sensor],
+        relations["memory"]["reading_error_change_bound"][sensor],
+    ) = (
+        steady,
+        changing,
+    )
+    redundancy.bound_residuals(relations, signal)
+    return relations["test"]["bound_per_s"][:RPM_TEST].copy(), relations["test"]["bound_per_sample"][
+        :RPM_TEST
+    ].copy()
 
 
 SIDES = ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, 1, -1), (1, 1, -1))
 SIZES = {AIRSPEED: 2.0, QDYN: 50.0, ALTITUDE: 10.0, **dict.fromkeys(range(AX, N_SENSORS), 1.0)}
 # The tests by which an instrument is known: its bounds there are hardly wider than what it can do.
 KNOWN_BY = {
-    **{gyro: {TURN + gyro, ANGLE + gyro} for gyro in range(3)},
-    **{PHI + i: {TURN + i, ANGLE + i} for i in range(3)},
-    ALPHA: {ALPHA_FLOW},
-    BETA: {BETA_FLOW},
-    AIRSPEED: {SPEED, DENSITY},
-    QDYN: {DENSITY},
-    ALTITUDE: {CLIMB},
-    **{AX + i: {(SPEED, BETA_FLOW, ALPHA_FLOW)[i]} for i in range(3)},
+    **{gyro: {TURN_TEST + gyro, ANGLE_TEST + gyro} for gyro in range(3)},
+    **{PHI + i: {TURN_TEST + i, ANGLE_TEST + i} for i in range(3)},
+    ALPHA: {ALPHA_FLOW_TEST},
+    BETA: {BETA_FLOW_TEST},
+    AIRSPEED: {SPEED_TEST, DENSITY_TEST},
+    QDYN: {DENSITY_TEST},
+    ALTITUDE: {CLIMB_TEST},
+    **{AX + i: {(SPEED_TEST, BETA_FLOW_TEST, ALPHA_FLOW_TEST)[i]} for i in range(3)},
 }
 
 
@@ -248,20 +267,20 @@ KNOWN_BY = {
 def test_no_error_moves_a_residual_further_than_it_is_allowed_to(sensor):
     """By differences: a reading that is off by a constant and by a changing error, of either sign at each of
     three looks. What that makes of the residuals is within what is allowed, and not far within."""
-    nearest = np.zeros(RPM)
+    nearest = np.zeros(RPM_TEST)
     for seed in range(20):
         steady, changing = np.random.default_rng([seed, sensor]).uniform(0.1, 1.0, 2) * SIZES.get(
             sensor, 0.02
         )
         looks = three_looks(seed)
-        step, exact = residuals(looks)
-        free = allowed(step, looks[2], sensor, 0.0, 0.0)[0]
+        relations, exact = residuals(looks)
+        free = allowed(relations, looks[2], sensor, 0.0, 0.0)[0]
         for sides in SIDES:
             off = looks.copy()
             off[:, sensor] += steady + changing * np.array(sides)
-            step, moved = residuals(off)
-            then = allowed(step, off[1], sensor, steady, changing)[1]
-            rate, noise = allowed(step, off[2], sensor, steady, changing)
+            relations, moved = residuals(off)
+            then = allowed(relations, off[1], sensor, steady, changing)[1]
+            rate, noise = allowed(relations, off[2], sensor, steady, changing)
             share = np.abs(moved - exact) / np.maximum(H * (rate - free) + noise + then, 1e-12)
             assert (share <= 1.0 + 1e-9).all(), (seed, sides, share)
             nearest = np.maximum(nearest, share)
@@ -270,61 +289,71 @@ def test_no_error_moves_a_residual_further_than_it_is_allowed_to(sensor):
 
 def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change():
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
-    step, signal = new_step(), np.full(N_SENSORS, -3.0)
+    relations, signal = new_step(), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
-    step["config"]["offset"], step["config"]["slope"], step["config"]["steady"] = 0.3, 0.1, 0.25
-    redundancy.fill_reading_errors(step, signal)
+    (
+        relations["config"]["error_offset"],
+        relations["config"]["error_slope"],
+        relations["config"]["constant_error"],
+    ) = 0.3, 0.1, 0.25
+    redundancy.fill_reading_error_bounds(relations, signal)
     truth = (3.0 + 0.3) / 0.9
-    assert step["memory"]["error"] == pytest.approx(truth - 3.0)
-    assert step["memory"]["changing"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
+    assert relations["memory"]["reading_error_bound"] == pytest.approx(truth - 3.0)
+    assert relations["memory"]["reading_error_change_bound"] == pytest.approx(
+        truth - 3.0 - 0.25 + 3e-10, rel=1e-9
+    )
 
 
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
-    test, step = np.zeros(1, TEST)[0], new_step()
-    step["config"]["decay"] = keep = np.array([0.0, 0.8, 0.97])
-    step["config"]["gust_change_bound"], test["air"] = [0.1, 0.2, 0.3], 0.5
+    test, relations = np.zeros(1, TEST_RECORD)[0], new_step()
+    relations["config"]["filter_decay"] = keep = np.array([0.0, 0.8, 0.97])
+    relations["config"]["gust_change_bound_mps"], test["gust_gain"] = [0.1, 0.2, 0.3], 0.5
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
-        test["residual"], test["rate"], test["noise"] = residual[k], rate[k], noise[k]
-        redundancy.filter_test(step, test)
+        test["residual"], test["bound_per_s"], test["bound_per_sample"] = residual[k], rate[k], noise[k]
+        redundancy.filter_residual(relations, test)
     weight = keep[:, None] ** np.arange(frames)[::-1]
     filtered = weight @ residual
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]
     bound = H * weight @ rate + changes + 0.5 * np.array([0.1, 0.2, 0.3])
-    assert test["filtered"] == pytest.approx(filtered)
-    assert test["bound"] == pytest.approx(bound)
-    assert test["share"] == pytest.approx(np.max(np.abs(filtered) / bound))
-    assert test["noise_before"] == noise[-1]
+    assert test["filtered_residual"] == pytest.approx(filtered)
+    assert test["filtered_bound"] == pytest.approx(bound)
+    assert test["residual_bound_ratio"] == pytest.approx(np.max(np.abs(filtered) / bound))
+    assert test["previous_bound_per_sample"] == noise[-1]
 
 
 @pytest.mark.parametrize("engine", [False, True])
 def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine):
-    step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    step["config"]["decay"] = [0.0, 0.8, 0.97]
-    step["memory"]["command"], step["config"]["offset"][ENGINE_SPEED], step["config"]["offset"][MANIFOLD] = (
+    relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
+    relations["config"]["filter_decay"] = [0.0, 0.8, 0.97]
+    (
+        relations["memory"]["engine_command"],
+        relations["config"]["error_offset"][ENGINE_SPEED],
+        relations["config"]["error_offset"][MANIFOLD],
+    ) = (
         (1700.0, 20.5),
         10.0,
         0.25,
     )
-    redundancy.store_sample(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
-    step["test"]["bound_noise"] = 1e-6
-    redundancy.run_tests(step, signal, engine)
-    assert (step["test"]["share"][:CLIMB] < 1.0).all()
+    redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    relations["test"]["filtered_sample_bound"] = 1e-6
+    redundancy.run_redundancy_tests(relations, signal, engine)
+    assert (relations["test"]["residual_bound_ratio"][:CLIMB_TEST] < 1.0).all()
     # 100 rpm too fast where 10 are declared, 0.5 inHg too low where a quarter is
-    shares = step["test"]["share"][[RPM, MANIFOLD_PRESSURE]]
+    shares = relations["test"]["residual_bound_ratio"][[RPM_TEST, MANIFOLD_PRESSURE_TEST]]
     assert shares == pytest.approx([10.0, 2.0] if engine else [0.0, 0.0], rel=1e-5)
-    assert step["test"]["residual"][[RPM, MANIFOLD_PRESSURE]] == pytest.approx(
+    assert relations["test"]["residual"][[RPM_TEST, MANIFOLD_PRESSURE_TEST]] == pytest.approx(
         [100.0, -0.5] if engine else [0, 0]
     )
 
 
 def test_a_reading_that_jumps_fails_its_own_test():
-    step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
-    redundancy.store_sample(step, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
+    relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
+    redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     signal[ALTITUDE] += 5.0
-    redundancy.run_tests(step, signal, False)
-    assert np.flatnonzero(step["test"]["share"] > 1.0).tolist() == [CLIMB]
+    redundancy.run_redundancy_tests(relations, signal, False)
+    assert np.flatnonzero(relations["test"]["residual_bound_ratio"] > 1.0).tolist() == [CLIMB_TEST]
 
 
 def test_no_air_of_the_standard_atmosphere_thins_faster_than_the_bound_has_it():
@@ -343,7 +372,7 @@ UNITS = np.array(
 
 def true_flight(rng, looks, h):
     """What exact instruments say (looks, N_SENSORS) of a body that is turned and pushed at random, from the
-    middle of it on: rates held over a step, velocity by two steps, place by three, in a steady wind."""
+    middle of it on: rates held over a relations, velocity by two steps, place by three, in a steady wind."""
     rotation, wind = as_rotation(rng.uniform(-0.8, 0.8, 3)), np.array([8.0, -5.0, rng.choice([-1.0, 1.0])])
     velocity = rotation.apply([45.0, 2.0, 4.0]) + wind
     altitude, rates, force = 1500.0, np.zeros(3), np.array([0.0, 0.0, -GRAVITY])
@@ -375,7 +404,7 @@ def true_flight(rng, looks, h):
 def test_sound_instruments_stay_within_every_bound(seed, h):
     """Each error at its extreme: a bias, a slope, a drift, and noise that jumps from side to side."""
     rng, looks = np.random.default_rng([seed, round(1 / h)]), 100
-    true, step = true_flight(rng, looks, h), new_step()
+    true, relations = true_flight(rng, looks, h), new_step()
     side = rng.choice([-1.0, 1.0], (3, N_SENSORS)) * (rng.random((3, N_SENSORS)) < 0.7)
     bias, slope, drift = (
         side[0] * UNITS,
@@ -383,54 +412,70 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         3e-3 * side[2] * (np.abs(np.arange(N_SENSORS) - 8) <= 1),
     )
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
-    step["config"]["h"], step["config"]["decay"], step["config"]["max_gust_speed"] = (
+    (
+        relations["config"]["sample_time_s"],
+        relations["config"]["filter_decay"],
+        relations["config"]["max_gust_speed_mps"],
+    ) = (
         h,
         np.exp(-h * np.array([1e6, 10.0, 1.0])),
         0.0,
     )
-    step["config"]["offset"], step["config"]["steady"], step["config"]["slope"] = (
+    (
+        relations["config"]["error_offset"],
+        relations["config"]["constant_error"],
+        relations["config"]["error_slope"],
+    ) = (
         np.abs(bias) + noise,
         np.abs(bias),
         np.abs(slope),
     )
-    step["config"]["drift"], step["memory"]["command"] = np.abs(drift).max(), (1800.0, 20.0)
+    relations["config"]["attitude_drift_rad_s"], relations["memory"]["engine_command"] = (
+        np.abs(drift).max(),
+        (1800.0, 20.0),
+    )
     nearest = np.zeros(13)
     for k in range(looks):
         reading = (1.0 + slope) * true[k] + bias + h * k * drift + noise * rng.choice([-1.0, 1.0], N_SENSORS)
         if k == 0:
-            redundancy.begin_tests(step, reading, reading[AX:])
+            redundancy.start_redundancy_tests(relations, reading, reading[AX:])
         else:
-            redundancy.run_tests(step, reading, True)
-            redundancy.store_sample(step, reading, reading[AX:])
-        nearest = np.maximum(nearest, step["test"]["share"])
+            redundancy.run_redundancy_tests(relations, reading, True)
+            redundancy.store_sample(relations, reading, reading[AX:])
+        nearest = np.maximum(nearest, relations["test"]["residual_bound_ratio"])
     assert (nearest <= 1.0).all(), nearest
     assert (nearest > 0.2).sum() >= 4, nearest
 
 
 def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
-    step, signal = new_step(), reading(rates=np.zeros(3), attitude=(0.1, 1.25, 0.2))
-    step["config"]["decay"] = 0.0, 0.8, 0.97
-    redundancy.begin_tests(step, signal, signal[AX:])
+    relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0.1, 1.25, 0.2))
+    relations["config"]["filter_decay"] = 0.0, 0.8, 0.97
+    redundancy.start_redundancy_tests(relations, signal, signal[AX:])
     shares = []
     for pitch in (1.28, 1.31, 1.28, 1.25):
         signal[THETA] = pitch
-        redundancy.run_tests(step, signal, False)
-        redundancy.store_sample(step, signal, signal[AX:])
-        shares.append(step["test"]["share"][ANGLE + 1])
+        redundancy.run_redundancy_tests(relations, signal, False)
+        redundancy.store_sample(relations, signal, signal[AX:])
+        shares.append(relations["test"]["residual_bound_ratio"][ANGLE_TEST + 1])
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
     assert shares[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
-    assert step["test"]["filtered"][ANGLE + 1] == pytest.approx([-0.03] * 3)  # nothing of what was before
+    assert relations["test"]["filtered_residual"][ANGLE_TEST + 1] == pytest.approx(
+        [-0.03] * 3
+    )  # nothing of what was before
 
 
 def test_the_bound_of_a_climb_knows_the_hardest_of_three_pulls_whichever_it_was():
     """Adams and Bashforth's weights of an acceleration over the three latest steps add up to 4/3 at most."""
 
     def rate(*pulled):
-        step, signal = new_step(), reading()
-        redundancy.store_sample(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["memory"]["size"], step["memory"]["earlier_sizes"] = 1.0, pulled
-        redundancy.bound_residuals(step, signal)
-        return step["test"]["rate"][CLIMB]
+        relations, signal = new_step(), reading()
+        redundancy.store_sample(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
+        (
+            relations["memory"]["acceleration_magnitude"],
+            relations["memory"]["earlier_acceleration_magnitudes"],
+        ) = 1.0, pulled
+        redundancy.bound_residuals(relations, signal)
+        return relations["test"]["bound_per_s"][CLIMB_TEST]
 
     assert rate(50.0, 20.0) == rate(20.0, 50.0) == rate(50.0, 50.0)
     assert rate(20.0, 80.0) - rate(20.0, 50.0) == pytest.approx(4.0 / 3.0 * H * 30.0)
@@ -440,10 +485,10 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
     """In level flight a pull turns the path by pull / V: 2 m/s less, by pull (1/(V - 2) - 1/V) more."""
     signal, pull, rates = reading(rates=np.zeros(3), attitude=np.zeros(3), alpha=0.0, beta=0.0), 30.0, []
     for off in (0.0, 2.0):
-        step = new_step()
-        redundancy.store_sample(step, signal, np.array([0.0, 0.0, -GRAVITY]))
-        step["memory"]["size"] = pull
-        rates.append(allowed(step, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
+        relations = new_step()
+        redundancy.store_sample(relations, signal, np.array([0.0, 0.0, -GRAVITY]))
+        relations["memory"]["acceleration_magnitude"] = pull
+        rates.append(allowed(relations, signal, AIRSPEED, off, 0.0)[0][list(FLOWS)])
     V = signal[AIRSPEED]
     turned = pull * (1.0 / (V - 2.0) - 1.0 / V)
     assert (turned < rates[1] - rates[0]).all()
@@ -453,15 +498,18 @@ def test_a_wrong_airspeed_turns_the_flow_at_most_by_what_it_makes_of_the_pull():
 @pytest.mark.parametrize("seed", range(6))
 def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(seed):
     """A heading that leaps back and forth turns each time about the axis that a blurred bank has by then."""
-    rng, step, signal = np.random.default_rng(seed), new_step(), reading(rates=np.zeros(3))
-    step["config"]["decay"], step["config"]["drift"] = (0.0, 0.99, 0.9999), 0.0
-    step["config"]["offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
+    rng, relations, signal = np.random.default_rng(seed), new_step(), reading(rates=np.zeros(3))
+    relations["config"]["filter_decay"], relations["config"]["attitude_drift_rad_s"] = (
+        (0.0, 0.99, 0.9999),
+        0.0,
+    )
+    relations["config"]["error_offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
     true = signal[PHI : PHI + 3] * (0.0, 1.0, 1.0)
     for k in range(400):
         signal[PHI : PHI + 3] = true + sizes * rng.choice([-1.0, 0.0, 1.0], 3)
         if k == 0:
-            redundancy.begin_tests(step, signal, signal[AX:])
+            redundancy.start_redundancy_tests(relations, signal, signal[AX:])
         else:
-            redundancy.run_tests(step, signal, False)
-            redundancy.store_sample(step, signal, signal[AX:])
-        assert (step["test"]["share"][TURN : TURN + 3] <= 1.0).all(), k
+            redundancy.run_redundancy_tests(relations, signal, False)
+            redundancy.store_sample(relations, signal, signal[AX:])
+        assert (relations["test"]["residual_bound_ratio"][TURN_TEST : TURN_TEST + 3] <= 1.0).all(), k

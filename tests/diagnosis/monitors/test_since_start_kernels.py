@@ -11,35 +11,41 @@ from scipy.spatial.transform import Rotation
 from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
-    AIRSPEED_ERROR,
+    AIRSPEED_HYPOTHESIS,
     ALPHA,
-    ALPHA_ERROR,
+    ALPHA_HYPOTHESIS,
     BETA,
-    BETA_ERROR,
-    CLIMB,
-    DENSITY,
-    N_INITIAL,
+    BETA_HYPOTHESIS,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
-    PHI_ERROR,
+    PHI_HYPOTHESIS,
     QDYN,
-    SENSOR_MONITOR,
-    SPEED,
+    SENSOR_MONITOR_RECORD,
+    SPEED_TEST,
     THETA,
-    THETA_ERROR,
-    TURN,
+    THETA_HYPOTHESIS,
+    TURN_TEST,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 
 GRAVITY, LOOKS = 9.8, 100
-READING = {ALPHA_ERROR: ALPHA, BETA_ERROR: BETA, AIRSPEED_ERROR: AIRSPEED, PHI_ERROR: PHI, THETA_ERROR: THETA}
-NAMES = {
-    ALPHA_ERROR: "alpha",
-    BETA_ERROR: "beta",
-    AIRSPEED_ERROR: "V",
-    PHI_ERROR: "phi",
-    THETA_ERROR: "theta",
+READING = {
+    ALPHA_HYPOTHESIS: ALPHA,
+    BETA_HYPOTHESIS: BETA,
+    AIRSPEED_HYPOTHESIS: AIRSPEED,
+    PHI_HYPOTHESIS: PHI,
+    THETA_HYPOTHESIS: THETA,
 }
-SHOWN = {ALPHA_ERROR: 0.1, BETA_ERROR: 0.12, PHI_ERROR: 0.1, THETA_ERROR: 0.1}
+NAMES = {
+    ALPHA_HYPOTHESIS: "alpha",
+    BETA_HYPOTHESIS: "beta",
+    AIRSPEED_HYPOTHESIS: "V",
+    PHI_HYPOTHESIS: "phi",
+    THETA_HYPOTHESIS: "theta",
+}
+SHOWN = {ALPHA_HYPOTHESIS: 0.1, BETA_HYPOTHESIS: 0.12, PHI_HYPOTHESIS: 0.1, THETA_HYPOTHESIS: 0.1}
 
 
 def flight(seed, h, swiftly):
@@ -82,17 +88,25 @@ def course(kind, size, true, h):
 
 
 def new_watch(h):
-    monitor = np.zeros(1, SENSOR_MONITOR).view(np.recarray)[0]
-    step = monitor["step"]
-    step["config"]["h"], step["config"]["decay"], step["config"]["gravity"] = (
+    monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
+    relations = monitor["redundancy"]
+    (
+        relations["config"]["sample_time_s"],
+        relations["config"]["filter_decay"],
+        relations["config"]["gravity_m_s2"],
+    ) = (
         h,
         np.exp([-1e6 * h, -10.0 * h, -h]),
         GRAVITY,
     )
-    step["config"]["max_vertical_wind"], step["config"]["max_airspeed"] = 1.0, 80.0
-    step["config"]["offset"][:3], step["config"]["steady"][:3] = 2e-4, 1e-4
-    step["config"]["offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
-    step["config"]["offset"][AIRSPEED], step["config"]["offset"][QDYN], step["config"]["offset"][ALTITUDE] = (
+    relations["config"]["max_vertical_wind_mps"], relations["config"]["max_airspeed_mps"] = 1.0, 80.0
+    relations["config"]["error_offset"][:3], relations["config"]["constant_error"][:3] = 2e-4, 1e-4
+    relations["config"]["error_offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
+    (
+        relations["config"]["error_offset"][AIRSPEED],
+        relations["config"]["error_offset"][QDYN],
+        relations["config"]["error_offset"][ALTITUDE],
+    ) = (
         0.05,
         2.0,
         0.5,
@@ -102,46 +116,48 @@ def new_watch(h):
 
 def sizes(i, reading, true):
     """The error as since_start counts it."""
-    return reading / true - 1.0 if i == AIRSPEED_ERROR else 2.0 * np.sin(0.5 * (reading - true))
+    return reading / true - 1.0 if i == AIRSPEED_HYPOTHESIS else 2.0 * np.sin(0.5 * (reading - true))
 
 
 def looks(signal, h):
     """Each look's number and the monitor, all that was beyond its bound by then noted as fired."""
     monitor = new_watch(h)
-    redundancy.begin_tests(monitor["step"], signal[0], signal[0, AX:])
-    initial_errors.begin_initial_errors(monitor["initial"], signal[0])
-    redundancy.store_sample(monitor["step"], signal[0], signal[0, AX:])
+    redundancy.start_redundancy_tests(monitor["redundancy"], signal[0], signal[0, AX:])
+    initial_errors.set_error_bounds_at_start(monitor["initial_errors"], signal[0])
+    redundancy.store_sample(monitor["redundancy"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
-        redundancy.run_tests(monitor["step"], signal[k], 0)
-        initial_errors.update_initial_errors(monitor["step"], monitor["initial"], signal[k])
-        fired |= monitor["step"]["test"]["share"] > 1.0
-        initial_errors.record_refuted(monitor["step"], monitor["initial"], fired)
+        redundancy.run_redundancy_tests(monitor["redundancy"], signal[k], 0)
+        initial_errors.update_initial_error_bounds(
+            monitor["redundancy"], monitor["initial_errors"], signal[k]
+        )
+        fired |= monitor["redundancy"]["test"]["residual_bound_ratio"] > 1.0
+        initial_errors.record_refuted_hypotheses(monitor["redundancy"], monitor["initial_errors"], fired)
         yield k, monitor, fired
-        redundancy.store_sample(monitor["step"], signal[k], signal[k, AX:])
+        redundancy.store_sample(monitor["redundancy"], signal[k], signal[k, AX:])
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
-@pytest.mark.parametrize("i", range(N_INITIAL), ids=NAMES.get)
+@pytest.mark.parametrize("i", range(N_INITIAL_ERROR_HYPOTHESES), ids=NAMES.get)
 @pytest.mark.parametrize(("seed", "h", "swiftly"), [(1, 0.01, True), (2, 0.05, False)])
 def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kind):
     rng, true = np.random.default_rng([seed, i]), flight(seed, h, swiftly)
     for size in rng.uniform(0.8, 1.2) * np.array([-0.4, 0.03, 0.5]):
         broken = true.copy()
-        factor = true[0, AIRSPEED] if i == AIRSPEED_ERROR else 1.0
+        factor = true[0, AIRSPEED] if i == AIRSPEED_HYPOTHESIS else 1.0
         broken[:, READING[i]] += course(
             kind, size * (1.0 if kind == "scale" else factor), true[:, READING[i]], h
         )
         off = abs(sizes(i, broken[:, READING[i]], true[:, READING[i]]))
         moved = set()
         for k, monitor, _ in looks(broken, h):
-            initial = monitor["initial"]
-            assert off[k] <= (initial["error_bound"][i] + initial["change_bound"][i]) * (1.0 + 1e-9), (
+            initial = monitor["initial_errors"]
+            assert off[k] <= (initial["error_bound"][i] + initial["error_change_bound"][i]) * (1.0 + 1e-9), (
                 size,
                 k,
             )
-            moved |= set(np.flatnonzero(initial["refuted"][i]).tolist())
-        assert all(initial_errors.test_moves_with_error(i, t) for t in moved), (size, moved)
+            moved |= set(np.flatnonzero(initial["is_refuted_by_test"][i]).tolist())
+        assert all(initial_errors.test_reacts_to_error_change(i, t) for t in moved), (size, moved)
         assert kind != "constant" or not moved
 
 
@@ -150,10 +166,10 @@ def test_a_sound_flight_shows_each_reading_to_be_sound():
     as the density of the air says from the first look on."""
     for k, monitor, fired in looks(flight(5, 0.01, True), 0.01):
         assert not fired.any(), k
-        initial = monitor["initial"]
+        initial = monitor["initial_errors"]
     for i, little in SHOWN.items():
-        assert initial["error_bound"][i] < little < initial["initial_bound"][i], NAMES[i]
-    assert initial["error_bound"][AIRSPEED_ERROR] < 0.2
+        assert initial["error_bound"][i] < little < initial["error_bound_at_start"][i], NAMES[i]
+    assert initial["error_bound"][AIRSPEED_HYPOTHESIS] < 0.2
 
 
 def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
@@ -168,37 +184,44 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
     signal[:, ALTITUDE] -= 0.01 * down * np.arange(LOOKS)
     for _, monitor, fired in looks(signal, 0.01):
         assert not fired.any()
-        off, first = monitor["initial"]["error_bound"], monitor["initial"]["initial_bound"]
-    assert off[BETA_ERROR] == first[BETA_ERROR]
-    assert off[AIRSPEED_ERROR] == first[AIRSPEED_ERROR]
-    assert max(off[PHI_ERROR], off[THETA_ERROR]) < 0.06
+        off, first = (
+            monitor["initial_errors"]["error_bound"],
+            monitor["initial_errors"]["error_bound_at_start"],
+        )
+    assert off[BETA_HYPOTHESIS] == first[BETA_HYPOTHESIS]
+    assert off[AIRSPEED_HYPOTHESIS] == first[AIRSPEED_HYPOTHESIS]
+    assert max(off[PHI_HYPOTHESIS], off[THETA_HYPOTHESIS]) < 0.06
 
 
 @pytest.mark.parametrize(
     ("i", "lead", "by", "explained"),
     [
-        (ALPHA_ERROR, CLIMB, (CLIMB,), False), (ALPHA_ERROR, CLIMB, (7,), True), (ALPHA_ERROR, 7,
-        (7,), False),
-        (AIRSPEED_ERROR, CLIMB, (SPEED, DENSITY), True), (AIRSPEED_ERROR, DENSITY, (DENSITY,), False),
-        (PHI_ERROR, 8, (TURN, TURN + 2, 3), True), (PHI_ERROR, 8, (4,), False), (PHI_ERROR, TURN,
-        (TURN,), False),
-        (THETA_ERROR, 8, (TURN + 1, 4), True), (THETA_ERROR, 8, (3,), False), (BETA_ERROR, CLIMB,
-        (12,), False),
-        (BETA_ERROR, CLIMB, (), True),
+        (ALPHA_HYPOTHESIS, CLIMB_TEST, (CLIMB_TEST,), False),
+        (ALPHA_HYPOTHESIS, CLIMB_TEST, (7,), True),
+        (ALPHA_HYPOTHESIS, 7, (7,), False),
+        (AIRSPEED_HYPOTHESIS, CLIMB_TEST, (SPEED_TEST, DENSITY_TEST), True),
+        (AIRSPEED_HYPOTHESIS, DENSITY_TEST, (DENSITY_TEST,), False),
+        (PHI_HYPOTHESIS, 8, (TURN_TEST, TURN_TEST + 2, 3), True),
+        (PHI_HYPOTHESIS, 8, (4,), False),
+        (PHI_HYPOTHESIS, TURN_TEST, (TURN_TEST,), False),
+        (THETA_HYPOTHESIS, 8, (TURN_TEST + 1, 4), True),
+        (THETA_HYPOTHESIS, 8, (3,), False),
+        (BETA_HYPOTHESIS, CLIMB_TEST, (12,), False),
+        (BETA_HYPOTHESIS, CLIMB_TEST, (), True),
     ],
 )  # fmt: skip
 def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
-    initial = new_watch(0.01)["initial"]
-    initial["refuted"][i, list(by)] = 1
-    assert initial_errors.initial_error_explains(initial, i, lead) == explained
+    initial = new_watch(0.01)["initial_errors"]
+    initial["is_refuted_by_test"][i, list(by)] = 1
+    assert initial_errors.initial_error_explains_alarm(initial, i, lead) == explained
 
 
 def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():
     """At 1000 m of the standard the density is 1.1116 kg/m3; a quarter more or less is the weather."""
     for V, true in ((45.0, 45.0), (20.0, 45.0), (90.0, 45.0)):
-        signal, initial = np.zeros(N_SENSORS), new_watch(0.01)["initial"]
+        signal, initial = np.zeros(N_SENSORS), new_watch(0.01)["initial_errors"]
         signal[[AIRSPEED, ALTITUDE, QDYN, ALPHA]] = V, 1000.0, 0.5 * 1.1116 * true**2, -0.2
-        initial_errors.begin_initial_errors(initial, signal)
+        initial_errors.set_error_bounds_at_start(initial, signal)
         ends = V / true * np.sqrt(1.25) - 1.0, 1.0 - V / true * np.sqrt(0.75)
-        assert initial["error_bound"][AIRSPEED_ERROR] == pytest.approx(max(ends), rel=1e-3)
-        assert initial["error_bound"][ALPHA_ERROR] == pytest.approx(2.0 * np.sin(0.45))
+        assert initial["error_bound"][AIRSPEED_HYPOTHESIS] == pytest.approx(max(ends), rel=1e-3)
+        assert initial["error_bound"][ALPHA_HYPOTHESIS] == pytest.approx(2.0 * np.sin(0.45))

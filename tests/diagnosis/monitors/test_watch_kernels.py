@@ -5,30 +5,30 @@ import pytest
 from kernels import DT, fill, new_fdi, on
 
 from beaver_ftc.design.model import DPT, measured_slipstream
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor as watching
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
-    ALPHA_FLOW,
-    ANGLE,
+    ALPHA_FLOW_TEST,
+    ANGLE_TEST,
     BETA,
-    BETA_FLOW,
-    CLIMB,
-    DENSITY,
-    MANIFOLD_PRESSURE,
+    BETA_FLOW_TEST,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    GYRO_ERROR_CONFIRMED,
+    GYRO_ERROR_REFUTED,
+    GYRO_ERROR_UNDECIDED,
+    MANIFOLD_PRESSURE_TEST,
     N_TESTS,
-    NO,
     NO_SENSOR,
     PSI,
     QDYN,
-    RPM,
-    SENSOR_MONITOR,
-    SPEED,
+    RPM_TEST,
+    SENSOR_MONITOR_RECORD,
+    SPEED_TEST,
     THETA,
-    TURN,
-    UNDECIDED,
-    YES,
+    TURN_TEST,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop import frame
@@ -49,22 +49,26 @@ GYROS, FORCES = (0, 1, 2), (AX, AX + 1, AX + 2)
 
 
 def new_watch(**fields):
-    monitor = np.zeros(1, SENSOR_MONITOR).view(np.recarray)[0]
+    monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
     (
         monitor["config"]["enabled"],
-        monitor["config"]["instants"],
-        monitor["output"]["named"],
+        monitor["config"]["substeps"],
+        monitor["output"]["isolated_sensor"],
         monitor["config"]["attitude_correction_share"],
     ) = 1, 4, NO_SENSOR, 1.0
-    monitor["step"]["config"]["h"], monitor["step"]["config"]["decay"], monitor["output"]["alarmed_at_s"] = (
+    (
+        monitor["redundancy"]["config"]["sample_time_s"],
+        monitor["redundancy"]["config"]["filter_decay"],
+        monitor["output"]["alarmed_at_s"],
+    ) = (
         H,
         (0.0, 0.9, 0.99),
         -1.0,
     )
     (
-        monitor["step"]["test"]["bound"],
-        monitor["config"]["longest_identical"],
-        monitor["step"]["config"]["max_airspeed"],
+        monitor["redundancy"]["test"]["filtered_bound"],
+        monitor["config"]["min_frozen_samples"],
+        monitor["redundancy"]["config"]["max_airspeed_mps"],
     ) = (
         1.0,
         3,
@@ -83,8 +87,8 @@ def with_shares(shares, **fields):
     """Tests {test: share of its bound}, of which the residual is as large."""
     monitor = new_watch(**fields)
     for test, share in shares.items():
-        monitor["step"]["test"]["share"][test] = share
-        monitor["step"]["test"]["filtered"][test] = share
+        monitor["redundancy"]["test"]["residual_bound_ratio"][test] = share
+        monitor["redundancy"]["test"]["filtered_residual"][test] = share
     return monitor
 
 
@@ -94,46 +98,46 @@ def with_shares(shares, **fields):
      ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
 )  # fmt: skip
 def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, substep, furthest):
-    monitor = with_shares(shares, largest_test=5, share=0.7, substep=substep)
-    watching.find_largest_share(monitor)
-    assert (monitor["output"]["largest_test"], monitor["output"]["share"]) == furthest
+    monitor = with_shares(shares, worst_test=5, worst_test_ratio=0.7, substep=substep)
+    watching.find_worst_test(monitor)
+    assert (monitor["output"]["worst_test"], monitor["output"]["worst_test_ratio"]) == furthest
 
 
 def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     monitor = with_shares(shares, **fields)
-    monitor["output"]["lead"] = max(shares, key=shares.get) if lead is None else lead
+    monitor["output"]["alarm_test"] = max(shares, key=shares.get) if lead is None else lead
     watching.record_exceeded_tests(monitor)
     watching.find_suspects(monitor)
-    return set(np.flatnonzero(monitor["output"]["suspect"]).tolist())
+    return set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist())
 
 
 @pytest.mark.parametrize(
     ("shares", "who"),
     [
-        ({SPEED: 2.0}, {AIRSPEED, *FORCES}),
-        ({DENSITY: 3.0, SPEED: 2.0}, {AIRSPEED}),
-        ({CLIMB: 2.0}, {ALTITUDE}),
-        ({CLIMB: 3.0, SPEED: 2.0}, set()),  # the altitude is in no other test
-        ({DENSITY: 3.0, CLIMB: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
-        ({RPM: 2.0}, {ENGINE_SPEED}),
-        ({MANIFOLD_PRESSURE: 2.0}, {MANIFOLD}),
-        ({ALPHA_FLOW: 5.0}, {ALPHA, *FORCES}),
-        ({BETA_FLOW: 5.0}, {BETA, *FORCES}),
-        ({ALPHA_FLOW: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
-        ({BETA_FLOW: 2.0}, {BETA, 2, *FORCES}),
-        ({ALPHA_FLOW: 5.0, TURN + 1: 2.0}, {1}),
-        ({BETA_FLOW: 5.0, TURN + 2: 2.0}, {2}),
-        ({BETA_FLOW: 5.0, TURN: 2.0}, {0}),  # no instrument of the flow moves the attitude's tests
-        ({ALPHA_FLOW: 5.0, TURN: 2.0, TURN + 1: 1.5}, set()),
-        ({TURN: 2.1}, {0}),
-        ({TURN + 2: 2.1}, {2}),
-        ({TURN: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
-        ({TURN + 1: 1.9}, {1, THETA}),
-        ({TURN + 1: 2.0, ANGLE + 1: 1.5}, {1, THETA}),
-        ({TURN: 2.0, TURN + 1: 1.5}, set()),
-        ({ANGLE + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
-        ({ANGLE: 2.0, ANGLE + 2: 1.5}, {0, 1, 2}),
+        ({SPEED_TEST: 2.0}, {AIRSPEED, *FORCES}),
+        ({DENSITY_TEST: 3.0, SPEED_TEST: 2.0}, {AIRSPEED}),
+        ({CLIMB_TEST: 2.0}, {ALTITUDE}),
+        ({CLIMB_TEST: 3.0, SPEED_TEST: 2.0}, set()),  # the altitude is in no other test
+        ({DENSITY_TEST: 3.0, CLIMB_TEST: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
+        ({RPM_TEST: 2.0}, {ENGINE_SPEED}),
+        ({MANIFOLD_PRESSURE_TEST: 2.0}, {MANIFOLD}),
+        ({ALPHA_FLOW_TEST: 5.0}, {ALPHA, *FORCES}),
+        ({BETA_FLOW_TEST: 5.0}, {BETA, *FORCES}),
+        ({ALPHA_FLOW_TEST: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
+        ({BETA_FLOW_TEST: 2.0}, {BETA, 2, *FORCES}),
+        ({ALPHA_FLOW_TEST: 5.0, TURN_TEST + 1: 2.0}, {1}),
+        ({BETA_FLOW_TEST: 5.0, TURN_TEST + 2: 2.0}, {2}),
+        ({BETA_FLOW_TEST: 5.0, TURN_TEST: 2.0}, {0}),  # no instrument of the flow moves the attitude's tests
+        ({ALPHA_FLOW_TEST: 5.0, TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
+        ({TURN_TEST: 2.1}, {0}),
+        ({TURN_TEST + 2: 2.1}, {2}),
+        ({TURN_TEST: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
+        ({TURN_TEST + 1: 1.9}, {1, THETA}),
+        ({TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}, {1, THETA}),
+        ({TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
+        ({ANGLE_TEST + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
+        ({ANGLE_TEST: 2.0, ANGLE_TEST + 2: 1.5}, {0, 1, 2}),
     ],
 )
 def test_who_is_suspected_of_what_the_tests_show(shares, who):
@@ -141,18 +145,18 @@ def test_who_is_suspected_of_what_the_tests_show(shares, who):
 
 
 def test_an_angle_that_is_frozen_is_no_gyro_s_doing():
-    shares, still = {TURN + 1: 2.0, ANGLE + 1: 1.5}, np.zeros(N_SENSORS, int)
+    shares, still = {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}, np.zeros(N_SENSORS, int)
     for looks, who in ((2, {1, THETA}), (3, {THETA})):
         still[THETA] = looks
-        assert suspects(shares, identical=still) == who
-    assert suspects({TURN: 2.1}, identical=still) == set()
+        assert suspects(shares, n_identical_samples=still) == who
+    assert suspects({TURN_TEST: 2.1}, n_identical_samples=still) == set()
 
 
 def test_a_large_error_moves_its_neighbours_a_little():
     """What is below a share of the largest of its kind is beyond its bound for a neighbour's sake."""
-    assert suspects({TURN: 100.0, TURN + 1: 2.9}) == {0}
-    assert suspects({TURN: 100.0, TURN + 1: 3.1}) == set()
-    assert suspects({ANGLE: 100.0, ANGLE + 1: 2.9}) == {0, 1, 2, PHI}
+    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 2.9}) == {0}
+    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 3.1}) == set()
+    assert suspects({ANGLE_TEST: 100.0, ANGLE_TEST + 1: 2.9}) == {0, 1, 2, PHI}
 
 
 @pytest.mark.parametrize(
@@ -160,82 +164,100 @@ def test_a_large_error_moves_its_neighbours_a_little():
 )
 def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(airspeed, who):
     """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
-    monitor = with_shares({DENSITY: 0.2})
-    monitor["step"]["test"]["share"][DENSITY] = 2.0
-    monitor["step"]["memory"]["previous"][AIRSPEED], monitor["output"]["lead"] = airspeed, DENSITY
-    monitor["initial"]["refuted"] = 1
-    assert watching.airspeed_error_would_show(monitor) == (who == {QDYN})
+    monitor = with_shares({DENSITY_TEST: 0.2})
+    monitor["redundancy"]["test"]["residual_bound_ratio"][DENSITY_TEST] = 2.0
+    monitor["redundancy"]["memory"]["previous_reading"][AIRSPEED], monitor["output"]["alarm_test"] = (
+        airspeed,
+        DENSITY_TEST,
+    )
+    monitor["initial_errors"]["is_refuted_by_test"] = 1
+    assert watching.airspeed_error_would_exceed_own_test(monitor) == (who == {QDYN})
     watching.find_suspects(monitor)
-    assert set(np.flatnonzero(monitor["output"]["suspect"]).tolist()) == who
-    monitor["memory"]["identical"][AIRSPEED] = 1
+    assert set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist()) == who
+    monitor["memory"]["n_identical_samples"][AIRSPEED] = 1
     watching.find_suspects(monitor)
-    assert monitor["output"]["suspect"][AIRSPEED], "one that stands still may be frozen"
+    assert monitor["output"]["is_suspect"][AIRSPEED], "one that stands still may be frozen"
 
 
-@pytest.mark.parametrize(("say", "who"), [(UNDECIDED, {1, THETA}), (YES, {1}), (NO, {THETA})])
+@pytest.mark.parametrize(
+    ("say", "who"),
+    [(GYRO_ERROR_UNDECIDED, {1, THETA}), (GYRO_ERROR_CONFIRMED, {1}), (GYRO_ERROR_REFUTED, {THETA})],
+)
 def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
-    assert suspects({TURN + 1: 2.0, ANGLE + 1: 1.5}, rates_confirm=(UNDECIDED, say, UNDECIDED)) == who
+    assert (
+        suspects(
+            {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5},
+            gyro_error_verdict=(GYRO_ERROR_UNDECIDED, say, GYRO_ERROR_UNDECIDED),
+        )
+        == who
+    )
 
 
 def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
-    monitor = with_shares({TURN: 0.2, TURN + 1: 0.5, TURN + 2: 0.3})
-    assert [watching.axis_showing_angle(monitor, i) for i in range(3)] == [1, 1, 1]
-    monitor = with_shares({TURN: 0.5, TURN + 1: 0.5, TURN + 2: 0.5})
-    assert [watching.axis_showing_angle(monitor, i) for i in range(3)] == [0, 1, 2]
+    monitor = with_shares({TURN_TEST: 0.2, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.3})
+    assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [1, 1, 1]
+    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.5})
+    assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("known", [0, 1])
 @pytest.mark.parametrize("gyros_excluded", [0, 1])
-@pytest.mark.parametrize("noisy_attitude", [0, 1])
-def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, gyros_excluded, noisy_attitude):
-    fields = {"gyros_excluded": gyros_excluded, "noisy_attitude": noisy_attitude}
-    assert watching.allows_isolation(new_watch(enabled=0, **fields), known)
-    clear = bool(known and (gyros_excluded or not noisy_attitude))
-    assert bool(watching.allows_isolation(new_watch(**fields), known)) == clear
+@pytest.mark.parametrize("attitude_is_noisy", [0, 1])
+def test_a_surface_may_be_named_where_no_gyro_can_be_it(known, gyros_excluded, attitude_is_noisy):
+    fields = {"gyros_excluded": gyros_excluded, "attitude_is_noisy": attitude_is_noisy}
+    assert watching.allows_surface_isolation(new_watch(enabled=0, **fields), known)
+    clear = bool(known and (gyros_excluded or not attitude_is_noisy))
+    assert bool(watching.allows_surface_isolation(new_watch(**fields), known)) == clear
 
 
 @pytest.mark.parametrize(("detected_at_s", "early"), [(2.5, True), (3.49, True), (3.51, False)])
 def test_an_alarm_of_the_first_second_may_be_an_instruments_first_error(detected_at_s, early):
-    assert watching.alarm_is_at_start(new_watch(started_at_s=2.5), detected_at_s) == early
-    assert not watching.alarm_is_at_start(new_watch(enabled=0, started_at_s=2.5), detected_at_s)
+    assert watching.surface_alarm_may_be_initial_error(new_watch(started_at_s=2.5), detected_at_s) == early
+    assert not watching.surface_alarm_may_be_initial_error(
+        new_watch(enabled=0, started_at_s=2.5), detected_at_s
+    )
 
 
 @pytest.mark.parametrize(
     ("flow", "gyro", "share"),
-    [(ALPHA_FLOW, 0, np.tan(0.3) * np.cos(0.2)), (ALPHA_FLOW, 1, 1.0),
-     (ALPHA_FLOW, 2, np.tan(0.3) * np.sin(0.2)), (BETA_FLOW, 0, np.sin(0.2)), (BETA_FLOW, 1, 0.0),
-     (BETA_FLOW, 2, 1.0)],
+    [(ALPHA_FLOW_TEST, 0, np.tan(0.3) * np.cos(0.2)), (ALPHA_FLOW_TEST, 1, 1.0),
+     (ALPHA_FLOW_TEST, 2, np.tan(0.3) * np.sin(0.2)), (BETA_FLOW_TEST, 0, np.sin(0.2)), (BETA_FLOW_TEST, 1,
+     0.0),
+     (BETA_FLOW_TEST, 2, 1.0)],
 )  # fmt: skip
 @pytest.mark.parametrize("less", [0.99, 1.01])
 def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
     """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
     monitor = new_watch()
-    monitor["step"]["memory"]["previous"][[ALPHA, BETA]] = 0.2, -0.3
-    monitor["step"]["test"]["bound"][TURN + gyro] = 40.0
-    own = (flow, gyro) in ((ALPHA_FLOW, 1), (BETA_FLOW, 2))
-    monitor["step"]["test"]["filtered"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
-    assert watching.gyro_may_be_hidden(monitor, flow, gyro, own) == (less < 1.0 and share > 0.0)
+    monitor["redundancy"]["memory"]["previous_reading"][[ALPHA, BETA]] = 0.2, -0.3
+    monitor["redundancy"]["test"]["filtered_bound"][TURN_TEST + gyro] = 40.0
+    own = (flow, gyro) in ((ALPHA_FLOW_TEST, 1), (BETA_FLOW_TEST, 2))
+    monitor["redundancy"]["test"]["filtered_residual"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
+    assert watching.gyro_error_may_be_hidden(monitor, flow, gyro, own) == (less < 1.0 and share > 0.0)
 
 
 @pytest.mark.parametrize("name", ["alpha", "beta", "V", "qdyn"])
 def test_no_surface_is_named_while_a_reading_of_the_flow_stands_still(name):
     """Whatever moves the aircraft moves it; but a sideslip of zero may stay one."""
     i = SENSORS.index(name)
-    monitor = new_watch(noisy_attitude=0)
-    monitor["config"]["longest_identical"], monitor["step"]["memory"]["previous"] = 3, 0.1
+    monitor = new_watch(attitude_is_noisy=0)
+    monitor["config"]["min_frozen_samples"], monitor["redundancy"]["memory"]["previous_reading"] = 3, 0.1
     for still, value, clear in ((2, 0.1, True), (3, 0.1, False), (3, 0.0, True)):
-        monitor["memory"]["identical"][i], monitor["step"]["memory"]["previous"][i] = still, value
-        assert bool(watching.allows_isolation(monitor, 1)) == clear
+        (
+            monitor["memory"]["n_identical_samples"][i],
+            monitor["redundancy"]["memory"]["previous_reading"][i],
+        ) = still, value
+        assert bool(watching.allows_surface_isolation(monitor, 1)) == clear
     (
-        monitor["step"]["memory"]["previous"],
-        monitor["memory"]["identical"],
-        monitor["memory"]["identical"][0],
+        monitor["redundancy"]["memory"]["previous_reading"],
+        monitor["memory"]["n_identical_samples"],
+        monitor["memory"]["n_identical_samples"][0],
     ) = (
         0.1,
         0,
         9,
     )
-    assert watching.allows_isolation(monitor, 1), "a gyro is held against the attitude"
+    assert watching.allows_surface_isolation(monitor, 1), "a gyro is held against the attitude"
 
 
 def test_the_watch_has_the_word_once_it_has_raised_its_alarm():
@@ -246,8 +268,13 @@ def test_the_watch_has_the_word_once_it_has_raised_its_alarm():
 def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
     fdi = new_fdi()
     verdict = fdi["verdict"]
-    verdict["detected"], verdict["detected_at_s"], verdict["isolated"] = at_s >= 0.0, at_s, isolated
-    verdict["isolated_at_s"], verdict["type"], verdict["lead"], verdict["lead_kind"] = at_s, 2, 1, 1
+    verdict["detected"], verdict["detected_at_s"], verdict["isolated_estimator"] = at_s >= 0.0, at_s, isolated
+    (
+        verdict["isolated_at_s"],
+        verdict["fault_type"],
+        verdict["accommodated_surface"],
+        verdict["accommodation_mode"],
+    ) = at_s, 2, 1, 1
     fdi["types"]["surface"]["accommodation"]["mode"] = 1
     fdi["fdae"]["network"]["memory"]["weights"] = fdi["fdae"]["network"]["output"] = 0.3
     return fdi
@@ -260,12 +287,16 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
     assert monitor["output"]["surface_was_isolated"] == (isolated >= 0)
-    assert not monitor["output"]["keeps_surface"]
+    assert not monitor["output"]["keeps_isolated_surface"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
-    assert [verdict[name] for name in ("detected", "isolated", "type")] == [0, NOT_ISOLATED, -1]
+    assert [verdict[name] for name in ("detected", "isolated_estimator", "fault_type")] == [
+        0,
+        NOT_ISOLATED,
+        -1,
+    ]
     assert [verdict[name] for name in ("detected_at_s", "isolated_at_s")] == [-1.0, -1.0]
-    assert [verdict[name] for name in ("lead", "lead_kind")] == [-1, -1]
+    assert [verdict[name] for name in ("accommodated_surface", "accommodation_mode")] == [-1, -1]
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
@@ -276,53 +307,61 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
 def test_a_surface_found_long_before_stays_found():
     monitor, fdi = new_watch(), detected_fdi(9.4, 1)
     on(watching.raise_alarm, fdi, monitor, 10.0)
-    assert monitor["output"]["keeps_surface"]
+    assert monitor["output"]["keeps_isolated_surface"]
     assert monitor["output"]["alarmed_at_s"] == 10.0
-    assert fdi["verdict"]["isolated"] == 1
+    assert fdi["verdict"]["isolated_estimator"] == 1
     monitor, fdi = new_watch(), detected_fdi(9.5, 1)
     on(watching.raise_alarm, fdi, monitor, 10.0)  # half a second is no long time
-    assert not monitor["output"]["keeps_surface"]
+    assert not monitor["output"]["keeps_isolated_surface"]
 
 
 def test_with_nothing_found_before_the_alarm_is_of_now():
     monitor, fdi = new_watch(), detected_fdi()
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed_at_s"] == 10.0
-    assert not monitor["output"]["keeps_surface"]
+    assert not monitor["output"]["keeps_isolated_surface"]
     assert not monitor["output"]["surface_was_isolated"]
 
 
 def test_an_instrument_without_a_reading_is_named_at_once():
     monitor = new_watch()
-    on(watching.decide_sensor, new_fdi(), monitor, seen(BETA, PSI), 5.0)
+    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(BETA, PSI), 5.0)
     assert monitor["output"]["alarmed"]
-    assert monitor["output"]["named"] == BETA
-    assert monitor["output"]["named_at_s"] == 5.0
-    assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == [BETA]
-    on(watching.decide_sensor, new_fdi(), monitor, seen(PSI), 6.0)
-    assert monitor["output"]["named"] == BETA
+    assert monitor["output"]["isolated_sensor"] == BETA
+    assert monitor["output"]["isolated_at_s"] == 5.0
+    assert np.flatnonzero(monitor["output"]["is_replaced"]).tolist() == [BETA]
+    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(PSI), 6.0)
+    assert monitor["output"]["isolated_sensor"] == BETA
 
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
-    monitor = with_shares({CLIMB: 2.0})
-    on(watching.decide_sensor, new_fdi(), monitor, seen(), 5.0)
-    assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
+    monitor = with_shares({CLIMB_TEST: 2.0})
+    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
+    assert (
+        monitor["output"]["alarmed"],
+        monitor["output"]["alarm_test"],
+        monitor["output"]["isolated_sensor"],
+    ) == (
         1,
-        CLIMB,
+        CLIMB_TEST,
         ALTITUDE,
     )
-    monitor = with_shares({ALPHA_FLOW: 2.0})
-    on(watching.decide_sensor, new_fdi(), monitor, seen(), 5.0)
-    assert (monitor["output"]["alarmed"], monitor["output"]["lead"], monitor["output"]["named"]) == (
+    monitor = with_shares({ALPHA_FLOW_TEST: 2.0})
+    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
+    assert (
+        monitor["output"]["alarmed"],
+        monitor["output"]["alarm_test"],
+        monitor["output"]["isolated_sensor"],
+    ) == (
         1,
-        ALPHA_FLOW,
+        ALPHA_FLOW_TEST,
         NO_SENSOR,
     )
-    monitor["step"]["test"]["share"][SPEED] = 9.0
-    on(watching.decide_sensor, new_fdi(), monitor, seen(), 6.0)
-    assert monitor["output"]["lead"] == ALPHA_FLOW  # the first alarm leads
+    monitor["redundancy"]["test"]["residual_bound_ratio"][SPEED_TEST] = 9.0
+    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 6.0)
+    assert monitor["output"]["alarm_test"] == ALPHA_FLOW_TEST  # the first alarm leads
     quiet = new_watch()
-    on(watching.decide_sensor, new_fdi(), quiet, seen(), 5.0)
+    on(watching.isolate_broken_sensor, new_fdi(), quiet, seen(), 5.0)
     assert not quiet["output"]["alarmed"]
 
 
@@ -331,29 +370,51 @@ def asked(
 ):
     """What the rates say by axis; by default the bound of a frame is 1 rad/s2."""
     monitor, fdi = (
-        new_watch(gyro_error=error, previous_gyro_error=then, earlier_spike=spike, **fields),
+        new_watch(
+            apparent_gyro_error=error,
+            previous_apparent_gyro_error=then,
+            earlier_substep_gyro_error_peak=spike,
+            **fields,
+        ),
         new_fdi(),
     )
-    fdi["bank"]["output"]["innovation"], fdi["bound"]["frame"] = innovation, 1.0
+    fdi["bank"]["output"]["innovation"], fdi["bound"]["frame_innovation_bound"] = innovation, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
-    monitor["step"]["test"]["noise"] = noise
-    on(watching.compare_rates_with_dynamics, fdi, monitor)
-    return monitor["memory"]["rates_confirm"].tolist()
+    monitor["redundancy"]["test"]["bound_per_sample"] = noise
+    on(watching.judge_gyro_errors, fdi, monitor)
+    return monitor["memory"]["gyro_error_verdict"].tolist()
 
 
 def test_a_jump_of_a_gyro_is_an_acceleration_and_one_of_the_attitude_is_none():
     jump = 0.3 / DT
-    assert asked(error=(0.3, 0, 0), innovation=(jump, 0, 0)) == [YES, UNDECIDED, UNDECIDED]
-    assert asked(error=(0, 0.3, 0), innovation=(0, 0, 0)) == [UNDECIDED, NO, UNDECIDED]
-    assert asked(error=(0, 0.3, 0), innovation=(0, -jump, 0)) == [UNDECIDED, NO, UNDECIDED]
-    assert asked(error=(0.3, 0, 0), then=(0.3, 0, 0), W=(0.3, 0, 0), W_bound=(0.1, 1, 1)) == [
-        YES,
-        UNDECIDED,
-        UNDECIDED,
+    assert asked(error=(0.3, 0, 0), innovation=(jump, 0, 0)) == [
+        GYRO_ERROR_CONFIRMED,
+        GYRO_ERROR_UNDECIDED,
+        GYRO_ERROR_UNDECIDED,
+    ]
+    assert asked(error=(0, 0.3, 0), innovation=(0, 0, 0)) == [
+        GYRO_ERROR_UNDECIDED,
+        GYRO_ERROR_REFUTED,
+        GYRO_ERROR_UNDECIDED,
+    ]
+    assert asked(error=(0, 0.3, 0), innovation=(0, -jump, 0)) == [
+        GYRO_ERROR_UNDECIDED,
+        GYRO_ERROR_REFUTED,
+        GYRO_ERROR_UNDECIDED,
+    ]
+    assert asked(
+        error=(0.3, 0, 0),
+        then=(0.3, 0, 0),
+        gyro_error_estimate=(0.3, 0, 0),
+        gyro_error_estimate_bound=(0.1, 1, 1),
+    ) == [
+        GYRO_ERROR_CONFIRMED,
+        GYRO_ERROR_UNDECIDED,
+        GYRO_ERROR_UNDECIDED,
     ]
 
 
-@pytest.mark.parametrize(("less", "say"), [(0.999, UNDECIDED), (1.001, NO)])
+@pytest.mark.parametrize(("less", "say"), [(0.999, GYRO_ERROR_UNDECIDED), (1.001, GYRO_ERROR_REFUTED)])
 def test_how_much_an_own_error_may_explain(less, say):
     """Of a jump a tenth, of the error ten per second, twice four noises a frame, and the bound of it."""
     jump, noise = 0.02 / DT, 1e-5
@@ -361,74 +422,102 @@ def test_how_much_an_own_error_may_explain(less, say):
     blur = 4.0 * noise / H
     off = less * (1.0 + own + blur / DT)
     say_ = asked(
-        error=(0.02, 0, 0), innovation=(jump - off, 0, 0), noise=noise, W_bound=(9, 9, 9), W=(0, 0, 0)
+        error=(0.02, 0, 0),
+        innovation=(jump - off, 0, 0),
+        noise=noise,
+        gyro_error_estimate_bound=(9, 9, 9),
+        gyro_error_estimate=(0, 0, 0),
     )
-    assert (say_[0] == NO) == (say == NO)
+    assert (say_[0] == GYRO_ERROR_REFUTED) == (say == GYRO_ERROR_REFUTED)
 
 
-@pytest.mark.parametrize(("error", "say"), [(0.0029, NO), (0.0031, UNDECIDED)])
+@pytest.mark.parametrize(("error", "say"), [(0.0029, GYRO_ERROR_REFUTED), (0.0031, GYRO_ERROR_UNDECIDED)])
 def test_what_has_shown_and_is_gone_is_no_gyros(error, say):
-    assert asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, W_bound=(1, 1, 1))[0] == say
+    assert (
+        asked(error=(error, 0, 0), then=(error, 0, 0), spike=1.0, gyro_error_estimate_bound=(1, 1, 1))[0]
+        == say
+    )
 
 
 def test_a_spike_within_the_attitudes_noise_says_nothing():
     noise = 0.6 * H / 4.0  # a blur of 0.6: below half of which a spike of 1 is none
-    assert asked(spike=1.0, noise=noise, W_bound=(1, 1, 1))[0] == UNDECIDED
-    assert asked(spike=1.21, noise=noise, W_bound=(1, 1, 1))[0] == NO
+    assert asked(spike=1.0, noise=noise, gyro_error_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_UNDECIDED
+    assert asked(spike=1.21, noise=noise, gyro_error_estimate_bound=(1, 1, 1))[0] == GYRO_ERROR_REFUTED
 
 
-@pytest.mark.parametrize(("error", "say"), [(0.99, UNDECIDED), (1.01, NO)])
+@pytest.mark.parametrize(("error", "say"), [(0.99, GYRO_ERROR_UNDECIDED), (1.01, GYRO_ERROR_REFUTED)])
 def test_a_gyros_error_stays_within_what_the_filter_may_have_of_it(error, say):
     error = error * (0.5 + 0.2 + 4.0 * 1e-4 / H) / 0.7
     assert (
-        asked(error=(error,) * 3, then=(error,) * 3, W=(-0.2,) * 3, W_bound=(0.5,) * 3, noise=1e-4)
+        asked(
+            error=(error,) * 3,
+            then=(error,) * 3,
+            gyro_error_estimate=(-0.2,) * 3,
+            gyro_error_estimate_bound=(0.5,) * 3,
+            noise=1e-4,
+        )
         == [say] * 3
     )
 
 
 def test_what_the_rates_have_said_stays_said():
-    assert asked(error=(0, 0.3, 0), rates_confirm=(YES, YES, NO)) == [YES, YES, NO]
+    assert asked(
+        error=(0, 0.3, 0), gyro_error_verdict=(GYRO_ERROR_CONFIRMED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED)
+    ) == [
+        GYRO_ERROR_CONFIRMED,
+        GYRO_ERROR_CONFIRMED,
+        GYRO_ERROR_REFUTED,
+    ]
 
 
-@pytest.mark.parametrize(("first", "say"), [(1.0, UNDECIDED), (0.5, UNDECIDED), (0.2, NO)])
+@pytest.mark.parametrize(
+    ("first", "say"), [(1.0, GYRO_ERROR_UNDECIDED), (0.5, GYRO_ERROR_UNDECIDED), (0.2, GYRO_ERROR_REFUTED)]
+)
 def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     """An error there from the first look on, which brought no innovation: 0.7 of it is within the bound."""
-    monitor = new_watch(begun=1, substep=0, gyro_error=(first, -first, 2.0 * first))
+    monitor = new_watch(start_stage=1, substep=0, apparent_gyro_error=(first, -first, 2.0 * first))
     for substep in (0, 1, 2, 3):
         monitor["memory"]["substep"] = substep
-        watching.allow_for_first_errors(monitor)
-    assert monitor["memory"]["begun"] == 2
-    assert monitor["memory"]["W_bound"].tolist() == [first, first, 2.0 * first], (
+        watching.widen_bound_by_initial_gyro_error(monitor)
+    assert monitor["memory"]["start_stage"] == 2
+    assert monitor["memory"]["gyro_error_estimate_bound"].tolist() == [first, first, 2.0 * first], (
         "once, at the first look of the frame"
     )
     error = (0.7, -0.7, 1.4)
-    assert asked(error=error, then=error, W_bound=monitor["memory"]["W_bound"])[0] == say
+    assert (
+        asked(
+            error=error, then=error, gyro_error_estimate_bound=monitor["memory"]["gyro_error_estimate_bound"]
+        )[0]
+        == say
+    )
 
 
 @pytest.mark.parametrize(("begun", "asked"), [(1, False), (2, False), (3, True)])
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
     monitor, fdi = (
-        with_shares({TURN: 2.0, ANGLE: 1.5}, substep=0, gyro_error=(0, 0.3, 0), begun=begun),
+        with_shares(
+            {TURN_TEST: 2.0, ANGLE_TEST: 1.5}, substep=0, apparent_gyro_error=(0, 0.3, 0), start_stage=begun
+        ),
         new_fdi(),
     )
-    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide_sensor, fdi, monitor, seen(), 5.0)
-    assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
+    on(watching.isolate_broken_sensor, fdi, monitor, seen(), 5.0)
+    assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
 
 
-@pytest.mark.parametrize("quiet", ["error", "then", "previous_spike"])
+@pytest.mark.parametrize("quiet", ["error", "then", "previous_substep_gyro_error_peak"])
 def test_what_comes_again_within_a_frame_is_not_gone(quiet):
-    given = {"error": (0, 0, 0), "then": (0, 0, 0), "previous_spike": 0.0}
-    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == NO
-    given[quiet] = 0.004 if quiet == "previous_spike" else (0.004, 0, 0)
-    assert asked(spike=1.0, W_bound=(1, 1, 1), **given)[0] == UNDECIDED
+    given = {"error": (0, 0, 0), "then": (0, 0, 0), "previous_substep_gyro_error_peak": 0.0}
+    assert asked(spike=1.0, gyro_error_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_REFUTED
+    given[quiet] = 0.004 if quiet == "previous_substep_gyro_error_peak" else (0.004, 0, 0)
+    assert asked(spike=1.0, gyro_error_estimate_bound=(1, 1, 1), **given)[0] == GYRO_ERROR_UNDECIDED
 
 
 def test_the_filter_of_a_gyros_error_follows_it_exactly():
     """W' = -D W + nu with nu = e' + D e, for an e of any course; and the bound of its own uncertainty."""
     rng, frames, fdi = np.random.default_rng(3), 40, new_fdi()
     D = np.array([[3.0, 0.4, -0.2], [0.1, 2.0, 0.3], [-0.5, 0.2, 1.0]])
-    monitor = new_watch(damping=D)
+    monitor = new_watch(rate_damping_per_s=D)
     error = np.vstack([np.zeros(3), rng.normal(size=(frames, 3))])
     bound, eta_bar = np.zeros(3), np.array([0.3, 0.2, 0.1])
     growing = np.abs(D)
@@ -436,35 +525,37 @@ def test_the_filter_of_a_gyros_error_follows_it_exactly():
     fdi["bound"]["eta_bar"] = eta_bar
     for k in range(frames):
         fdi["bank"]["output"]["innovation"] = (error[k + 1] - error[k]) / DT + D @ error[k]
-        watching.update_rate_filter(
+        watching.update_gyro_error_estimate(
             monitor, fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"], fdi["config"]["dt"]
         )
         bound = bound + DT * (eta_bar + growing @ bound)
-    assert monitor["memory"]["W"] == pytest.approx(error[-1])
-    assert monitor["memory"]["W_bound"] == pytest.approx(bound)
+    assert monitor["memory"]["gyro_error_estimate"] == pytest.approx(error[-1])
+    assert monitor["memory"]["gyro_error_estimate_bound"] == pytest.approx(bound)
 
 
 def test_a_bound_of_that_filter_is_never_below_zero():
-    monitor = new_watch(damping=np.diag([200.0, 1.0, 1.0]), W_bound=(1.0, 1.0, 1.0))
-    watching.update_rate_filter(monitor, np.zeros(3), np.zeros(3), DT)
-    assert monitor["memory"]["W_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
+    monitor = new_watch(
+        rate_damping_per_s=np.diag([200.0, 1.0, 1.0]), gyro_error_estimate_bound=(1.0, 1.0, 1.0)
+    )
+    watching.update_gyro_error_estimate(monitor, np.zeros(3), np.zeros(3), DT)
+    assert monitor["memory"]["gyro_error_estimate_bound"] == pytest.approx([0.0, 1 - DT, 1 - DT])
 
 
 @pytest.mark.parametrize(("size", "clear"), [(0.999, 0), (1.001, 1)])
 def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
-    monitor = new_watch(W=(0.0, -0.5, 0.0), W_bound=(0.1, 0.3, 0.1))
-    test = monitor["step"]["test"]
-    test["bound"][:] = 9.0
-    test["bound"][TURN + 1, 0] = 0.02
+    monitor = new_watch(gyro_error_estimate=(0.0, -0.5, 0.0), gyro_error_estimate_bound=(0.1, 0.3, 0.1))
+    test = monitor["redundancy"]["test"]
+    test["filtered_bound"][:] = 9.0
+    test["filtered_bound"][TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
-    test["residual"][TURN + 1] = size * limit + H * 0.5
+    test["residual"][TURN_TEST + 1] = size * limit + H * 0.5
     watching.exclude_gyros(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
-    assert monitor["memory"]["rate_difference"][1] == pytest.approx([size * limit] * 3)
+    assert monitor["memory"]["gyro_error_difference"][1] == pytest.approx([size * limit] * 3)
     watching.exclude_gyros(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
-    assert monitor["memory"]["rate_difference"][1] == pytest.approx(size * limit * kept)
-    assert monitor["memory"]["rate_difference_bound"][1] == pytest.approx(
+    assert monitor["memory"]["gyro_error_difference"][1] == pytest.approx(size * limit * kept)
+    assert monitor["memory"]["gyro_error_difference_bound"][1] == pytest.approx(
         H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99]))
     )
 
@@ -473,40 +564,54 @@ def test_a_watch_begins_with_its_first_look():
     monitor = new_watch(substep=3)
     measured = np.zeros(1, [("signal", "f8", (N_SENSORS,)), ("force", "f8", (3,))]).view(np.recarray)[0]
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
-    monitor["step"]["config"]["gravity"], monitor["step"]["config"]["offset"][ALTITUDE] = 9.8, 0.7
-    monitor["step"]["config"]["drift"], monitor["step"]["config"]["max_airspeed"] = 2e-3, 80.0
+    (
+        monitor["redundancy"]["config"]["gravity_m_s2"],
+        monitor["redundancy"]["config"]["error_offset"][ALTITUDE],
+    ) = 9.8, 0.7
+    (
+        monitor["redundancy"]["config"]["attitude_drift_rad_s"],
+        monitor["redundancy"]["config"]["max_airspeed_mps"],
+    ) = 2e-3, 80.0
     watching.begin_monitor(monitor, measured, 5.0)
-    step = monitor["step"]
-    assert (monitor["memory"]["begun"], monitor["memory"]["substep"]) == (1, 0)
-    assert step["memory"]["previous_error"][[PHI, ALTITUDE]] == pytest.approx(
+    relations = monitor["redundancy"]
+    assert (monitor["memory"]["start_stage"], monitor["memory"]["substep"]) == (1, 0)
+    assert relations["memory"]["previous_error_bound"][[PHI, ALTITUDE]] == pytest.approx(
         [0.01, 0.7]
     )  # drifted since the flight began
-    assert (step["memory"]["earlier_error"] == step["memory"]["previous_error"]).all()
-    assert step["memory"]["previous"][AIRSPEED] == 45.0
-    assert step["memory"]["previous_acceleration"] == pytest.approx([1.0, 2.0, 0.8])
-    assert step["test"]["noise_before"][CLIMB] == pytest.approx(0.7)
-    assert step["test"]["bound_noise"][CLIMB] == pytest.approx([0.7] * 3)
-    assert step["test"]["noise_before"].shape == (N_TESTS,)
+    assert (
+        relations["memory"]["error_bound_two_samples_ago"] == relations["memory"]["previous_error_bound"]
+    ).all()
+    assert relations["memory"]["previous_reading"][AIRSPEED] == 45.0
+    assert relations["memory"]["previous_body_acceleration"] == pytest.approx([1.0, 2.0, 0.8])
+    assert relations["test"]["previous_bound_per_sample"][CLIMB_TEST] == pytest.approx(0.7)
+    assert relations["test"]["filtered_sample_bound"][CLIMB_TEST] == pytest.approx([0.7] * 3)
+    assert relations["test"]["previous_bound_per_sample"].shape == (N_TESTS,)
 
 
 def stood_in(i, signal=(), **fields):
     monitor = new_watch(**fields)
-    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    step = monitor["step"]
-    step["memory"]["predicted"], step["memory"]["command"] = np.arange(N_SENSORS) / 10.0, (1800.0, 20.0)
-    step["memory"]["previous"][[QDYN, AIRSPEED]] = 1000.0, 40.0
-    step["memory"]["previous"][:3], monitor["config"]["trim"] = (0.1, 0.2, 0.3), 7.0
+    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
+    relations = monitor["redundancy"]
+    relations["memory"]["predicted_reading"], relations["memory"]["engine_command"] = (
+        np.arange(N_SENSORS) / 10.0,
+        (1800.0, 20.0),
+    )
+    relations["memory"]["previous_reading"][[QDYN, AIRSPEED]] = 1000.0, 40.0
+    relations["memory"]["previous_reading"][:3], monitor["config"]["trim_reading"] = (0.1, 0.2, 0.3), 7.0
     values = np.zeros(N_SENSORS)
     for sensor, value in dict(signal).items():
         values[sensor] = value
-    belief["f"], belief["G"], belief["u"], belief["u_before"] = (
+    prediction["f"], prediction["G"], prediction["u"], prediction["u_before"] = (
         (1, 2, 3),
         0.5,
         (0.1, 0.2, 0, 0),
         (0.7, 0, 0, 0),
     )
-    step["test"]["residual"][:3], step["test"]["filtered"][:3, 1] = (0.01, 0.02, 0.03), (0.4, 0.5, 0.6)
-    return float(watching.substitute_of(monitor, belief, values, i)), monitor
+    relations["test"]["residual"][:3], relations["test"]["filtered_residual"][:3, 1] = (
+        (0.01, 0.02, 0.03),
+        (0.4, 0.5, 0.6),
+    )
+    return float(watching.estimate_reading(monitor, prediction, values, i)), monitor
 
 
 def test_vanes_are_predicted_and_drift_back_to_trim():
@@ -535,13 +640,13 @@ def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, sub
     u_sum = 0.7 if substep == 0 else 0.3
     acceleration = (1, 2, 3)[gyro] + 0.5 * u_sum
     assert value == pytest.approx((0.1, 0.2, 0.3)[gyro] + (0.01, 0.02, 0.03)[gyro] / H + H * acceleration)
-    assert monitor["memory"]["rate_replaced"][gyro]
+    assert monitor["memory"]["is_rate_replaced"][gyro]
 
 
 def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
     value, _ = stood_in(1, attitude_correction_share=0.1)
     assert value == pytest.approx(0.2 + 10.0 * 0.5 + H * 2.35)
-    value, _ = stood_in(1, attitude_correction_share=0.1, rate_replaced=(0, 1, 0))
+    value, _ = stood_in(1, attitude_correction_share=0.1, is_rate_replaced=(0, 1, 0))
     assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)
 
 
@@ -551,43 +656,43 @@ def looked(monitor, fdi, **signal):
     measured["signal"][AIRSPEED], measured["signal"][QDYN] = 45.0, 1000.0
     for name, value in signal.items():
         measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
-    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    on(watching.monitor_sensors, fdi, monitor, belief, measured, 3.0)
+    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
+    on(watching.monitor_sensors, fdi, monitor, prediction, measured, 3.0)
     return measured
 
 
 def test_looks_of_a_frame_follow_one_another():
     monitor, fdi = new_watch(substep=3), new_fdi()
-    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    monitor["step"]["config"]["gravity"] = monitor["step"]["config"]["offset"] = 0.0
-    monitor["step"]["config"]["offset"][:] = 1.0
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
+    monitor["redundancy"]["config"]["gravity_m_s2"] = monitor["redundancy"]["config"]["error_offset"] = 0.0
+    monitor["redundancy"]["config"]["error_offset"][:] = 1.0
     fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
     looked(monitor, fdi)
-    assert (monitor["memory"]["begun"], monitor["memory"]["substep"]) == (1, 0)
+    assert (monitor["memory"]["start_stage"], monitor["memory"]["substep"]) == (1, 0)
     for k in range(4):
         looked(monitor, fdi, phi=1e-3 * (k % 2))
         assert monitor["memory"]["substep"] == (k + 1) % 4
-    assert monitor["memory"]["W"][0] == pytest.approx(0.5 * DT)  # once a frame
+    assert monitor["memory"]["gyro_error_estimate"][0] == pytest.approx(0.5 * DT)  # once a frame
     # the gyro's error as the frame began, and the largest inside it: the attitude moved, the rates did not
-    assert monitor["memory"]["gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert monitor["memory"]["spike"][0] == pytest.approx(1e-3 / H, rel=1e-3)
-    before = monitor["memory"]["spike"].copy()
+    assert monitor["memory"]["apparent_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert monitor["memory"]["substep_gyro_error_peak"][0] == pytest.approx(1e-3 / H, rel=1e-3)
+    before = monitor["memory"]["substep_gyro_error_peak"].copy()
     looked(monitor, fdi, phi=2e-3)
-    assert monitor["memory"]["gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
-    assert monitor["memory"]["previous_spike"] == pytest.approx(before)
-    assert not monitor["memory"]["spike"].any()
-    assert monitor["memory"]["previous_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
-    assert monitor["memory"]["W"][0] == pytest.approx(2 * 0.5 * DT)
+    assert monitor["memory"]["apparent_gyro_error"][0] == pytest.approx(-1e-3 / H, rel=1e-2)
+    assert monitor["memory"]["previous_substep_gyro_error_peak"] == pytest.approx(before)
+    assert not monitor["memory"]["substep_gyro_error_peak"].any()
+    assert monitor["memory"]["previous_apparent_gyro_error"] == pytest.approx(np.zeros(3), abs=1e-12)
+    assert monitor["memory"]["gyro_error_estimate"][0] == pytest.approx(2 * 0.5 * DT)
 
 
 def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
     monitor, fdi = new_watch(), new_fdi()
-    fdi["bound"]["frame"], fdi["bank"]["output"]["threshold"] = 1.0, 1.0
+    fdi["bound"]["frame_innovation_bound"], fdi["bank"]["output"]["threshold"] = 1.0, 1.0
     looked(monitor, fdi)
     looked(monitor, fdi)
     assert not monitor["output"]["alarmed"]
     measured = looked(monitor, fdi, altitude=50.0)
-    assert monitor["output"]["named"] == ALTITUDE
+    assert monitor["output"]["isolated_sensor"] == ALTITUDE
     assert abs(measured["signal"][ALTITUDE]) < 0.1
     assert abs(measured["altitude"]) < 0.1
 
@@ -596,13 +701,16 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
 def test_the_rates_are_asked_once_a_frame(substep, asked):
     monitor, fdi = (
         with_shares(
-            {TURN: 2.0, ANGLE: 1.5}, substep=substep, gyro_error=(0, 0.3, 0), begun=watching.MONITOR_RUNNING
+            {TURN_TEST: 2.0, ANGLE_TEST: 1.5},
+            substep=substep,
+            apparent_gyro_error=(0, 0.3, 0),
+            start_stage=watching.RATES_COMPARABLE_STAGE,
         ),
         new_fdi(),
     )
-    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame"] = 1.0, 1.0
-    on(watching.decide_sensor, fdi, monitor, seen(), 5.0)
-    assert (monitor["memory"]["rates_confirm"][1] == NO) == asked
+    fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
+    on(watching.isolate_broken_sensor, fdi, monitor, seen(), 5.0)
+    assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
 
 
 @pytest.mark.parametrize(
@@ -618,20 +726,23 @@ def test_the_rates_are_asked_once_a_frame(substep, asked):
 def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is_made_of(
     broken, engine, shared, slipstream, missing
 ):
-    monitor, measured = new_watch(engine=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
-    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    monitor["step"]["memory"]["predicted"], monitor["step"]["memory"]["command"] = 0.1, (1800.0, 20.0)
-    monitor["step"]["memory"]["previous"][[QDYN, AIRSPEED]] = 1000.0, 44.0
+    monitor, measured = new_watch(has_engine_sensors=engine), np.zeros(1, MEASURED).view(np.recarray)[0]
+    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
+    (
+        monitor["redundancy"]["memory"]["predicted_reading"],
+        monitor["redundancy"]["memory"]["engine_command"],
+    ) = 0.1, (1800.0, 20.0)
+    monitor["redundancy"]["memory"]["previous_reading"][[QDYN, AIRSPEED]] = 1000.0, 44.0
     measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0
     measured["signal"][[AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD]] = 45.0, 1036.0, 1900.0, 21.0
     for i in broken:
         if missing:
             measured["missing"][i] = 1
         else:
-            monitor["output"]["replaced"][i] = 1
+            monitor["output"]["is_replaced"][i] = 1
     before = measured["signal"].copy()
-    watching.replace_readings(monitor, belief, measured)
-    assert np.flatnonzero(monitor["output"]["replaced"]).tolist() == sorted(broken)
+    watching.replace_isolated_readings(monitor, prediction, measured)
+    assert np.flatnonzero(monitor["output"]["is_replaced"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
     assert (measured["y"][DPT] != 9.0) == slipstream
@@ -643,74 +754,85 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
 def test_at_its_bound_a_test_is_within_it():
     """Shares of exactly one, and residuals of exactly the share that neighbours explain, are no suspicion."""
     at_first = {ALPHA, BETA, AIRSPEED, PHI, THETA}  # nothing is beyond what a first error may have done
-    assert suspects({TURN: 1.0, TURN + 1: 1.0}, lead=TURN) == {0, 1, 2, PSI} | at_first
-    assert suspects({ANGLE: 2.0, ANGLE + 1: 1.0}) == {0, 1, 2, PHI}
-    assert suspects({TURN: 100.0, TURN + 1: 100.0 * watching.INVOLVED_SHARE}) == {0}
-    assert suspects({SPEED: 1.0, DENSITY: 1.0}, lead=DENSITY) == {QDYN} | at_first
+    assert suspects({TURN_TEST: 1.0, TURN_TEST + 1: 1.0}, lead=TURN_TEST) == {0, 1, 2, PSI} | at_first
+    assert suspects({ANGLE_TEST: 2.0, ANGLE_TEST + 1: 1.0}) == {0, 1, 2, PHI}
+    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 100.0 * watching.MIN_SHARE_OF_LARGEST_RESIDUAL}) == {0}
+    assert suspects({SPEED_TEST: 1.0, DENSITY_TEST: 1.0}, lead=DENSITY_TEST) == {QDYN} | at_first
 
 
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
     """The others have less of it, or more of what was before."""
-    monitor = with_shares({TURN: 0.5, TURN + 1: 2.0}, lead=TURN + 1)
-    monitor["step"]["test"]["filtered"][TURN : TURN + 3, 1:] = 1e3
-    monitor["step"]["test"]["filtered"][TURN, 0] = 50.0
-    assert watching.is_involved(monitor, TURN + 1, TURN)
-    monitor["step"]["test"]["filtered"][TURN, 0] = 70.0
-    assert not watching.is_involved(monitor, TURN + 1, TURN)
-    monitor["step"]["test"]["filtered"][TURN, 0], monitor["step"]["test"]["filtered"][TURN + 2, 0] = (
+    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test=TURN_TEST + 1)
+    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST : TURN_TEST + 3, 1:] = 1e3
+    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 50.0
+    assert watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 70.0
+    assert not watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    (
+        monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0],
+        monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST + 2, 0],
+    ) = (
         0.0,
         -70.0,
     )
-    assert not watching.is_involved(monitor, TURN + 1, TURN)
-    for c in (TURN, ANGLE):
+    assert not watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    for c in (TURN_TEST, ANGLE_TEST):
         small = new_watch()
-        small["step"]["test"]["share"][c], small["step"]["test"]["filtered"][c, 0] = 2.0, 1e-6
-        assert watching.is_involved(small, c, c), "of small residuals the largest is involved"
+        (
+            small["redundancy"]["test"]["residual_bound_ratio"][c],
+            small["redundancy"]["test"]["filtered_residual"][c, 0],
+        ) = 2.0, 1e-6
+        assert watching.exceeds_beyond_cross_coupling(small, c, c), (
+            "of small residuals the largest is involved"
+        )
 
 
 def test_angles_are_held_against_angles_and_rates_against_rates():
-    assert suspects({TURN + 2: 100.0, ANGLE: 2.0}) == {2, PHI}
-    assert suspects({ANGLE: 100.0, TURN + 2: 2.0}, lead=TURN + 2) == {2, PHI}
+    assert suspects({TURN_TEST + 2: 100.0, ANGLE_TEST: 2.0}) == {2, PHI}
+    assert suspects({ANGLE_TEST: 100.0, TURN_TEST + 2: 2.0}, lead=TURN_TEST + 2) == {2, PHI}
 
 
 def test_suspicions_of_the_frame_before_are_gone():
-    monitor = with_shares({CLIMB: 2.0}, lead=CLIMB)
-    monitor["output"]["suspect"] = 1
+    monitor = with_shares({CLIMB_TEST: 2.0}, alarm_test=CLIMB_TEST)
+    monitor["output"]["is_suspect"] = 1
     watching.record_exceeded_tests(monitor)
     watching.find_suspects(monitor)
-    assert np.flatnonzero(monitor["output"]["suspect"]).tolist() == [ALTITUDE]
+    assert np.flatnonzero(monitor["output"]["is_suspect"]).tolist() == [ALTITUDE]
 
 
 def test_an_alarm_on_roll_counts_as_one():
     """The first axis of the bank has number 0, and no axis is -1."""
-    monitor, fdi = new_watch(gyro_error=(0.0, 0.3, 0.0), W_bound=(9.0, 9.0, 9.0)), new_fdi()
+    monitor, fdi = (
+        new_watch(apparent_gyro_error=(0.0, 0.3, 0.0), gyro_error_estimate_bound=(9.0, 9.0, 9.0)),
+        new_fdi(),
+    )
     (
-        fdi["bound"]["frame"],
+        fdi["bound"]["frame_innovation_bound"],
         fdi["bank"]["output"]["threshold"][:3],
-        monitor["memory"]["previous_gyro_error"],
+        monitor["memory"]["previous_apparent_gyro_error"],
     ) = (
         1.0,
         1.0,
         (0.0, 0.3, 0.0),
     )
     fdi["bank"]["output"]["residual"][0, 0] = 2.0
-    on(watching.compare_rates_with_dynamics, fdi, monitor)
-    assert monitor["memory"]["rates_confirm"].tolist() == [YES] * 3
+    on(watching.judge_gyro_errors, fdi, monitor)
+    assert monitor["memory"]["gyro_error_verdict"].tolist() == [GYRO_ERROR_CONFIRMED] * 3
 
 
 def test_what_is_named_is_replaced_and_flags_are_one():
     monitor = new_watch()
-    watching.name_sensor(monitor, CLIMB, 3.0)
-    assert monitor["output"]["replaced"][CLIMB] == 1
+    watching.isolate_sensor(monitor, CLIMB_TEST, 3.0)
+    assert monitor["output"]["is_replaced"][CLIMB_TEST] == 1
     monitor = new_watch()
     on(watching.raise_alarm, detected_fdi(9.4, 1), monitor, 10.0)
-    assert (monitor["output"]["keeps_surface"], monitor["output"]["alarmed"]) == (1, 1)
+    assert (monitor["output"]["keeps_isolated_surface"], monitor["output"]["alarmed"]) == (1, 1)
 
 
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
-    for noisy_attitude in (0, 1):
-        monitor, fdi = new_watch(noisy_attitude=noisy_attitude, begun=1, substep=1), new_fdi()
-        monitor["memory"]["W"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
-        monitor["step"]["config"]["offset"][:] = 1.0
+    for attitude_is_noisy in (0, 1):
+        monitor, fdi = new_watch(attitude_is_noisy=attitude_is_noisy, start_stage=1, substep=1), new_fdi()
+        monitor["memory"]["gyro_error_estimate"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
+        monitor["redundancy"]["config"]["error_offset"][:] = 1.0
         looked(monitor, fdi)
-        assert bool(monitor["memory"]["rate_difference"].any()) == bool(noisy_attitude)
+        assert bool(monitor["memory"]["gyro_error_difference"].any()) == bool(attitude_is_noisy)

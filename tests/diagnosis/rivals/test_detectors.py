@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.context import Context, Declared
-from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.rivals.kalman import Air
-from beaver_ftc.diagnosis.rivals.observer import Fit, residual_deviation
-from beaver_ftc.diagnosis.rivals.rls import Pair
+from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis.rivals.kalman import GustStates
+from beaver_ftc.diagnosis.rivals.observer import SurfaceFit, healthy_residual_std
+from beaver_ftc.diagnosis.rivals.rls import InputOutputPair
 from beaver_ftc.plugins import DETECTORS, plugin_class
 
 DT = 0.01
@@ -197,13 +197,13 @@ def test_the_observers_threshold_is_the_deviation_of_its_residual(pole_per_s):
     for measured in flight(duration_s=400, noise=0.0, air=declared):
         detector.step(measured, np.zeros(4))
         residuals.append(detector.eps)
-    expected = residual_deviation(still, np.exp(-pole_per_s * DT))
+    expected = healthy_residual_std(still, np.exp(-pole_per_s * DT))
     assert np.std(residuals[500:], axis=0) == pytest.approx(expected, rel=0.15)
 
 
 def test_air_that_is_not_declared_has_no_states():
-    assert Air(context()).n == 0
-    assert Air(context(GUSTY)).n == 3
+    assert GustStates(context()).n_states == 0
+    assert GustStates(context(GUSTY)).n_states == 3
 
 
 def test_on_a_linear_plant_the_unscented_filter_is_the_extended_one():
@@ -239,10 +239,10 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
     rng = np.random.default_rng(3)
     eps, Omega = rng.normal(size=(40, 3)), rng.normal(size=(40, 3, 3))
     eps += -0.4 * Omega[:, :, 1]
-    fit = Fit(1.0)
+    fit = SurfaceFit(1.0)
     for e, omega in zip(eps, Omega, strict=True):
         fit.step(e, omega)
-    surface, theta, misfit = fit.best()
+    surface, theta, misfit = fit.best_surface()
     solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
     assert surface == 1
     assert theta == pytest.approx(solution)
@@ -252,13 +252,13 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():
     """y[k] = 1.6 y[k-1] - 0.7 y[k-2] + b u[k-1]: predicted once learnt, an alarm when b halves."""
     rng = np.random.default_rng(5)
-    pair, y, scores = Pair(0.999, 0.995, 1e-4), [0.0, 0.0], []
+    pair, y, scores = InputOutputPair(0.999, 0.995, 1e-4), [0.0, 0.0], []
     u = rng.normal(size=3000)
     for k in range(2, 3000):
         b = 0.5 if k < 2500 else 0.25
         y.append(1.6 * y[-1] - 0.7 * y[-2] + b * u[k - 1] + 1e-3 * rng.normal())
         scores.append(pair.step(u[k], y[-1]))
-    assert pair._model.w[:2] == pytest.approx([1.6, -0.7], abs=0.02)
+    assert pair._model.weights[:2] == pytest.approx([1.6, -0.7], abs=0.02)
     assert max(scores[1500:2497]) < 8.0
     assert max(scores[2497:2510]) > 20.0
 
@@ -288,14 +288,14 @@ def test_the_multiple_models_alarm_by_the_odds_of_any_fault():
     """Beside evens the statistic is zero; odds of e^alarm are one, and no alarm yet."""
     models = plugin_class(DETECTORS, "multiple-models")()
     models.reset(context(alarm=2.0))
-    assert models.probability.sum() == pytest.approx(1.0, abs=1e-14)
-    assert models.probability[0] <= 1.0
+    assert models.mode_probability.sum() == pytest.approx(1.0, abs=1e-14)
+    assert models.mode_probability[0] <= 1.0
     for odds, statistic in ((1.0, 0.0), (np.exp(1.0), 0.5), (np.exp(-2.0), -1.0)):
-        models.probability[:] = odds / (1.0 + odds) / (len(models.probability) - 1)
-        models.probability[0] = 1.0 / (1.0 + odds)
+        models.mode_probability[:] = odds / (1.0 + odds) / (len(models.mode_probability) - 1)
+        models.mode_probability[0] = 1.0 / (1.0 + odds)
         assert models.verdict().statistic == pytest.approx(statistic)
         assert not models.verdict().detected
-    models.probability[0] = 1.0 / (1.0 + np.exp(2.1))
+    models.mode_probability[0] = 1.0 / (1.0 + np.exp(2.1))
     assert models.verdict().detected
 
 
@@ -305,6 +305,6 @@ def test_the_observer_names_nothing_until_its_statistic_is_over_one():
     detector.reset(context(pole_per_s=10.0))
     still = (np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND)
     detector.step(Measured(0.0, np.zeros(3), *still), np.zeros(4))
-    at = detector.scale * np.array([0.0, 1.0, 0.0])
+    at = detector.threshold * np.array([0.0, 1.0, 0.0])
     found = detector.step(Measured(DT, at, *still), np.zeros(4))
     assert (found.statistic, found.detected) == (1.0, False)

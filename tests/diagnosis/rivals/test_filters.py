@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from beaver_ftc.diagnosis.rivals.imm import mix, posterior, transition
-from beaver_ftc.diagnosis.rivals.kalman import log_likelihood, normalised_square, sigma_points, update
+from beaver_ftc.diagnosis.rivals.imm import mix_states, posterior_probabilities, transition_matrix
+from beaver_ftc.diagnosis.rivals.kalman import (
+    log_likelihood,
+    normalised_innovation_square,
+    sigma_points,
+    update_state,
+)
 from beaver_ftc.diagnosis.rivals.rls import RecursiveLeastSquares
 
 RNG = np.random.default_rng(7)
@@ -24,7 +29,7 @@ def test_an_update_is_the_conditional_gaussian():
     S = H @ P @ H.T + R
     mean = z + P @ H.T @ np.linalg.inv(S) @ (y - H @ z)
     covariance = np.linalg.inv(np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H)  # the information form
-    got_z, got_P, got_S = update(z, P, y - z[:2], R)
+    got_z, got_P, got_S = update_state(z, P, y - z[:2], R)
     assert got_z == pytest.approx(mean)
     assert got_P == pytest.approx(covariance)
     assert got_S == pytest.approx(S)
@@ -37,7 +42,7 @@ def test_a_filter_run_is_the_batch_posterior():
     z, P = np.zeros(1), np.eye(1)
     for value in y:
         P = P + q
-        z, P, _ = update(z, P, np.array([value]) - z, np.array([[r]]))
+        z, P, _ = update_state(z, P, np.array([value]) - z, np.array([[r]]))
     walk = 1.0 + q * (1.0 + np.minimum.outer(np.arange(n), np.arange(n)))
     gain = walk @ np.linalg.inv(walk + r * np.eye(n))
     assert z[0] == pytest.approx((gain @ y)[-1])
@@ -48,16 +53,16 @@ def test_the_variance_settles_at_the_riccati_equations_root():
     q, r = 0.02, 0.5
     P = np.eye(1)
     for _ in range(500):
-        _, P, _ = update(np.zeros(1), P + q, np.zeros(1), np.array([[r]]))
+        _, P, _ = update_state(np.zeros(1), P + q, np.zeros(1), np.array([[r]]))
     assert P[0, 0] == pytest.approx((-q + np.sqrt(q * q + 4 * q * r)) / 2)
 
 
 def test_a_stack_of_filters_is_each_filter_alone():
     z, nu, R = RNG.normal(size=(4, 3)), RNG.normal(size=(4, 3)), _covariance(3)
     P = np.array([_covariance(3) for _ in range(4)])
-    together = update(z, P, nu, R)
+    together = update_state(z, P, nu, R)
     for i in range(4):
-        for all_of_them, alone in zip(together, update(z[i], P[i], nu[i], R), strict=True):
+        for all_of_them, alone in zip(together, update_state(z[i], P[i], nu[i], R), strict=True):
             assert all_of_them[i] == pytest.approx(alone)
 
 
@@ -65,7 +70,7 @@ def test_likelihood_and_square_are_the_gaussians():
     S = _covariance(3)
     nu = RNG.multivariate_normal(np.zeros(3), S, size=20_000)
     assert log_likelihood(nu[:5], S) == pytest.approx(multivariate_normal(np.zeros(3), S).logpdf(nu[:5]))
-    share = np.mean(normalised_square(nu, S) > chi2.ppf(0.99, 3))
+    share = np.mean(normalised_innovation_square(nu, S) > chi2.ppf(0.99, 3))
     assert share == pytest.approx(0.01, abs=0.002)
 
 
@@ -96,7 +101,7 @@ def test_recursive_least_squares_is_the_weighted_batch_solution():
     weight = forgetting ** np.arange(n)[::-1]
     information = phi.T @ (phi * weight[:, None]) + np.eye(4) * forgetting**n / prior
     # the cap on P touches the first samples only, which are all but forgotten
-    assert rls.w == pytest.approx(np.linalg.solve(information, phi.T @ (weight * y)), rel=1e-4)
+    assert rls.weights == pytest.approx(np.linalg.solve(information, phi.T @ (weight * y)), rel=1e-4)
 
 
 def test_recursive_least_squares_does_not_wind_up_without_excitation():
@@ -112,7 +117,7 @@ def test_without_switching_the_modes_are_weighed_by_bayes_rule():
     likelihoods = RNG.normal(size=(15, 3))
     probability = np.array([0.2, 0.3, 0.5])
     for row in likelihoods:
-        probability = posterior(probability, row)
+        probability = posterior_probabilities(probability, row)
     expected = np.array([0.2, 0.3, 0.5]) * np.exp(likelihoods.sum(axis=0))
     assert probability == pytest.approx(expected / expected.sum(), abs=1e-9)
 
@@ -120,21 +125,21 @@ def test_without_switching_the_modes_are_weighed_by_bayes_rule():
 def test_mixing_keeps_the_mixtures_mean_and_covariance():
     """What is mixed and weighed again is the same distribution in its first two moments."""
     x, P = RNG.normal(size=(3, 2)), np.array([_covariance(2) for _ in range(3)])
-    probability, chain = np.array([0.5, 0.3, 0.2]), transition(0.9, 3)
+    probability, chain = np.array([0.5, 0.3, 0.2]), transition_matrix(0.9, 3)
 
     def moments(p, mean, covariance):
         centre = p @ mean
         off = mean - centre
         return centre, np.einsum("i,iab->ab", p, covariance + off[:, :, None] * off[:, None, :])
 
-    mixed_x, mixed_P, predicted = mix(x, P, probability, chain)
+    mixed_x, mixed_P, predicted = mix_states(x, P, probability, chain)
     assert predicted == pytest.approx(probability @ chain)
     for before, after in zip(moments(probability, x, P), moments(predicted, mixed_x, mixed_P), strict=True):
         assert after == pytest.approx(before)
 
 
 def test_a_chain_keeps_probability():
-    chain = transition(0.99, 5)
+    chain = transition_matrix(0.99, 5)
     assert chain.sum(axis=1) == pytest.approx(np.ones(5))
     assert np.linalg.matrix_power(chain, 5000)[0] == pytest.approx(np.full(5, 0.2), abs=1e-6)
 

@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.context import Context, Declared
-from beaver_ftc.diagnosis.base import Measured
-from beaver_ftc.diagnosis.rivals.effectiveness import AugmentedEkf, AugmentedUkf, EffectivenessFilter, N
-from beaver_ftc.diagnosis.rivals.kalman import Air, unexplained, update
-from beaver_ftc.diagnosis.rivals.rls import Pair, RecursiveLeastSquares, RlsMonitor
+from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis.rivals.effectiveness import (
+    N_STATES,
+    AugmentedEkf,
+    AugmentedUkf,
+    EffectivenessFilter,
+)
+from beaver_ftc.diagnosis.rivals.kalman import GustStates, unexplained_acceleration_size, update_state
+from beaver_ftc.diagnosis.rivals.rls import InputOutputPair, RecursiveLeastSquares, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
 GUSTY = Declared(
@@ -50,41 +55,43 @@ def started(declared=None, **options):
 
 
 def test_the_air_is_a_first_order_process_of_each_axis():
-    air, none = Air(context(GUSTY)), Air(context())
+    air, none = GustStates(context(GUSTY)), GustStates(context())
     keep = np.exp(-DT / GUSTY.gust_time_s)
-    assert (air.n, none.n, none.keep.size, none.effect.shape) == (3, 0, 0, (3, 0))
-    assert air.keep == pytest.approx(keep)
-    assert air.variance == pytest.approx(GUSTY.gust_rad_s**2)
+    assert (air.n_states, none.n_states, none.decay_factor.size, none.rate_effect.shape) == (3, 0, 0, (3, 0))
+    assert air.decay_factor == pytest.approx(keep)
+    assert air.initial_variance == pytest.approx(GUSTY.gust_rad_s**2)
     # In the long run as large as it was at the start.
-    assert keep**2 * air.variance + air.noise == pytest.approx(air.variance)
-    assert air.effect == pytest.approx(DT * GUSTY.gust_effect)
+    assert keep**2 * air.initial_variance + air.process_noise_variance == pytest.approx(air.initial_variance)
+    assert air.rate_effect == pytest.approx(DT * GUSTY.gust_effect)
 
 
 def test_what_is_declared_adds_by_squares():
     gyro = np.hypot(GUSTY.noise[:3], 0.01 / sqrt(12.0))
     assert np.sqrt(GUSTY.rate_variance(0.004)) == pytest.approx(np.hypot(0.004, gyro))
-    assert unexplained(context(GUSTY), 9.0 * BOUND) == pytest.approx(np.hypot(BOUND, [0.04, 0.0, 0.1]))
-    assert unexplained(context(), 9.0 * BOUND).tolist() == (9.0 * BOUND).tolist()
+    assert unexplained_acceleration_size(context(GUSTY), 9.0 * BOUND) == pytest.approx(
+        np.hypot(BOUND, [0.04, 0.0, 0.1])
+    )
+    assert unexplained_acceleration_size(context(), 9.0 * BOUND).tolist() == (9.0 * BOUND).tolist()
 
 
 def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
     detector = started(GUSTY, misfit_s=0.25, measurement_rad_s=0.004, drift_per_s=0.3)
     rates = GUSTY.rate_variance(0.004)
-    assert (detector.n, detector.z.tolist()) == (N + 3, [0.0] * 9)
+    assert (detector.n_states, detector.z.tolist()) == (N_STATES + 3, [0.0] * 9)
     assert np.diag(detector.P) == pytest.approx([*rates, 0.01, 0.01, 0.01, *GUSTY.gust_rad_s**2])
     assert np.count_nonzero(detector.P) == 9
     assert pytest.approx(np.diag(rates)) == detector.R
-    assert detector.Q_theta == pytest.approx(0.3**2 * DT)
-    assert detector.fade == pytest.approx(exp(-DT / 0.25))
-    assert (detector.square, detector.detected) == (3.0, False)
-    assert started().n == N
+    assert detector.theta_walk_variance == pytest.approx(0.3**2 * DT)
+    assert detector.averaging_decay == pytest.approx(exp(-DT / 0.25))
+    assert (detector.mean_innovation_square, detector.detected) == (3.0, False)
+    assert started().n_states == N_STATES
 
 
 def test_its_noise_is_the_bounds_the_walks_and_the_airs():
     detector = started(GUSTY, noise=2.0, drift_per_s=0.3)
-    size = unexplained(detector.context, BOUND)
-    expected = [*(DT * 2.0 * size) ** 2, *[0.3**2 * DT] * 3, *detector.air.noise]
-    assert detector.process_noise(seen()) == pytest.approx(expected)
+    size = unexplained_acceleration_size(detector.context, BOUND)
+    expected = [*(DT * 2.0 * size) ** 2, *[0.3**2 * DT] * 3, *detector.gust_states.process_noise_variance]
+    assert detector.process_noise_variances(seen()) == pytest.approx(expected)
 
 
 def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
@@ -97,7 +104,7 @@ def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
     z, P, square = detector.z.copy(), detector.P.copy(), 3.0
     for x in ((0.3, 0.4, 0.1), (0.2, 0.3, 0.2), (900.0, 0.0, 0.0)):
         nu = np.array(x) - z[:3]
-        z, P, S = update(z, P, nu, detector.R)
+        z, P, S = update_state(z, P, nu, detector.R)
         z[3:6] = np.clip(z[3:6], -1.0, 1.0)
         of_it = nu @ np.linalg.inv(S) @ nu
         square = exp(-DT / 0.1) * square + (1.0 - exp(-DT / 0.1)) * min(of_it, 1e6)
@@ -105,21 +112,21 @@ def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
         verdict = detector.step(seen(x), np.zeros(4))
         assert verdict.statistic == pytest.approx(of_it / 10.0)
         assert detector.z == pytest.approx(z)
-        assert detector.square == pytest.approx(square)
+        assert detector.mean_innovation_square == pytest.approx(square)
     assert np.abs(z[3:6]).max() == 1.0
     assert of_it > 1e6
 
 
 def named(theta, variance=(0.01, 0.01, 0.01), square=3.0, statistic=2.0, **options):
     detector = started(**{"misfit": 3.0, **options})
-    detector.z[3:6], detector.square = theta, square
+    detector.z[3:6], detector.mean_innovation_square = theta, square
     detector.P[range(3, 6), range(3, 6)] = variance
     return detector, detector.verdict(seen(), statistic)
 
 
 def test_the_surface_most_significantly_off_is_named():
     detector, verdict = named((-0.2, -0.5, -0.3), (0.01, 0.25, 0.01))
-    assert detector.significance() == pytest.approx([4.0, 1.0, 9.0])
+    assert detector.wald_statistics() == pytest.approx([4.0, 1.0, 9.0])
     assert (verdict.axis, verdict.isolated, verdict.type) == ("r", "rudder", "loss_of_effectiveness")
     assert verdict.estimate == pytest.approx(-0.3)
     assert verdict.effectiveness == pytest.approx([0.8, 0.5, 0.7, 1.0])
@@ -147,7 +154,7 @@ def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, squ
 def test_a_pairs_score_is_of_errors_against_those_before():
     """The model of least_squares.py, and mean and variance of its errors, both fading."""
     rng, fade, floor = np.random.default_rng(5), 0.9, 0.01
-    pair, model = Pair(0.98, fade, floor), RecursiveLeastSquares(5, 0.98, 1e4)
+    pair, model = InputOutputPair(0.98, fade, floor), RecursiveLeastSquares(5, 0.98, 1e4)
     inputs, outputs = rng.normal(size=(2, 40))
     mean = variance = 0.0
     for k in range(40):
@@ -159,7 +166,7 @@ def test_a_pairs_score_is_of_errors_against_those_before():
         )
         mean = fade * mean + (1.0 - fade) * error
         variance = fade * variance + (1.0 - fade) * (error - mean) ** 2
-        assert (pair.mean, pair.variance) == pytest.approx((mean, variance))
+        assert (pair.error_mean, pair.error_variance) == pytest.approx((mean, variance))
 
 
 class Scores:
@@ -193,8 +200,8 @@ def test_a_monitor_forgets_and_averages_over_its_times_and_doubts_a_gyro():
     monitor = RlsMonitor()
     monitor.reset(context(GUSTY, forgetting_s=2.0, score_s=0.5, floor_rad_s=0.004))
     floors = np.hypot(0.004, GUSTY.gyro_rad_s)
-    assert [pair._floor for pair in monitor.pairs] == pytest.approx(list(floors))
-    assert monitor.pairs[0]._fade == pytest.approx(exp(-DT / 0.5))
+    assert [pair._min_error_std for pair in monitor.pairs] == pytest.approx(list(floors))
+    assert monitor.pairs[0]._averaging_decay == pytest.approx(exp(-DT / 0.5))
 
 
 class Curved:

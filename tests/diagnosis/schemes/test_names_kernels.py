@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi
 
-from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN, record_named
-from beaver_ftc.diagnosis.schemes import record_named_surfaces
+from beaver_ftc.diagnosis.conclusion import MAX_WITHDRAWN_ISOLATIONS, update_isolation_interval
+from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 
 AILERON, ELEVATOR, RUDDER, FLAP = range(4)
@@ -17,7 +17,7 @@ AILERON, ELEVATOR, RUDDER, FLAP = range(4)
 
 def nameless():
     fdi = new_fdi()
-    fdi["verdict"]["named_from_s"], fdi["verdict"]["isolated"] = -1.0, NOT_ISOLATED
+    fdi["verdict"]["isolated_from_s"], fdi["verdict"]["isolated_estimator"] = -1.0, NOT_ISOLATED
     fdi["isolation"]["estimator"]["surface"][:4] = range(4)
     return fdi
 
@@ -38,16 +38,16 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
     conclusion = nameless()["verdict"]
     for k, named in enumerate(frames):
         for s, is_named in zip((ELEVATOR, FLAP), named, strict=True):
-            record_named(conclusion, s, is_named, float(k))
+            update_isolation_interval(conclusion, s, is_named, float(k))
     expected = sorted(
         (to, s, start)
         for s, column in zip((ELEVATOR, FLAP), zip(*frames, strict=True), strict=False)
         for start, to in spells(column)
     )
-    assert conclusion["n_withdrawn"] == len(expected)
-    if len(expected) > MAX_WITHDRAWN:
-        expected = [*expected[: MAX_WITHDRAWN - 1], expected[-1]]
-    kept = conclusion["withdrawn"][: len(expected)]
+    assert conclusion["n_withdrawn_isolations"] == len(expected)
+    if len(expected) > MAX_WITHDRAWN_ISOLATIONS:
+        expected = [*expected[: MAX_WITHDRAWN_ISOLATIONS - 1], expected[-1]]
+    kept = conclusion["withdrawn_isolations"][: len(expected)]
     assert [(one["to_s"], one["surface"], one["from_s"]) for one in kept] == expected
 
 
@@ -58,18 +58,24 @@ def test_every_spell_of_a_name_is_kept_and_of_too_many_the_latest(frames):
 def test_which_surfaces_are_named(pair, alarmed, beside, named):
     """The one isolated, those of a pair, and none where an instrument has been found instead."""
     fdi = nameless()
-    fdi["verdict"]["isolated"], fdi["types"]["surface"]["status"]["named"][[AILERON, RUDDER]] = ELEVATOR, 1
+    (
+        fdi["verdict"]["isolated_estimator"],
+        fdi["types"]["surface"]["status"]["is_isolated"][[AILERON, RUDDER]],
+    ) = (
+        ELEVATOR,
+        1,
+    )
     fdi["types"]["pair"]["enabled"] = pair
     (
         fdi["sensor_monitor"]["config"]["enabled"],
         fdi["sensor_monitor"]["output"]["alarmed"],
-        fdi["sensor_monitor"]["output"]["keeps_surface"],
+        fdi["sensor_monitor"]["output"]["keeps_isolated_surface"],
     ) = (
         1,
         alarmed,
         beside,
     )
-    record_named_surfaces(fdi, 2.5)
+    record_isolated_surfaces(fdi, 2.5)
     since = np.full(4, -1.0)
     since[named] = 2.5
-    assert fdi["verdict"]["named_from_s"].tolist() == since.tolist()
+    assert fdi["verdict"]["isolated_from_s"].tolist() == since.tolist()

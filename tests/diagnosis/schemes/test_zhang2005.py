@@ -22,7 +22,7 @@ POLE, DT = 10.0, 0.01
 
 
 def network(gain=60.0, limit=20.0):
-    new = np.zeros(1, published_scheme.STATE_NETWORK).view(np.recarray)[0]
+    new = np.zeros(1, published_scheme.STATE_NETWORK_RECORD).view(np.recarray)[0]
     published_scheme.configure_network(new, gain, limit, TRAVEL)
     return new
 
@@ -72,7 +72,7 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
     dead_zone, detected, residual, learns
 ):
     published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
-    published.config.dead_zone = dead_zone
+    published.config.uses_dead_zone = dead_zone
     published_scheme.configure_network(published.network, 60.0, 20.0, TRAVEL)
     at(published.network)
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
@@ -85,9 +85,9 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
 
 
 def zhang2005_fdae():
-    from beaver_ftc.diagnosis.detection.filters import FDAE
+    from beaver_ftc.diagnosis.detection.filters import FDAE_RECORD
 
-    return FDAE
+    return FDAE_RECORD
 
 
 @pytest.mark.parametrize(
@@ -108,22 +108,27 @@ def test_the_alarm_is_of_the_first_axis_beyond_its_threshold(residual, axis):
 def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_misses(theta, gain, Z, projects):
     """However it adapts: the term Om ths' of the estimator sees to that."""
     records = np.zeros(1, isolation_dtype(4)).view(np.recarray)[0]
-    records.config.decay[:], records.config.by_gradient, records.config.gradient = (
+    records.config.filter_decay[:], records.config.adapts_by_gradient, records.config.gradient_gain = (
         published_scheme.euler_decay(POLE, DT),
         1,
         gain,
     )
     fie = records.estimator[0]
-    fie.low, fie.high, fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0, -np.inf, np.inf
+    fie.theta_min, fie.theta_max, fie.feasible_theta_min[:], fie.feasible_theta_max[:] = (
+        -1.0,
+        0.0,
+        -np.inf,
+        np.inf,
+    )
     if projects:
-        fie.theta_low[:], fie.theta_high[:] = -1.0, 0.0
+        fie.feasible_theta_min[:], fie.feasible_theta_max[:] = -1.0, 0.0
     rate, bound = np.zeros(3), np.zeros(1, BOUND)[0]
     for z in Z:
         fie.residual[:] = rate - fie.xhat
-        assert fie.residual == pytest.approx(fie.omega * (theta - fie.theta), abs=1e-9)
-        fie.effect.Z[:] = z, -z, 0.5 * z
+        assert fie.residual == pytest.approx(fie.filtered_regressor * (theta - fie.theta), abs=1e-9)
+        fie.effect.regressor[:] = z, -z, 0.5 * z
         before = rate.copy()
-        rate = before + DT * theta * fie.effect.Z
+        rate = before + DT * theta * fie.effect.regressor
         isolation.predict_estimator(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()

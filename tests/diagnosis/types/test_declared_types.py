@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from design_plant import DesignPlant, believe, conclude
+from design_plant import DesignPlant, conclude, evaluate_prediction
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
@@ -33,19 +33,19 @@ class RealPlant(DesignPlant):
         if noisy:
             bounds["sensors"] = {axis: {"noise_std_deg_s": NOISE_DEG_S} for axis in "pqr"}
         super().__init__(seed=seed, bounds=bounds, fault_class="all", **keys)
-        anomalous = {name: 1 + TOLERANCE * self.rng.choice([-1, 1]) for name in NAMES}
-        self.truth = design_record(scale=anomalous)[0]
+        is_anomalous = {name: 1 + TOLERANCE * self.rng.choice([-1, 1]) for name in NAMES}
+        self.truth = design_record(scale=is_anomalous)[0]
         self.largest_deflection = 4 * np.deg2rad(NOISE_DEG_S) * noisy
 
     def _step(self, uncertainty):
         frame = self.frame
         seen = self.x + self.rng.choice([-1, 1], 3) * self.largest_deflection
         frame["k"], frame["t"] = self.k, self.k * self.dt
-        belief, y = frame["belief"], self.condition()
+        prediction, y = frame["prediction"], self.condition()
         frame["measured"]["x"], frame["measured"]["y"] = seen, y
-        belief["u"], belief["commanded"] = self.u, self.commanded
-        believe(self.frames)
-        f, G, true_f, true_G = belief["f"].copy(), belief["G"].copy(), np.zeros(3), np.zeros((3, 4))
+        prediction["u"], prediction["commanded"] = self.u, self.commanded
+        evaluate_prediction(self.frames)
+        f, G, true_f, true_G = prediction["f"].copy(), prediction["G"].copy(), np.zeros(3), np.zeros((3, 4))
         both_responses(self.truth, self.x, y, true_f, true_G)
         conclude(self.frames)
         eta = self.rng.uniform(-0.02, 0.02, 3)
@@ -69,10 +69,10 @@ def test_the_true_type_is_neither_excluded_nor_named_wrongly(noisy, seed, kind, 
     plant = fly(seed, noisy, kind, surface, at, share, 700)
     code = TYPES[kind][1]
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
     said = fault_findings(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
-    assert said["isolation_type"] in (types.NAMES[code], None)
+    assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
 
 
 @pytest.mark.parametrize("noisy", [False, True])
@@ -81,9 +81,11 @@ def test_an_estimate_is_certain_to_lie_in_its_interval(noisy):
     plant = fly(4, noisy, "stuck", 0, 30, 0.25, 900)
     known = plant.fdi["types"]["surface"][0]
     assert (
-        known["feasible"]["low"][fault_kinds.STUCK] <= -0.26 <= known["feasible"]["high"][fault_kinds.STUCK]
+        known["feasible_sets"]["low"][fault_kinds.STUCK]
+        <= -0.26
+        <= known["feasible_sets"]["high"][fault_kinds.STUCK]
     )
-    assert known["feasible"]["high"][fault_kinds.STUCK] - known["feasible"]["low"][
+    assert known["feasible_sets"]["high"][fault_kinds.STUCK] - known["feasible_sets"]["low"][
         fault_kinds.STUCK
     ] < np.deg2rad(4)
     assert fault_findings(plant.fdi, SURFACES)["isolated"] == "aileron"
@@ -96,8 +98,13 @@ def test_blocks_see_what_frames_do_not():
         plant.fdi["types"]["surface"][2],
         plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_estimator"][2]],
     )
-    of_a_frame = 2 * plant.fdi["bound"]["frame"][2] / abs(estimator["effect"]["Z"][2])
-    assert known["elapsed"]["high"] - known["elapsed"]["low"] < 0.5 * of_a_frame
+    of_a_frame = (
+        2 * plant.fdi["bound"]["frame_innovation_bound"][2] / abs(estimator["effect"]["regressor"][2])
+    )
+    assert (
+        known["last_observation"]["position_high"] - known["last_observation"]["position_low"]
+        < 0.5 * of_a_frame
+    )
 
 
 def test_pairs_are_refused_with_noisy_gyros_in_one_line():
@@ -121,4 +128,4 @@ def test_a_release_anywhere_inside_a_block_excludes_neither_surface_nor_type(
     fault.plant = plant
     plant.fly(at + lasting + 100, None)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][fault.code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][fault.code]

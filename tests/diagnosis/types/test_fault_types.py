@@ -119,7 +119,7 @@ def fly(case, kind, surface, at, share, uncertainty, frames=FRAMES, gone=None):
 def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
 
 
 @pytest.mark.parametrize("kind", ["constant loss", "stuck", "float", "bias", "hardover up", "oscillatory"])
@@ -128,7 +128,7 @@ def test_the_true_type_is_never_excluded(kind, case, surface, at, share, uncerta
 def test_nor_is_it_when_the_fault_goes_again(kind, case, surface, at, share, uncertainty):
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 40)
     assert not plant.position_excluded(surface)
-    assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][code]
+    assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][code]
 
 
 @pytest.mark.parametrize("kind", TYPES)
@@ -139,9 +139,9 @@ def test_neither_surface_nor_type_is_ever_named_wrongly(kind, seed, surface, sha
     plant, code = fly(case, kind, surface, 30, share, uncertainty, frames=700)
     said = fault_findings(plant.fdi, SURFACES)
     assert said["isolated"] in (SURFACES[surface], None)
-    assert said["isolation_type"] in (types.NAMES[code], None)
+    assert said["isolation_type"] in (types.TYPE_NAMES[code], None)
     if said["isolated"]:
-        assert types.NAMES[code] in said["candidates"]
+        assert types.TYPE_NAMES[code] in said["candidates"]
 
 
 @pytest.mark.parametrize("kind", ["varying loss", "growing bias", "rate limit"])
@@ -152,7 +152,7 @@ def test_a_short_fault_of_any_course_stays_among_the_candidates(kind, case, surf
     plant, code = fly(case, kind, surface, at, share, uncertainty, gone=at + 6)
     said = fault_findings(plant.fdi, SURFACES)
     if said["candidates"]:
-        name, left = types.NAMES[code], said["candidates"]
+        name, left = types.TYPE_NAMES[code], said["candidates"]
         assert name in left or f"{SURFACES[surface]}:{name}" in left
 
 

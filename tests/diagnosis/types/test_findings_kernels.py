@@ -7,8 +7,8 @@ from kernels import put
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH_GROUP, UNANTICIPATED
 from beaver_ftc.diagnosis.types import verdict
-from beaver_ftc.diagnosis.types.registry import NAMES, TYPES
-from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, RULED_OUT
+from beaver_ftc.diagnosis.types.registry import TYPE_NAMES, TYPES
+from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, DEDUCED_HEALTHY
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, SLOW, STUCK, UP, VARYING_LOSS
 from telling import apart, fill
 
@@ -20,22 +20,29 @@ POSITION_OF = (4, 5, 6, 7)
 def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     """A record in which these types are left, {surface: kinds}; other surfaces are excluded."""
     fdi = np.zeros(1, diagnosis_dtype(4))[0]
-    fdi["verdict"]["detected"], fdi["verdict"]["isolated"], fdi["verdict"]["type"] = detected, verdict, -1
+    fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = (
+        detected,
+        verdict,
+        -1,
+    )
     fdi["verdict"]["isolated_at_s"], fdi["types"]["pair"]["enabled"] = 12.5, pairs
     fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - PITCH_GROUP
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
-    fdi["types"]["surface"]["estimator_excluded"], fdi["types"]["surface"]["feasible"]["excluded"] = 1, 1
-    fdi["types"]["surface"]["status"]["type"], fdi["types"]["surface"]["status"]["type_at_s"] = -1, -1.0
+    fdi["types"]["surface"]["estimator_excluded"], fdi["types"]["surface"]["feasible_sets"]["excluded"] = 1, 1
+    (
+        fdi["types"]["surface"]["status"]["fault_type"],
+        fdi["types"]["surface"]["status"]["type_decided_at_s"],
+    ) = -1, -1.0
     for s, kinds in (left or {}).items():
         fdi["types"]["surface"]["estimator_excluded"][s] = 0
-        fdi["types"]["surface"]["feasible"]["excluded"][s][list(kinds)] = 0
+        fdi["types"]["surface"]["feasible_sets"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
 
 
 def said(*kinds):
-    return [NAMES[kind] for kind in kinds]
+    return [TYPE_NAMES[kind] for kind in kinds]
 
 
 def test_without_an_alarm_nothing_is_found():
@@ -54,24 +61,24 @@ def test_a_surface_of_which_no_type_fits_is_named_bare_and_the_fault_may_be_unan
     assert verdict.fault_findings(new({AILERON: []}), SURFACES)["candidates"] == ("aileron", "unanticipated")
     assert verdict.fault_findings(new(), SURFACES)["candidates"] == ("unanticipated",)
     both = verdict.fault_findings(new({AILERON: [], RUDDER: [STUCK]}), SURFACES)["candidates"]
-    assert both == ("aileron", f"rudder:{NAMES[STUCK]}")
+    assert both == ("aileron", f"rudder:{TYPE_NAMES[STUCK]}")
 
 
 @pytest.mark.parametrize(
     ("named", "standing", "excluded", "possible"),
     [
-        (0, 0, 0, True), (0, 0, 1, False), (0, RULED_OUT, 0, False), (1, RULED_OUT, 1, True),
-        (0, BY_DEDUCTION, 1, True), (1, 0, 1, True),
+        (0, 0, 0, True), (0, 0, 1, False), (0, DEDUCED_HEALTHY, 0, False),
+        (1, DEDUCED_HEALTHY, 1, True), (0, DEDUCED_FAULTY, 1, True), (1, 0, 1, True),
     ],
 )  # fmt: skip
 def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing, excluded, possible):
     fdi = new({RUDDER: [STUCK]})
     (
-        fdi["types"]["surface"]["status"]["named"][RUDDER],
-        fdi["types"]["surface"]["status"]["decided_by"][RUDDER],
+        fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
+        fdi["types"]["surface"]["status"]["decision_basis"][RUDDER],
     ) = named, standing
     fdi["types"]["surface"]["estimator_excluded"][RUDDER] = excluded
-    assert (f"rudder:{NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
+    assert (f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
 
 
 @pytest.mark.parametrize(
@@ -88,13 +95,13 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
 ):
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
-    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, half_cycle_frames=40)
+    fdi = new({RUDDER: {VARYING_LOSS, SLOW} | constants}, slowest_half_cycle_frames=40)
     (
-        fdi["types"]["surface"]["evidence"]["frames"][RUDDER],
-        fdi["types"]["surface"]["evidence"]["rest_frames"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][RUDDER],
+        fdi["types"]["surface"]["evidence"]["n_rest_frames"][RUDDER],
     ) = evidence, 10
     fdi["types"]["config"]["has_surface_errors"] = has_surface_errors
-    types = verdict._types_left(fdi, RUDDER)
+    types = verdict._remaining_type_names(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))
 
@@ -107,12 +114,12 @@ def test_one_fault_is_told_with_its_instant_and_what_it_may_be():
     assert set(found["candidates"]) == set(said(STUCK, FLOAT))
     assert found["estimate"] is None
     assert found["frequency_rad_s"] is None
-    fdi["verdict"]["type"], fdi["verdict"]["type_at_s"] = 0, 14.0
+    fdi["verdict"]["fault_type"], fdi["verdict"]["type_decided_at_s"] = 0, 14.0
     found = verdict.fault_findings(fdi, SURFACES)
     assert (found["isolation_type"], found["type_time_s"], found["candidates"]) == (
-        NAMES[0],
+        TYPE_NAMES[0],
         14.0,
-        (NAMES[0],),
+        (TYPE_NAMES[0],),
     )
 
 
@@ -127,11 +134,14 @@ def test_a_fault_outside_the_class_is_unanticipated():
 def several(named=(), alarmed=(0, 0), left=None):
     fdi = new(left, pairs=1)
     for s, at_s in named:
-        fdi["types"]["surface"]["status"]["named"][s], fdi["types"]["surface"]["status"]["named_at_s"][s] = (
+        (
+            fdi["types"]["surface"]["status"]["is_isolated"][s],
+            fdi["types"]["surface"]["status"]["isolated_at_s"][s],
+        ) = (
             1,
             at_s,
         )
-    fdi["types"]["pair"]["alarmed"] = alarmed
+    fdi["types"]["pair"]["group_has_alarm"] = alarmed
     return verdict.fault_findings(fdi, SURFACES)
 
 
@@ -147,8 +157,8 @@ def test_each_of_several_faults_has_instants_of_its_own():
     fdi = new(pairs=1)
     surface = fdi["types"]["surface"]
     for s, kind, named_at_s, type_at_s in ((RUDDER, STUCK, 9.0, 11.5), (ELEVATOR, -1, 7.0, -1.0)):
-        surface["status"]["named"][s], surface["status"]["named_at_s"][s] = 1, named_at_s
-        surface["status"]["type"][s], surface["status"]["type_at_s"][s] = kind, type_at_s
+        surface["status"]["is_isolated"][s], surface["status"]["isolated_at_s"][s] = 1, named_at_s
+        surface["status"]["fault_type"][s], surface["status"]["type_decided_at_s"][s] = kind, type_at_s
     apart(instants=[9.0, 11.5, 7.0])
     elevator, rudder = verdict.fault_findings(fdi, SURFACES)["faults"]
     keys = "isolated", "isolation_time_s", "isolation_type", "type_time_s"
@@ -162,7 +172,7 @@ def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
     found = several(alarmed=alarmed, left={ELEVATOR: [BIAS], RUDDER: [BIAS]})
     assert found["isolated"] is None
     (plane,) = found["faults"]
-    assert found["candidates"] == plane["candidates"] == (f"elevator:{NAMES[BIAS]}", "elevator+flap")
+    assert found["candidates"] == plane["candidates"] == (f"elevator:{TYPE_NAMES[BIAS]}", "elevator+flap")
     beside = several(named=[(RUDDER, 9.0)], alarmed=(1, 1), left={ELEVATOR: [BIAS]})
     assert [fault["isolated"] for fault in beside["faults"]] == ["rudder", None]
     assert several(named=[(FLAP, 9.0)], alarmed=alarmed)["faults"][1:] == ()
@@ -171,7 +181,7 @@ def test_a_plane_that_is_alarmed_and_not_explained_stays_open():
 def test_where_no_plane_is_alarmed_both_stay_open():
     found = several(left={ELEVATOR: [BIAS], RUDDER: [STUCK]})
     assert found["candidates"] == (
-        f"elevator:{NAMES[BIAS]}", "elevator+flap", f"rudder:{NAMES[STUCK]}", "aileron+rudder",
+        f"elevator:{TYPE_NAMES[BIAS]}", "elevator+flap", f"rudder:{TYPE_NAMES[STUCK]}", "aileron+rudder",
     )  # fmt: skip
 
 
@@ -179,10 +189,10 @@ def test_where_no_plane_is_alarmed_both_stay_open():
 def test_where_one_of_two_in_pitch_stands_still_the_other_may_be_off_as_well(kind):
     fdi = new({ELEVATOR: [kind], RUDDER: [kind]}, pairs=1)
     every = set(said(STUCK, FLOAT, UP, BIAS, CONSTANT_LOSS))
-    assert set(verdict._types_left(fdi, ELEVATOR)) == every
-    assert set(verdict._types_left(fdi, RUDDER)) == set(said(kind))
-    assert set(verdict._types_left(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
-    assert set(verdict._types_left(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
+    assert set(verdict._remaining_type_names(fdi, ELEVATOR)) == every
+    assert set(verdict._remaining_type_names(fdi, RUDDER)) == set(said(kind))
+    assert set(verdict._remaining_type_names(new({ELEVATOR: [BIAS]}, pairs=1), ELEVATOR)) == set(said(BIAS))
+    assert set(verdict._remaining_type_names(new({ELEVATOR: [kind]}), ELEVATOR)) == set(said(kind))
 
 
 @pytest.mark.parametrize("s", [AILERON, RUDDER, FLAP])
@@ -192,9 +202,9 @@ def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     sets = fdi["types"]["surface"]
     for surface in range(4):
         fill(sets[surface], seed=surface + 1)
-    apart(low=sets["feasible"]["low"], high=sets["feasible"]["high"])
+    apart(low=sets["feasible_sets"]["low"], high=sets["feasible_sets"]["high"])
     for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
-        low, high = sets["feasible"]["low"][s, kind] - off, sets["feasible"]["high"][s, kind] - off
-        assert TYPES[kind].interval(fdi, s, kind) == pytest.approx((low, high))
-    middle = 0.5 * (sets["feasible"]["low"][s, STUCK] + sets["feasible"]["high"][s, STUCK])
+        low, high = sets["feasible_sets"]["low"][s, kind] - off, sets["feasible_sets"]["high"][s, kind] - off
+        assert TYPES[kind].estimate_interval(fdi, s, kind) == pytest.approx((low, high))
+    middle = 0.5 * (sets["feasible_sets"]["low"][s, STUCK] + sets["feasible_sets"]["high"][s, STUCK])
     assert TYPES[STUCK].estimate(fdi, s, STUCK) == pytest.approx(middle)

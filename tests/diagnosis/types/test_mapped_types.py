@@ -42,8 +42,8 @@ class Mapped(DesignPlant):
 
     def __init__(self, **given):
         super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
-        self.map = self.fdi["bound"]["error_map"]
-        self.map["anywhere"], self.map["whole"] = 1, 0
+        self.map = self.fdi["bound"]["model_error_map"]
+        self.map["one_surface_anywhere"], self.map["several_surfaces_anywhere"] = 1, 0
         self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
         self.amplitude *= 0.3
 
@@ -53,7 +53,7 @@ class Mapped(DesignPlant):
         at = self.u.copy()
         at[self.surface] = self.position(self.k, self.u[self.surface])
         used = np.max(at / np.where(at > 0, TRAVEL_RAD[1], TRAVEL_RAD[0]))
-        more = np.maximum(ERROR[np.searchsorted(SHARE[:2], used)] - self.map["now"], 0.0)
+        more = np.maximum(ERROR[np.searchsorted(SHARE[:2], used)] - self.map["error_now"], 0.0)
         signs = np.sign(np.random.default_rng((self.k // 9, 7)).uniform(-1, 1, 3))
         return G @ (at - self.u) + signs * more
 
@@ -70,7 +70,7 @@ def test_no_healthy_flight_alarms(uncertainty):
     for seed in range(5):
         plant = Mapped(seed=seed).fly(FRAMES, UNCERTAINTIES[uncertainty])
         assert plant.detected_at_s == np.inf
-        assert plant.fdi["bank"]["output"]["closest"].max() > 0.9
+        assert plant.fdi["bank"]["output"]["max_threshold_ratio_so_far"].max() > 0.9
 
 
 @pytest.mark.parametrize("course", POSITIONS)
@@ -85,9 +85,12 @@ def test_the_surface_at_fault_is_never_excluded(surface, course):
 def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
     """Ablation: without what a surface at fault adds, and with the whole travel for the alarm as well."""
     assert not any(flown("jumps", seed=seed).position_excluded(ELEVATOR) for seed in range(4))
-    assert any(flown("jumps", seed=seed, anywhere=0).position_excluded(ELEVATOR) for seed in range(4))
+    assert any(
+        flown("jumps", seed=seed, one_surface_anywhere=0).position_excluded(ELEVATOR) for seed in range(4)
+    )
     for whole, found in ((0, True), (1, False)):
-        hidden = [flown("bias", seed=seed, uncertainty="hide", whole=whole) for seed in range(4)]
+        changes = {"uncertainty": "hide", "several_surfaces_anywhere": whole}
+        hidden = [flown("bias", seed=seed, **changes) for seed in range(4)]
         assert all(np.isfinite(plant.detected_at_s) == found for plant in hidden)
 
 
@@ -101,27 +104,35 @@ def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
 )  # fmt: skip
 def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
-    error_map = new_fdi()["bound"]["error_map"]
+    error_map = new_fdi()["bound"]["model_error_map"]
     error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
-    assert bounds.travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+    assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
 
 
 def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
     fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
-    bound["error_map"]["anywhere"], bound["error_map"]["n_levels"], bound["error_map"]["share"][:3] = (
+    (
+        bound["model_error_map"]["one_surface_anywhere"],
+        bound["model_error_map"]["n_levels"],
+        bound["model_error_map"]["travel_share"][:3],
+    ) = (
         1,
         3,
         SHARE,
     )
-    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = -0.5, 0.5
-    bound["further_error"][:3], bound["frame"], fdi["bank"]["output"]["innovation"] = (
+    bound["model_error_map"]["travel_low"], bound["model_error_map"]["travel_high"] = -0.5, 0.5
+    (
+        bound["additional_map_error"][:3],
+        bound["frame_innovation_bound"],
+        fdi["bank"]["output"]["innovation"],
+    ) = (
         ERROR,
         0.1,
         (0.0, 1.0, 0.0),
     )
-    fie["effect"]["Z"], fdi["config"]["instants"] = (0.0, 20.0, 0.0), 1
+    fie["effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(isolation.widen_by_own_errors, fdi, fie)
-    assert fie["effect"]["spread"] == pytest.approx(ERROR[0])
-    assert fie["travel_share"] == pytest.approx(1.13 / 20 / 0.5)
+    on(isolation.widen_tolerance_by_surface_errors, fdi, fie)
+    assert fie["effect"]["error_bound"] == pytest.approx(ERROR[0])
+    assert fie["max_possible_travel_share"] == pytest.approx(1.13 / 20 / 0.5)

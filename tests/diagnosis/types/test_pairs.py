@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.pairs import solve_roll_and_yaw
+from beaver_ftc.diagnosis.types.pairs import locate_roll_and_yaw_surfaces
 from beaver_ftc.diagnosis.types.verdict import fault_findings
 from beaver_ftc.scenario.schema import Scenario
 from flying import flown
@@ -40,7 +40,9 @@ def fly(seed, uncertainty, faults, frames=700, pairs=True):
 
 def check(plant, faults):
     """No surface named that is healthy, no type named or excluded wrongly."""
-    true = {("aileron", "elevator", "rudder")[s]: types.NAMES[TYPES[kind][1]] for s, kind, _, _ in faults}
+    true = {
+        ("aileron", "elevator", "rudder")[s]: types.TYPE_NAMES[TYPES[kind][1]] for s, kind, _, _ in faults
+    }
     for one in fault_findings(plant.fdi, SURFACES)["faults"]:
         if one["isolated"]:
             assert one["isolated"] in true
@@ -55,8 +57,8 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     plant = fly(seed, uncertainty, faults)
     check(plant, faults)
     for surface, one, _, _ in faults:
-        assert not plant.fdi["types"]["surface"][surface]["feasible"]["excluded"][TYPES[one][1]]
-    assert not plant.fdi["types"]["pair"]["no_lateral_pair"]
+        assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][TYPES[one][1]]
+    assert not plant.fdi["types"]["pair"]["lateral_outside_class"]
 
 
 @settings(max_examples=samples(40), deadline=None)
@@ -103,29 +105,29 @@ def test_ailerons_and_rudder_were_where_two_equations_put_them(off_a, off_r, siz
     frame, spread = np.array(sizes[:2]) + 0.01, np.array(sizes[2:]).reshape(2, 2)
     for column, s in enumerate((AILERON, RUDDER)):
         effect = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]["effect"]
-        effect["Z"][[0, 2]], effect["spread"][[0, 2]] = Z[:, column], spread[:, column]
-        fdi["types"]["surface"][s]["elapsed"]["command"] = 0.02
-    fdi["bound"]["frame"][[0, 2]] = frame
+        effect["regressor"][[0, 2]], effect["error_bound"][[0, 2]] = Z[:, column], spread[:, column]
+        fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = 0.02
+    fdi["bound"]["frame_innovation_bound"][[0, 2]] = frame
     fdi["bank"]["output"]["innovation"][[0, 2]] = Z @ [off_a, off_r]
-    solve_roll_and_yaw(
+    locate_roll_and_yaw_surfaces(
         fdi["types"],
         fdi["layout"],
         fdi["isolation"]["estimator"],
         fdi["bank"]["output"]["innovation"],
-        fdi["bound"]["frame"],
+        fdi["bound"]["frame_innovation_bound"],
     )
     e = frame + spread.sum(axis=1)
     signs = product((-1, 1), repeat=2)
     corners = np.array([np.linalg.solve(Z, Z @ [off_a, off_r] + e * sign) for sign in signs])
     for column, s in enumerate((AILERON, RUDDER)):
         surface, ends = fdi["types"]["surface"][s], corners[:, column]
-        assert surface["elapsed"]["low"] == pytest.approx(
+        assert surface["last_observation"]["position_low"] == pytest.approx(
             max(surface["actuator"]["travel_low"], 0.02 + ends.min()), abs=1e-9
         )
-        assert surface["elapsed"]["high"] == pytest.approx(
+        assert surface["last_observation"]["position_high"] == pytest.approx(
             min(surface["actuator"]["travel_high"], 0.02 + ends.max()), abs=1e-9
         )
-        assert surface["elapsed"]["anomalous"] == (ends.min() > 0 or ends.max() < 0)
+        assert surface["last_observation"]["is_anomalous"] == (ends.min() > 0 or ends.max() < 0)
 
 
 @pytest.mark.parametrize("thresholds", ["published", "interval"])

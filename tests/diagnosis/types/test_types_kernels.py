@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis.types import contract, registry
+from beaver_ftc.diagnosis import types
+from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
 from fault_kinds import (
@@ -29,58 +30,86 @@ ALL = set(range(N_TYPES))
 def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     """(fdi, surface 0) with only these types left; low to high: where it was in the judged frame, rad."""
     fdi = new_fdi()
-    put(fdi, whole=1, half_cycle_frames=20, instants=1)
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"], fdi["types"]["frame"] = 1, DT, 10
+    put(fdi, whole=1, slowest_half_cycle_frames=20, instants=1)
+    (
+        fdi["types"]["config"]["frames_per_block"],
+        fdi["types"]["config"]["block_duration_s"],
+        fdi["types"]["frame_index"],
+    ) = (
+        1,
+        DT,
+        10,
+    )
     surface = fdi["types"]["surface"][0]
     (
         surface["actuator"]["travel_low"],
         surface["actuator"]["travel_high"],
-        surface["actuator"]["approach"],
-        surface["actuator"]["step"],
+        surface["actuator"]["lag_share_per_substep"],
+        surface["actuator"]["max_motion_per_substep"],
     ) = LOW, HIGH, 0.5, 0.1
-    surface["actuator"]["reach_low"], surface["actuator"]["reach_high"] = min(LOW, 0.0), max(HIGH, 0.0)
-    registry.restart_surface(surface)
-    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, np.inf
-    surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = low, high, command
-    surface["feasible"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
+    surface["actuator"]["reachable_low"], surface["actuator"]["reachable_high"] = (
+        min(LOW, 0.0),
+        max(HIGH, 0.0),
+    )
+    registry.restart_surface_types(surface)
+    surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, np.inf
+    (
+        surface["judged_observation"]["position_low"],
+        surface["judged_observation"]["position_high"],
+        surface["judged_observation"]["healthy_position"],
+    ) = low, high, command
+    surface["feasible_sets"]["excluded"] = [kind not in left for kind in range(N_TYPES)]
     put_on(surface, **fields)
     return fdi, surface
 
 
 def judged(judge, fdi, surface, kind, *given):
     """Take in what a type's row makes of the judged frame."""
-    contract.intersect_set(surface, kind, on(judge, fdi, surface, kind, *given))
+    types.intersect_feasible_set(surface, kind, on(judge, fdi, surface, kind, *given))
 
 
-def restored(surface):
+def restore_sets(surface):
     """Take in what a jam was before the earliest release still possible."""
-    contract.replace_set(surface, STUCK, held_surface.restored_set(surface, STUCK))
+    types.set_feasible_set(surface, STUCK, held_surface.stuck_set_after_frame(surface, STUCK))
 
 
 def test_what_is_known_of_a_surface_as_it_begins():
     _, surface = new_surface(left=())
-    surface["evidence"]["frames"], surface["evidence"]["rest_frames"], surface["evidence"]["started_at"] = (
+    (
+        surface["evidence"]["n_anomalous_frames"],
+        surface["evidence"]["n_rest_frames"],
+        surface["evidence"]["first_anomalous_frame"],
+    ) = (
         3,
         4,
         5,
     )
-    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
-    registry.restart_surface(surface)
-    assert not surface["feasible"]["excluded"].any()
+    surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
+    registry.restart_surface_types(surface)
+    assert not surface["feasible_sets"]["excluded"].any()
     assert (
-        surface["evidence"]["frames"],
-        surface["evidence"]["rest_frames"],
-        surface["evidence"]["started_at"],
+        surface["evidence"]["n_anomalous_frames"],
+        surface["evidence"]["n_rest_frames"],
+        surface["evidence"]["first_anomalous_frame"],
     ) == (0, 0, -1)
-    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == (LOW, HIGH)
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (LOW, HIGH)
-    assert (surface["feasible"]["low"][CONSTANT_LOSS], surface["feasible"]["high"][CONSTANT_LOSS]) == (
+    assert (surface["last_observation"]["position_low"], surface["last_observation"]["position_high"]) == (
+        LOW,
+        HIGH,
+    )
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (LOW, HIGH)
+    assert (
+        surface["feasible_sets"]["low"][CONSTANT_LOSS],
+        surface["feasible_sets"]["high"][CONSTANT_LOSS],
+    ) == (
         0.0,
         1.0,
     )
-    assert (surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS]) == (-np.inf, np.inf)
-    assert surface["rate_limit"]["at"] == -2
-    assert surface["oscillatory"]["half_cycles"] == 0
+    assert (surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS]) == (
+        -np.inf,
+        np.inf,
+    )
+    assert surface["rate_limit"]["last_known_frame"] == -2
+    assert surface["oscillatory"]["n_half_cycles"] == 0
 
 
 @pytest.mark.parametrize(
@@ -92,64 +121,67 @@ def test_what_is_known_of_a_surface_as_it_begins():
 )  # fmt: skip
 def test_a_constant_loss_keeps_the_shares_that_explain_the_frame(low, high, command, expected):
     fdi, surface = new_surface(low=low, high=high, command=command)
-    judged(commanded_surface.judge_loss, fdi, surface, CONSTANT_LOSS, 5)
-    judged(commanded_surface.judge_varying_loss, fdi, surface, VARYING_LOSS, 5)
+    judged(commanded_surface.consistent_loss_interval, fdi, surface, CONSTANT_LOSS, 5)
+    judged(commanded_surface.consistent_varying_loss_interval, fdi, surface, VARYING_LOSS, 5)
     assert (
-        surface["feasible"]["excluded"][CONSTANT_LOSS]
-        == surface["feasible"]["excluded"][VARYING_LOSS]
+        surface["feasible_sets"]["excluded"][CONSTANT_LOSS]
+        == surface["feasible_sets"]["excluded"][VARYING_LOSS]
         == (expected is None)
     )
     if expected:
         assert (
-            surface["feasible"]["low"][CONSTANT_LOSS],
-            surface["feasible"]["high"][CONSTANT_LOSS],
+            surface["feasible_sets"]["low"][CONSTANT_LOSS],
+            surface["feasible_sets"]["high"][CONSTANT_LOSS],
         ) == pytest.approx(expected)
 
 
 def test_over_a_block_in_which_the_command_swings_any_mean_may_be_a_varying_loss():
     for least, greatest, excluded in ((-0.1, 0.2, 0), (0.0, 0.2, 1), (-0.1, 0.0, 1)):
         fdi, surface = new_surface(low=0.11, high=0.2, command=0.1)
-        fdi["types"]["config"]["length"], surface["commands"]["least"][1] = 5, least
-        surface["commands"]["greatest"][1] = greatest
-        judged(commanded_surface.judge_varying_loss, fdi, surface, VARYING_LOSS, 5)
-        assert surface["feasible"]["excluded"][VARYING_LOSS] == excluded
+        fdi["types"]["config"]["frames_per_block"], surface["commands"]["min_healthy_position"][1] = 5, least
+        surface["commands"]["max_healthy_position"][1] = greatest
+        judged(commanded_surface.consistent_varying_loss_interval, fdi, surface, VARYING_LOSS, 5)
+        assert surface["feasible_sets"]["excluded"][VARYING_LOSS] == excluded
 
 
 def test_sets_shrink_to_what_is_left_and_end_when_nothing_is():
     _, surface = new_surface()
-    contract.intersect_set(surface, STUCK, (-0.1, 0.2))
-    contract.intersect_set(surface, STUCK, (0.0, 0.9))
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.0, 0.2)
-    assert contract.set_middle(surface, STUCK) == 0.1
-    assert not surface["feasible"]["excluded"][STUCK]
-    contract.intersect_set(surface, STUCK, (0.2, 0.9))  # one point is not nothing
-    assert not surface["feasible"]["excluded"][STUCK]
-    contract.intersect_set(surface, STUCK, (0.21, 0.9))
-    assert surface["feasible"]["excluded"][STUCK]
+    types.intersect_feasible_set(surface, STUCK, (-0.1, 0.2))
+    types.intersect_feasible_set(surface, STUCK, (0.0, 0.9))
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
+    assert types.feasible_set_midpoint(surface, STUCK) == 0.1
+    assert not surface["feasible_sets"]["excluded"][STUCK]
+    types.intersect_feasible_set(surface, STUCK, (0.2, 0.9))  # one point is not nothing
+    assert not surface["feasible_sets"]["excluded"][STUCK]
+    types.intersect_feasible_set(surface, STUCK, (0.21, 0.9))
+    assert surface["feasible_sets"]["excluded"][STUCK]
 
 
 @pytest.mark.parametrize(
     ("interval", "stands"),
-    [((0.15, 0.05), False), ((0.4, 0.5), False), (contract.EMPTY_SET, True)],
+    [((0.15, 0.05), False), ((0.4, 0.5), False), (types.EMPTY_SET, True)],
     ids=["axes disagree", "elsewhere", "refuted otherwise"],
 )
 def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval, stands):
     _, surface = new_surface()
-    contract.replace_set(surface, STUCK, (0.0, 0.2))
-    contract.intersect_set(surface, STUCK, interval)
-    assert surface["feasible"]["excluded"][STUCK]
+    types.set_feasible_set(surface, STUCK, (0.0, 0.2))
+    types.intersect_feasible_set(surface, STUCK, interval)
+    assert surface["feasible_sets"]["excluded"][STUCK]
     for place in (-0.1, 0.02, 0.15, 0.19, 0.45):
-        surface["judged"]["low"], surface["judged"]["high"] = place - 1e-3, place + 1e-3
-        assert registry.agrees_with_rest(surface) == (stands and 0.0 <= place <= 0.2), place
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            place - 1e-3,
+            place + 1e-3,
+        )
+        assert registry.agrees_with_rest_position(surface) == (stands and 0.0 <= place <= 0.2), place
 
 
 def test_an_offset_is_unlimited_at_a_stop():
     _, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert commanded_surface.judged_offset(surface) == pytest.approx((-0.2, -0.15))
-    surface["judged"]["high"] = HIGH
-    assert commanded_surface.judged_offset(surface) == (pytest.approx(-0.2), np.inf)
-    surface["judged"]["low"] = LOW
-    assert commanded_surface.judged_offset(surface)[0] == -np.inf
+    assert commanded_surface.consistent_offset_interval(surface) == pytest.approx((-0.2, -0.15))
+    surface["judged_observation"]["position_high"] = HIGH
+    assert commanded_surface.consistent_offset_interval(surface) == (pytest.approx(-0.2), np.inf)
+    surface["judged_observation"]["position_low"] = LOW
+    assert commanded_surface.consistent_offset_interval(surface)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
@@ -157,46 +189,53 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in (
-        (BIAS, commanded_surface.judge_bias),
-        (GROWING_BIAS, commanded_surface.judge_growing_bias),
+        (BIAS, commanded_surface.consistent_bias_interval),
+        (GROWING_BIAS, commanded_surface.growing_bias_consistent_set),
     ):
         judged(judge, fdi, surface, kind, 5)
-        assert surface["feasible"]["excluded"][kind]
+        assert surface["feasible_sets"]["excluded"][kind]
 
 
 @pytest.mark.parametrize("length", [1, 5])  # frames; one may have several instants
 def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_order(length):
     fdi, surface = new_surface(low=0.2, high=0.25, command=0.1)
-    fdi["types"]["config"]["length"] = length
-    surface["commands"]["least"][1], surface["commands"]["greatest"][1] = -0.4, 0.34
+    fdi["types"]["config"]["frames_per_block"] = length
+    surface["commands"]["min_healthy_position"][1], surface["commands"]["max_healthy_position"][1] = (
+        -0.4,
+        0.34,
+    )
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert commanded_surface.judged_offset(surface) == pytest.approx((0.1, 0.15))
-    surface["commands"]["greatest"][1] = 0.36
-    assert commanded_surface.judged_offset(surface)[1] == np.inf
-    surface["commands"]["least"][1] = -0.51
-    assert commanded_surface.judged_offset(surface)[0] == -np.inf
+    assert commanded_surface.consistent_offset_interval(surface) == pytest.approx((0.1, 0.15))
+    surface["commands"]["max_healthy_position"][1] = 0.36
+    assert commanded_surface.consistent_offset_interval(surface)[1] == np.inf
+    surface["commands"]["min_healthy_position"][1] = -0.51
+    assert commanded_surface.consistent_offset_interval(surface)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    judged(commanded_surface.judge_bias, fdi, surface, BIAS, 5)
-    surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"] = 0.23, 0.4, 0.4
-    judged(commanded_surface.judge_bias, fdi, surface, BIAS, 6)
-    assert (surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS]) == pytest.approx(
+    judged(commanded_surface.consistent_bias_interval, fdi, surface, BIAS, 5)
+    (
+        surface["judged_observation"]["position_low"],
+        surface["judged_observation"]["position_high"],
+        surface["judged_observation"]["healthy_position"],
+    ) = 0.23, 0.4, 0.4
+    judged(commanded_surface.consistent_bias_interval, fdi, surface, BIAS, 6)
+    assert (surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS]) == pytest.approx(
         (-0.17, -0.15)
     )
-    surface["elapsed"]["command"] = 0.05
+    surface["last_observation"]["healthy_position"] = 0.05
     assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
-    commands, surface["elapsed"]["command"] = surface["commands"], -0.2
-    commands["least"][0], commands["greatest"][0] = (
+    commands, surface["last_observation"]["healthy_position"] = surface["commands"], -0.2
+    commands["min_healthy_position"][0], commands["max_healthy_position"][0] = (
         -0.24,
         -0.1,
     )  # where it was meanwhile: to -0.41 and to -0.25
     assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
-    commands["least"][0] = commands["greatest"][0] = 0.0
+    commands["min_healthy_position"][0] = commands["max_healthy_position"][0] = 0.0
     assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
-    assert contract.set_middle_of(fdi, 0, BIAS) == pytest.approx(-0.16)
-    surface["feasible"]["high"][BIAS] = np.inf
+    assert types.parameter_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
+    surface["feasible_sets"]["high"][BIAS] = np.inf
     assert commanded_surface.bias_interval(fdi, 0, BIAS) is None
 
 
@@ -211,16 +250,19 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
     """Each known to within 0.01."""
     fdi, surface = new_surface()
     for offset in offsets:
-        surface["judged"]["low"], surface["judged"]["high"] = offset - 0.01, offset + 0.01
-        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
-    assert surface["feasible"]["excluded"][GROWING_BIAS] == excluded
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            offset - 0.01,
+            offset + 0.01,
+        )
+        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+    assert surface["feasible_sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
-        assert surface["growing_bias"]["up"] == surface["growing_bias"]["down"] == 0.0
+        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["min_growth_up"] == surface["growing_bias"]["min_growth_down"] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -233,35 +275,44 @@ def test_at_a_stop_a_growing_bias_says_nothing():
     ],
 )  # fmt: skip
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
-    fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
+    fdi, surface = new_surface(min_runaway_rate=0.05 / DT)
     for place in places:
-        on(commanded_surface.widen_offset_range, fdi, surface, GROWING_BIAS)
+        on(commanded_surface.widen_offset_interval, fdi, surface, GROWING_BIAS)
         if place == "well":
-            on(commanded_surface.skip_growing_bias, fdi, surface, GROWING_BIAS)
+            on(commanded_surface.forget_bias_offset_interval, fdi, surface, GROWING_BIAS)
         elif place is not None:
-            surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, min(place + 0.01, HIGH)
-            judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
-    assert surface["growing_bias"]["ran"].tolist() == ran
+            surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+                place - 0.01,
+                min(place + 0.01, HIGH),
+            )
+            judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+    assert surface["growing_bias"]["has_run_to_stop"].tolist() == ran
 
 
 def test_of_several_instants_a_mean_may_be_that_of_the_last():
-    fdi, surface = new_surface(least_runaway_rate=0.05 / DT)
-    fdi["types"]["config"]["whole"] = 0
+    fdi, surface = new_surface(min_runaway_rate=0.05 / DT)
+    fdi["types"]["config"]["is_single_instant"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
-        on(commanded_surface.widen_offset_range, fdi, surface, GROWING_BIAS)
-        surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
-        judged(commanded_surface.judge_growing_bias, fdi, surface, GROWING_BIAS, 5)
-        assert surface["growing_bias"]["ran"][1] == ran
+        on(commanded_surface.widen_offset_interval, fdi, surface, GROWING_BIAS)
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            place - 0.01,
+            place + 0.01,
+        )
+        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["has_run_to_stop"][1] == ran
 
 
 def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
-    fdi["types"]["config"]["whole"] = whole
-    surface["commands"]["low"], surface["commands"]["high"] = commands[0], commands[1]
+    fdi["types"]["config"]["is_single_instant"] = whole
+    surface["commands"]["min_command"], surface["commands"]["max_command"] = commands[0], commands[1]
     for k, place in enumerate(places):
-        surface["judged"]["low"], surface["judged"]["high"] = place - 0.01, place + 0.01
-        judged(commanded_surface.judge_rate_limit, fdi, surface, SLOW, (frames or range(99))[k])
-    return surface["feasible"]["excluded"][SLOW]
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            place - 0.01,
+            place + 0.01,
+        )
+        judged(commanded_surface.consistent_rate_limit_interval, fdi, surface, SLOW, (frames or range(99))[k])
+    return surface["feasible_sets"]["excluded"][SLOW]
 
 
 def test_a_slow_surface_never_moves_away_from_its_command():
@@ -294,31 +345,34 @@ def test_which_side_of_its_orders_a_surface_stands_on():
     fdi, surface = new_surface(low=0.1, high=0.2)
     commands = surface["commands"]
     for newest, whole in ((1, 0), (2, 1)):
-        fdi["types"]["config"]["whole"] = whole
+        fdi["types"]["config"]["is_single_instant"] = whole
         for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
-            commands["low"], commands["high"] = 9.0, -9.0
-            commands["low"][newest], commands["high"][newest] = low, high
-            commands["low"][2] = min(commands["low"][2], low)
-            commands["high"][2] = max(commands["high"][2], high)
-            assert on(commanded_surface.side_of_command, fdi, surface) == side
+            commands["min_command"], commands["max_command"] = 9.0, -9.0
+            commands["min_command"][newest], commands["max_command"][newest] = low, high
+            commands["min_command"][2] = min(commands["min_command"][2], low)
+            commands["max_command"][2] = max(commands["max_command"][2], high)
+            assert on(commanded_surface.side_of_all_commands, fdi, surface) == side
 
 
-def swung(signs, half_cycle_frames=20):
+def swung(signs, slowest_half_cycle_frames=20):
     fdi, surface = new_surface()
-    fdi["types"]["config"]["half_cycle_frames"] = half_cycle_frames
+    fdi["types"]["config"]["slowest_half_cycle_frames"] = slowest_half_cycle_frames
     for frame, sign in enumerate(signs):
-        fdi["types"]["frame"] = frame + 1
-        surface["judged"]["low"], surface["judged"]["high"] = 0.1 * sign - 0.02, 0.1 * sign + 0.02
-        on(commanded_surface.add_squared_error, fdi, surface, OSCILLATORY)
-        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, frame)
+        fdi["types"]["frame_index"] = frame + 1
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            0.1 * sign - 0.02,
+            0.1 * sign + 0.02,
+        )
+        on(commanded_surface.add_squared_deflection_error, fdi, surface, OSCILLATORY)
+        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, frame)
     return fdi, surface
 
 
 def test_an_oscillation_is_counted_by_half_cycles():
     fdi, surface = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
     swing = surface["oscillatory"]
-    assert swing["half_cycles"] == 3
-    assert (swing["first_end"], swing["last_end"]) == (5, 15)
+    assert swing["n_half_cycles"] == 3
+    assert (swing["first_half_cycle_end_frame"], swing["last_half_cycle_end_frame"]) == (5, 15)
     assert commanded_surface.oscillation_has_shown(surface)
     assert not commanded_surface.oscillation_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
     assert commanded_surface.oscillation_frequency_rad_s(fdi, 0, OSCILLATORY) == pytest.approx(
@@ -326,38 +380,42 @@ def test_an_oscillation_is_counted_by_half_cycles():
     )
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
-    assert swing["squares"] == pytest.approx(10 * 0.01)
+    assert swing["earlier_error_square_sum"] == pytest.approx(10 * 0.01)
 
 
 def test_the_amplitude_is_that_of_the_mean_square():
     fdi, _ = swung([1] * 5 + [-1] * 5 + [1] * 5 + [-1])
-    assert commanded_surface.amplitude(fdi, 0, OSCILLATORY) == pytest.approx(np.sqrt(2.0 * 0.01))
+    assert commanded_surface.oscillation_amplitude_rad(fdi, 0, OSCILLATORY) == pytest.approx(
+        np.sqrt(2.0 * 0.01)
+    )
 
 
 def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
-    assert not swung([1] * 21)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert swung([1] * 22)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert swung([-1] * 22)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible"]["excluded"][OSCILLATORY]
+    assert not swung([1] * 21)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert swung([1] * 22)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert swung([-1] * 22)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert not swung([1] * 15 + [0] + [1] * 15)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     fdi, surface = swung([1] * 20)
-    on(commanded_surface.skip_oscillation, fdi, surface, OSCILLATORY)
-    assert surface["oscillatory"]["steady_since"] == 20
+    on(commanded_surface.skip_oscillation_frame, fdi, surface, OSCILLATORY)
+    assert surface["oscillatory"]["sign_since_frame"] == 20
 
 
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
-    fdi, surface = new_surface(started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0)
-    fdi["types"]["config"]["length"] = length
+    fdi, surface = new_surface(
+        first_anomalous_frame=3, first_position_low=0.1, first_position_high=0.2, min_runaway_rate=1.0
+    )
+    fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert on(held_surface.runaway_travel, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.least_upward_deflection, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(held_surface.least_downward_deflection, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(held_surface.least_upward_deflection, fdi, surface, 99) == HIGH
-    assert on(held_surface.least_downward_deflection, fdi, surface, 99) == LOW
-    surface["evidence"]["started_at"] = -1
+        assert on(held_surface.min_runaway_travel, fdi, surface, frame) == pytest.approx(way)
+        assert on(held_surface.min_runaway_up_deflection, fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert on(held_surface.max_runaway_down_deflection, fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert on(held_surface.min_runaway_up_deflection, fdi, surface, 99) == HIGH
+    assert on(held_surface.max_runaway_down_deflection, fdi, surface, 99) == LOW
+    surface["evidence"]["first_anomalous_frame"] = -1
     assert (
-        on(held_surface.least_upward_deflection, fdi, surface, 9),
-        on(held_surface.least_downward_deflection, fdi, surface, 9),
+        on(held_surface.min_runaway_up_deflection, fdi, surface, 9),
+        on(held_surface.max_runaway_down_deflection, fdi, surface, 9),
     ) == (
         LOW,
         HIGH,
@@ -373,55 +431,72 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
 )  # fmt: skip
 def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside):
     for (low, high), excluded in ((inside, 0), (outside, 1)):
-        fdi, surface = new_surface(low=low, high=high, started_at=3, start_low=0.1, start_high=0.2)
-        surface["actuator"]["least_runaway_rate"] = 1.0
-        surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.05, 0.3
-        judged(TYPES[kind].judge, fdi, surface, kind, 5)
-        assert surface["feasible"]["excluded"][kind] == excluded
+        fdi, surface = new_surface(
+            low=low, high=high, first_anomalous_frame=3, first_position_low=0.1, first_position_high=0.2
+        )
+        surface["actuator"]["min_runaway_rate"] = 1.0
+        surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
+        judged(TYPES[kind].consistent_interval, fdi, surface, kind, 5)
+        assert surface["feasible_sets"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate(fdi, 0, kind) == pytest.approx(0.175)
 
 
 @pytest.mark.parametrize(
-    ("whole", "stop_hides", "excluded"),
+    ("whole", "stop_can_hide_deflection", "excluded"),
     [(1, (0, 0), 1), (0, (0, 0), 1), (1, (0, 1), 1), (0, (0, 1), 0), (0, (1, 0), 1)],
 )
-def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_hides, excluded):
+def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_can_hide_deflection, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    fdi["types"]["config"]["whole"], surface["judged"]["stop_hides"] = whole, stop_hides
+    fdi["types"]["config"]["is_single_instant"], surface["judged_observation"]["stop_can_hide_deflection"] = (
+        whole,
+        stop_can_hide_deflection,
+    )
     for frame in range(30):
-        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, frame)
-    assert surface["feasible"]["excluded"][OSCILLATORY] == excluded
+        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, frame)
+    assert surface["feasible_sets"]["excluded"][OSCILLATORY] == excluded
 
 
-@pytest.mark.parametrize(("least", "greatest", "stop_hides"), [
+@pytest.mark.parametrize(("least", "greatest", "stop_can_hide_deflection"), [
     (-0.3, 0.4, [0, 0]), (-0.31, 0.3, [1, 0]), (0.0, 0.41, [0, 1]), (-0.35, 0.45, [1, 1]), (LOW, LOW, [1, 0]),
 ])  # fmt: skip
-def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(least, greatest, stop_hides):
+def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
+    least, greatest, stop_can_hide_deflection
+):
     _, surface = new_surface()
-    surface["commands"]["least"][0], surface["commands"]["greatest"][0] = least, greatest
-    contract.record_hiding_stops(surface, 0.0999)
-    assert surface["elapsed"]["stop_hides"].tolist() == stop_hides
+    surface["commands"]["min_healthy_position"][0], surface["commands"]["max_healthy_position"][0] = (
+        least,
+        greatest,
+    )
+    types.mark_stops_that_can_hide_deflection(surface, 0.0999)
+    assert surface["last_observation"]["stop_can_hide_deflection"].tolist() == stop_can_hide_deflection
 
 
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
-    judged(held_surface.judge_stuck, fdi, surface, STUCK, 5)
+    judged(held_surface.consistent_stuck_interval, fdi, surface, STUCK, 5)
     assert on(held_surface.stuck_deflection, fdi, surface, STUCK) == (0.1, 0.2)
-    assert contract.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
+    assert types.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
 
 def test_where_types_have_a_surface():
     fdi, surface = new_surface(
-        started_at=3, start_low=0.1, start_high=0.2, least_runaway_rate=1.0, command=0.2
+        first_anomalous_frame=3,
+        first_position_low=0.1,
+        first_position_high=0.2,
+        min_runaway_rate=1.0,
+        command=0.2,
     )
-    surface["elapsed"]["command"], surface["feasible"]["low"][CONSTANT_LOSS] = -0.2, 0.25
-    fdi["types"]["frame"] = 5
+    surface["last_observation"]["healthy_position"], surface["feasible_sets"]["low"][CONSTANT_LOSS] = (
+        -0.2,
+        0.25,
+    )
+    fdi["types"]["frame_index"] = 5
     assert on(commanded_surface.loss_deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
     assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.0, 0.0)
     surface["actuator"]["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
     assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.1, 0.1)
-    assert held_surface.neutral_deflection(fdi, 0, FLOAT) == 0.1
+    assert held_surface.neutral_deflection_rad(fdi, 0, FLOAT) == 0.1
     surface["actuator"]["travel_low"] = LOW
     assert on(held_surface.hardover_up_deflection, fdi, surface, UP) == pytest.approx((0.14, HIGH))
     assert on(held_surface.hardover_down_deflection, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
@@ -435,12 +510,12 @@ def test_where_types_have_a_surface():
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["types"]["config"]["released_returns"], fdi["types"]["config"]["instants"] = 1, instants
-    surface["commands"]["given"][1] = order
+    fdi["types"]["config"]["returns_via_actuator"], fdi["types"]["config"]["n_substeps"] = 1, instants
+    surface["commands"]["command_history"][1] = order
     for which in (held_surface.EARLIER_RELEASE, held_surface.LATER_RELEASE):
         held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["low"][held_surface.LATER_RELEASE, STUCK] = low
-    surface["release"]["high"][held_surface.LATER_RELEASE, STUCK] = high
+    surface["release"]["return_low"][held_surface.LATER_RELEASE, STUCK] = low
+    surface["release"]["return_high"][held_surface.LATER_RELEASE, STUCK] = high
     return fdi, surface
 
 
@@ -466,10 +541,14 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["judged"]["effectiveness_variation"] = 0.25 * (G.max() - G.min()) / G.mean()
+    surface["judged_observation"]["effectiveness_variation"] = 0.25 * (G.max() - G.min()) / G.mean()
     mean, _, room = on(held_surface.mean_return_position, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
-    surface["judged"]["command"], surface["judged"]["low"], surface["judged"]["high"] = (
+    (
+        surface["judged_observation"]["healthy_position"],
+        surface["judged_observation"]["position_low"],
+        surface["judged_observation"]["position_high"],
+    ) = (
         9.0,
         shown - 1e-12,
         shown + 1e-12,
@@ -481,7 +560,7 @@ def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
     assert on(held_surface.return_explains, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.22, 0.28))
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((0.22, 0.28))
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
         assert not on(held_surface.return_explains, fdi, surface, STUCK)
@@ -498,12 +577,16 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
     for beyond, there in ((0.9, True), (1.1, False), (-0.9, True), (-1.1, False)):
         shown = 0.25 + beyond * 0.2 * 0.1
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
-        fdi["types"]["config"]["length"], surface["actuator"]["approach"], surface["actuator"]["step"] = (
+        (
+            fdi["types"]["config"]["frames_per_block"],
+            surface["actuator"]["lag_share_per_substep"],
+            surface["actuator"]["max_motion_per_substep"],
+        ) = (
             length,
             1.0,
             0.05,
         )
-        surface["judged"]["effectiveness_variation"] = 0.2
+        surface["judged_observation"]["effectiveness_variation"] = 0.2
         assert on(held_surface.return_explains, fdi, surface, STUCK) == there
 
 
@@ -513,99 +596,115 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     held_surface.add_release(surface, STUCK, 0.1, 0.15)
     held_surface.add_release(surface, STUCK, 0.5, 0.4)  # nowhere
     held = surface["release"]
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
-    held["released"][STUCK] = 1
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.1, 0.3)
+    held["has_released"][STUCK] = 1
     held_surface.add_release(surface, STUCK, -0.4, 0.5)
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.1, 0.3)
-    surface["judged"]["anomalous"] = 1
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.1, 0.3)
+    surface["judged_observation"]["is_anomalous"] = 1
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((0.05, 0.2))
-    assert held["released"][STUCK] == 1
-    surface["judged"]["anomalous"] = 0
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((0.05, 0.2))
+    assert held["has_released"][STUCK] == 1
+    surface["judged_observation"]["is_anomalous"] = 0
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert held["released"][STUCK] == 0
+    assert held["has_released"][STUCK] == 0
 
 
-@pytest.mark.parametrize("released_returns", [0, 1])
-def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(released_returns):
+@pytest.mark.parametrize("returns_via_actuator", [0, 1])
+def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns_via_actuator):
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["released_returns"] = released_returns
-    elsewhere = held_surface.RETURNING if released_returns else held_surface.REFUTED
-    judged(held_surface.hold_or_return_explains, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["feasible"]["excluded"][STUCK] == (not released_returns)
-    assert surface["release"]["released"][STUCK] == released_returns
+    fdi["types"]["config"]["returns_via_actuator"] = returns_via_actuator
+    elsewhere = held_surface.STATUS_RETURNING if returns_via_actuator else held_surface.STATUS_REFUTED
+    judged(held_surface.held_or_returning_set, fdi, surface, STUCK, -0.1, 0.1)
+    assert surface["feasible_sets"]["excluded"][STUCK] == (not returns_via_actuator)
+    assert surface["release"]["has_released"][STUCK] == returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["released_returns"] = released_returns
-    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.HELD
-    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.HELD
-    surface["release"]["released"][STUCK] = 1
-    assert on(held_surface.hold_status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
+    fdi["types"]["config"]["returns_via_actuator"] = returns_via_actuator
+    assert on(held_surface.hold_status_in_frame, fdi, surface, STUCK, 0.3, 0.4) == held_surface.STATUS_HELD
+    assert on(held_surface.hold_status_in_frame, fdi, surface, STUCK, 0.1, 0.2) == held_surface.STATUS_HELD
+    surface["release"]["has_released"][STUCK] = 1
+    assert on(held_surface.hold_status_in_frame, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
     assert on(held_surface.position_at_frame_start, fdi, surface) == (0.1, 0.2, 9)
-    fdi["types"]["config"]["whole"] = 0
+    fdi["types"]["config"]["is_single_instant"] = 0
     assert on(held_surface.position_at_frame_start, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
 def test_from_where_each_type_lets_go(kind):
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=(-0.1, 0.2), started_at=7, start_low=0.0)
-    surface["actuator"]["least_runaway_rate"], surface["evidence"]["start_high"] = 1.0, 0.1
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.05, 0.3
+    fdi, surface = released(
+        low=np.inf, high=-np.inf, judged=(-0.1, 0.2), first_anomalous_frame=7, first_position_low=0.0
+    )
+    surface["actuator"]["min_runaway_rate"], surface["evidence"]["first_position_high"] = 1.0, 0.1
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["low"][held_surface.EARLIER_RELEASE, STUCK],
-            surface["release"]["high"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["return_low"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["return_high"][held_surface.EARLIER_RELEASE, STUCK],
         ) = 0.0, 0.1
-    on(TYPES[kind].on_release, fdi, surface, kind)
+    on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
-    assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
+    assert (held["return_low"][1, kind], held["return_high"][1, kind]) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
 def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(kind, expected):
-    fdi, surface = released(started_at=7, start_low=0.0, start_high=0.1, least_runaway_rate=1.0)
-    surface["earlier"]["low"], surface["earlier"]["high"], fdi["types"]["config"]["whole"] = -0.1, 0.2, 0
+    fdi, surface = released(
+        first_anomalous_frame=7, first_position_low=0.0, first_position_high=0.1, min_runaway_rate=1.0
+    )
+    (
+        surface["earlier_observation"]["position_low"],
+        surface["earlier_observation"]["position_high"],
+        fdi["types"]["config"]["is_single_instant"],
+    ) = -0.1, 0.2, 0
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
-    on(TYPES[kind].on_release, fdi, surface, kind)
+    on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
-    assert (held["low"][1, kind], held["high"][1, kind]) == pytest.approx(expected)
+    assert (held["return_low"][1, kind], held["return_high"][1, kind]) == pytest.approx(expected)
 
 
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
-    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
-    surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
-    restored(surface)
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
-    held_surface.promote_kept_sets(surface, STUCK)  # no earlier release: the later are the earlier ones now
+    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
+    surface["stuck"]["feasible_low_before_release"], surface["stuck"]["feasible_high_before_release"] = (
+        (0.0, 0.1),
+        (0.2, 0.4),
+    )
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
+    restore_sets(surface)
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
+    held_surface.promote_sets_before_release(
+        surface, STUCK
+    )  # no earlier release: the later are the earlier ones now
     held = surface["release"]
-    assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.2, 0.3)
+    assert (held["return_low"][0, STUCK], held["return_high"][0, STUCK]) == (0.2, 0.3)
     assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK)
-    assert (surface["stuck"]["kept_low"].tolist(), surface["stuck"]["kept_high"].tolist()) == (
+    assert (
+        surface["stuck"]["feasible_low_before_release"].tolist(),
+        surface["stuck"]["feasible_high_before_release"].tolist(),
+    ) == (
         [0.1, 0.1],
         [0.4, 0.4],
     )
-    restored(surface)
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
-    surface["judged"]["anomalous"], surface["feasible"]["low"][STUCK] = 1, 0.3
-    restored(surface)
-    assert surface["feasible"]["low"][STUCK] == 0.3
+    restore_sets(surface)
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
+    surface["judged_observation"]["is_anomalous"], surface["feasible_sets"]["low"][STUCK] = 1, 0.3
+    restore_sets(surface)
+    assert surface["feasible_sets"]["low"][STUCK] == 0.3
 
 
 def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     """A block of frames in which the surface may be let go at any instant."""
-    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, anomalous_then=1)
-    fdi["types"]["config"]["length"] = len(commands)
-    surface["commands"]["given"][1, : len(commands)] = commands
-    surface["release"]["held_low"][STUCK], surface["release"]["held_high"][STUCK] = held
-    surface["judged"]["effectiveness_variation"] = UNEVEN
+    fdi, surface = released(low=np.inf, high=-np.inf, judged=judged, is_anomalous_then=1)
+    fdi["types"]["config"]["frames_per_block"] = len(commands)
+    surface["commands"]["command_history"][1, : len(commands)] = commands
+    surface["release"]["held_position_min"][STUCK], surface["release"]["held_position_max"][STUCK] = held
+    surface["judged_observation"]["effectiveness_variation"] = UNEVEN
     return fdi, surface
 
 
@@ -646,12 +745,14 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
-    surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if end == "low" else (beyond, 1.0)
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        (-1.0, beyond) if end == "low" else (beyond, 1.0)
+    )
     assert on(held_surface.block_release_explains, fdi, surface, STUCK) == inside
     assert on(held_surface.return_explains, fdi, surface, STUCK) == inside
-    held = surface["release"]["held_low"][STUCK] <= surface["release"]["held_high"][STUCK]
+    held = surface["release"]["held_position_min"][STUCK] <= surface["release"]["held_position_max"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
-    fdi["types"]["config"]["length"] = 1
+    fdi["types"]["config"]["frames_per_block"] = 1
     assert not on(held_surface.block_release_explains, fdi, surface, STUCK)
 
 
@@ -665,12 +766,12 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     fdi, surface = within_block(ORDERS)
     held = surface["release"]
     if joined:
-        held["low"][1, STUCK], held["high"][1, STUCK] = 0.25, 0.251
+        held["return_low"][1, STUCK], held["return_high"][1, STUCK] = 0.25, 0.251
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     low, high = (on(held_surface.mean_return_position, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == pytest.approx((low, high))
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((low, high))
     assert not held_surface.has_release(surface, held_surface.EARLIER_RELEASE, STUCK)
-    fdi["types"]["config"]["length"], before = 1, held["high"][1, STUCK].copy()
+    fdi["types"]["config"]["frames_per_block"], before = 1, held["return_high"][1, STUCK].copy()
     held_surface.clear_releases(surface, held_surface.LATER_RELEASE, STUCK)
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK), (
@@ -683,9 +784,9 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
 @pytest.mark.parametrize("inside", [True, False])
 def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room(side, inside):
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
-    fdi["types"]["config"]["length"], surface["commands"]["given"][1, :4] = 4, ORDERS
+    fdi["types"]["config"]["frames_per_block"], surface["commands"]["command_history"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
-    surface["judged"]["effectiveness_variation"], path = UNEVEN, way(start, ORDERS)
+    surface["judged_observation"]["effectiveness_variation"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
     assert on(held_surface.mean_return_position, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
@@ -693,41 +794,49 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))
     sign = -1.0 if side == "low" else 1.0
     beyond = mean + sign * (room + (-1e-6 if inside else 1e-6))
-    surface["judged"]["low"], surface["judged"]["high"] = (-1.0, beyond) if side == "low" else (beyond, 1.0)
-    assert on(held_surface.narrow_return, fdi, surface, held_surface.LATER_RELEASE, STUCK) == inside
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+        (-1.0, beyond) if side == "low" else (beyond, 1.0)
+    )
+    assert on(held_surface.narrow_return_interval, fdi, surface, held_surface.LATER_RELEASE, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
-        assert held["low"][1, STUCK] <= held["high"][1, STUCK]
-        kept = held["low" if side == "low" else "high"][1, STUCK]
+        assert held["return_low"][1, STUCK] <= held["return_high"][1, STUCK]
+        kept = held["return_low" if side == "low" else "return_high"][1, STUCK]
         assert kept == pytest.approx(start)
 
 
 def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     fdi, surface = released(low=0.1, high=0.3, judged=(0.0, 0.25))
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.22
-    on(held_surface.on_release_stuck, fdi, surface, STUCK)
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.15, 0.22
+    on(held_surface.add_stuck_release, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["low"][0, STUCK], held["high"][0, STUCK]) == (0.1, 0.3)
-    assert (held["low"][1, STUCK], held["high"][1, STUCK]) == (0.15, 0.22)
-    assert (held["held_low"][STUCK], held["held_high"][STUCK]) == (0.15, 0.22)
+    assert (held["return_low"][0, STUCK], held["return_high"][0, STUCK]) == (0.1, 0.3)
+    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.15, 0.22)
+    assert (held["held_position_min"][STUCK], held["held_position_max"][STUCK]) == (0.15, 0.22)
 
 
 def test_a_jam_that_looks_healthy_is_what_it_was_before():
-    _, surface = released(low=0.2, high=0.3, anomalous_then=0)
-    surface["stuck"]["kept_low"], surface["stuck"]["kept_high"] = (0.0, 0.1), (0.2, 0.4)
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.25, 0.26
-    restored(surface)
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.1, 0.4)
-    surface["release"]["low"][0, STUCK], surface["release"]["high"][0, STUCK] = 0.1, 0.2
-    restored(surface)
-    assert (surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK]) == (0.0, 0.2)
+    _, surface = released(low=0.2, high=0.3, is_anomalous_then=0)
+    surface["stuck"]["feasible_low_before_release"], surface["stuck"]["feasible_high_before_release"] = (
+        (0.0, 0.1),
+        (0.2, 0.4),
+    )
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
+    restore_sets(surface)
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
+    surface["release"]["return_low"][0, STUCK], surface["release"]["return_high"][0, STUCK] = 0.1, 0.2
+    restore_sets(surface)
+    assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
 
 
 def test_a_frame_that_may_be_on_either_side_ends_no_half_cycle_and_begins_the_count_anew():
     fdi, surface = new_surface(low=-0.1, high=0.2)
-    judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, 10)
+    judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, 10)
     swing = surface["oscillatory"]
-    assert (swing["sign"], swing["half_cycles"], swing["steady_since"]) == (0, 0, 11)
+    assert (swing["error_sign"], swing["n_half_cycles"], swing["sign_since_frame"]) == (0, 0, 11)
     for low, high in ((0.0, 0.3), (-0.3, 0.0)):
-        surface["judged"]["low"], surface["judged"]["high"] = low, high
-        judged(commanded_surface.judge_oscillation, fdi, surface, OSCILLATORY, 10)
-        assert swing["sign"] == 0, "on its command it is on no side of it"
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            low,
+            high,
+        )
+        judged(commanded_surface.consistent_oscillation_interval, fdi, surface, OSCILLATORY, 10)
+        assert swing["error_sign"] == 0, "on its command it is on no side of it"

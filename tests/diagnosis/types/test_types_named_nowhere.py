@@ -8,7 +8,7 @@ from pkgutil import iter_modules
 import pytest
 
 from beaver_ftc.diagnosis import types
-from beaver_ftc.diagnosis.types import contract, registry, table
+from beaver_ftc.diagnosis.types import registry, table
 
 FOLDER = Path(types.__path__[0])
 READERS = sorted(path.name for path in FOLDER.glob("*.py"))
@@ -21,9 +21,9 @@ def names_of_types():
         name
         for module in MODULES
         for name, value in vars(import_module(f"{table.__name__}.{module}")).items()
-        if isinstance(value, contract.FaultType)
+        if isinstance(value, types.FaultType)
     }
-    words = {word for row in registry.TYPES for word in (row.name, row.words, row.record) if word}
+    words = {word for row in registry.TYPES for word in (row.name, row.description, row.record_name) if word}
     return (rows | words | set(MODULES)) - {"float"}  # which is Python's as well
 
 

@@ -4,13 +4,25 @@ import numpy as np
 import pytest
 from kernels import new_fdi, on, put, put_on
 
-from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis.expectation import means_dtype
+from beaver_ftc.diagnosis import conclusion, types
+from beaver_ftc.diagnosis.model_prediction import frame_means_dtype
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types import contract, pairs, registry, verdict
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
+from beaver_ftc.diagnosis.types import (
+    GIVE_UP,
+    SCALE_COMMAND,
+    SUBTRACT_OFFSET,
+    WAIT_FOR_SURFACE,
+    pairs,
+    registry,
+    verdict,
+)
 from beaver_ftc.diagnosis.types.registry import N_TYPES
-from beaver_ftc.diagnosis.types.verdict import BY_DEDUCTION, NO_SURFACE, RULED_OUT, SEVERAL_SURFACES
+from beaver_ftc.diagnosis.types.verdict import (
+    DEDUCED_FAULTY,
+    DEDUCED_HEALTHY,
+    NO_SURFACE,
+    SEVERAL_SURFACES,
+)
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -32,42 +44,48 @@ COURSES = (VARYING_LOSS, OSCILLATORY, SLOW, GROWING_BIAS)
 
 def leave(surface, *kinds):
     """Only these types are left of a surface."""
-    surface["feasible"]["excluded"] = [kind not in kinds for kind in range(N_TYPES)]
+    surface["feasible_sets"]["excluded"] = [kind not in kinds for kind in range(N_TYPES)]
 
 
 def new_case(**left):
     """Four surfaces, of which each has these types left: by default all; none: it cannot be at fault."""
     fdi = new_fdi()
     (
-        fdi["types"]["config"]["half_cycle_frames"],
-        fdi["types"]["config"]["whole"],
-        fdi["config"]["every_type"],
-        fdi["types"]["config"]["instants"],
+        fdi["types"]["config"]["slowest_half_cycle_frames"],
+        fdi["types"]["config"]["is_single_instant"],
+        fdi["config"]["diagnoses_all_types"],
+        fdi["types"]["config"]["n_substeps"],
     ) = PATIENCE, 1, 1, 1
-    fdi["isolation"]["config"]["n"] = 8
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"] = 1, DT
+    fdi["isolation"]["config"]["n_estimators"] = 8
+    fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = 1, DT
     layout = fdi["layout"]
     layout["loss_estimator"], layout["position_estimator"] = range(4), range(4, 8)
     layout["dominant_axis"], layout["main"] = (ROLL, PITCH, YAW, PITCH), (AILERON, ELEVATOR, RUDDER)
     layout["group"], layout["partner"] = (1, 0, 1, 0), (RUDDER, FLAP, AILERON, ELEVATOR)
-    fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["kind"][:8] = (
+    fdi["isolation"]["estimator"]["surface"][:8], fdi["isolation"]["estimator"]["hypothesis_kind"][:8] = (
         (0, 1, 2, 3) * 2,
         (0,) * 4 + (1,) * 4,
     )
     (
         fdi["types"]["surface"]["status"]["is_candidate"],
-        fdi["types"]["surface"]["evidence"]["frames"],
-        fdi["types"]["surface"]["evidence"]["unhidden_frames"],
+        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"],
+        fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"],
     ) = 1, 99, 99
     fdi["types"]["surface"]["actuator"]["travel_low"], fdi["types"]["surface"]["actuator"]["travel_high"] = (
         -0.4,
         0.5,
     )
-    fdi["types"]["surface"]["actuator"]["reach_low"], fdi["types"]["surface"]["actuator"]["reach_high"] = (
+    (
+        fdi["types"]["surface"]["actuator"]["reachable_low"],
+        fdi["types"]["surface"]["actuator"]["reachable_high"],
+    ) = (
         -0.4,
         0.5,
     )
-    fdi["isolation"]["estimator"]["low"][4:8], fdi["isolation"]["estimator"]["high"][4:8] = -0.4, 0.5
+    fdi["isolation"]["estimator"]["theta_min"][4:8], fdi["isolation"]["estimator"]["theta_max"][4:8] = (
+        -0.4,
+        0.5,
+    )
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
         if kinds is None:
@@ -78,12 +96,12 @@ def new_case(**left):
 
 
 def locate(fdi, s, innovation, bound, effect):
-    """`contract.locate_surface` for surface s, with its estimator and its axis."""
+    """`observe_position` for surface s, with its estimator and its axis."""
     fie = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
-    contract.shift_observations(surface)
-    contract.locate_surface(config, surface, fie, axis, innovation, bound, effect)
+    types.shift_observations(surface)
+    types.observe_position(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
@@ -117,12 +135,12 @@ def test_questions_about_the_types_left(kinds, constant, explained):
     assert bool(verdict.any_constant_type_remains(surface)) == constant
     assert bool(verdict.any_type_remains(surface)) == (kinds != ())
     for k, half_cycles in enumerate((2, 3)):
-        surface["oscillatory"]["half_cycles"] = half_cycles
-        assert bool(verdict.is_explained(surface)) == explained[k]
+        surface["oscillatory"]["n_half_cycles"] = half_cycles
+        assert bool(verdict.any_type_explains_flight(surface)) == explained[k]
 
 
 @pytest.mark.parametrize(
-    ("kinds", "fixed", "one_type", "sole_type"),
+    ("kinds", "fixed", "one_type", "sole_shown_type"),
     [
         ((CONSTANT_LOSS,), 0, CONSTANT_LOSS, CONSTANT_LOSS),
         ((VARYING_LOSS,), 0, -1, CONSTANT_LOSS),
@@ -138,13 +156,13 @@ def test_questions_about_the_types_left(kinds, constant, explained):
         ((SLOW, STUCK), 1, STUCK, -1),
     ],
 )
-def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_type):
+def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown_type):
     _, surface = one(*kinds)
-    same_name = verdict.FIRST_OF_NAME[sole_type] if sole_type >= 0 else -1
-    assert (verdict.accommodation_mode(surface) == GIVE_UP) == fixed
-    assert verdict.sole_constant_type(surface) == one_type
-    found = verdict.sole_type(surface)
-    assert (verdict.FIRST_OF_NAME[found] if found >= 0 else -1) == same_name
+    same_name = verdict.FIRST_TYPE_OF_NAME[sole_shown_type] if sole_shown_type >= 0 else -1
+    assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
+    assert verdict.sole_remaining_constant_type(surface) == one_type
+    found = verdict.sole_shown_type(surface)
+    assert (verdict.FIRST_TYPE_OF_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
@@ -155,7 +173,12 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
         False,
         True,
     ]
-    fdi["types"]["surface"]["status"]["decided_by"] = RULED_OUT, BY_DEDUCTION, BY_DEDUCTION, 0
+    fdi["types"]["surface"]["status"]["decision_basis"] = (
+        DEDUCED_HEALTHY,
+        DEDUCED_FAULTY,
+        DEDUCED_FAULTY,
+        0,
+    )
     assert [bool(verdict.can_be_at_fault(fdi["types"]["surface"][s])) for s in range(4)] == [
         False,
         True,
@@ -165,25 +188,25 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
 
 
 def test_the_sole_surface_that_is_possible():
-    assert on(verdict.sole_surface, new_case(), False) == SEVERAL_SURFACES
-    assert on(verdict.sole_surface, new_case(**NOBODY_ELSE), False) == RUDDER
-    assert on(verdict.sole_surface, new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
+    assert on(verdict.sole_possible_surface, new_case(), False) == SEVERAL_SURFACES
+    assert on(verdict.sole_possible_surface, new_case(**NOBODY_ELSE), False) == RUDDER
+    assert on(verdict.sole_possible_surface, new_case(rudder=None, **NOBODY_ELSE), False) == NO_SURFACE
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
-    assert on(verdict.sole_surface, only, True) == RUDDER
-    assert on(verdict.sole_surface, only, False) == SEVERAL_SURFACES
+    assert on(verdict.sole_possible_surface, only, True) == RUDDER
+    assert on(verdict.sole_possible_surface, only, False) == SEVERAL_SURFACES
     only["types"]["surface"]["status"]["is_candidate"] = 0, 0, 0, 1
-    assert on(verdict.sole_surface, only, False) == FLAP
-    assert on(verdict.sole_surface, only, True) == NO_SURFACE
+    assert on(verdict.sole_possible_surface, only, False) == FLAP
+    assert on(verdict.sole_possible_surface, only, True) == NO_SURFACE
 
 
 @pytest.mark.parametrize(
-    ("evidence", "rest_frames", "slow"), [(19, 0, True), (20, 0, False), (30, 11, True), (30, 10, False)]
+    ("evidence", "n_rest_frames", "slow"), [(19, 0, True), (20, 0, False), (30, 11, True), (30, 10, False)]
 )
-def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, rest_frames, slow):
-    fdi, surface = one(STUCK, SLOW, evidence=evidence, rest_frames=rest_frames)
+def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest_frames, slow):
+    fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
     assert bool(on(verdict.can_hide_at_rest, fdi, surface)) == slow
-    assert not on(verdict.can_hide_at_rest, *one(STUCK, evidence=evidence, rest_frames=rest_frames))
-    assert not on(verdict.can_hide_at_rest, *one(SLOW, evidence=evidence, rest_frames=rest_frames))
+    assert not on(verdict.can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames))
+    assert not on(verdict.can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames))
 
 
 def looked_like_by(kind):
@@ -195,9 +218,9 @@ def looked_like_by(kind):
 def test_what_stands_still_may_be_slow_until_that_is_excluded():
     assert looked_like_by(SLOW) == {STUCK, FLOAT, UP, DOWN}
     assert not verdict.can_be_another_type(one(STUCK)[1], STUCK, True)
-    assert on(verdict.type_at_fault, *one(STUCK)) == STUCK
-    assert on(verdict.type_at_fault, *one(STUCK, SLOW)) == -1
-    assert on(verdict.type_at_fault, *one(BIAS, SLOW)) == BIAS
+    assert on(verdict.fault_type_on_surface, *one(STUCK)) == STUCK
+    assert on(verdict.fault_type_on_surface, *one(STUCK, SLOW)) == -1
+    assert on(verdict.fault_type_on_surface, *one(BIAS, SLOW)) == BIAS
 
 
 def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
@@ -205,9 +228,9 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
     assert not verdict.can_be_another_type(one(STUCK)[1], STUCK, True)
     for direction, stop in ((UP, 1), (DOWN, 0)):  # what has run to the stop has not come there by and by
         _, surface = one(direction, GROWING_BIAS)
-        surface["growing_bias"]["ran"][stop] = 1
+        surface["growing_bias"]["has_run_to_stop"][stop] = 1
         assert not verdict.can_be_another_type(surface, direction, True)
-        surface["growing_bias"]["ran"][:] = 1 - surface["growing_bias"]["ran"]
+        surface["growing_bias"]["has_run_to_stop"][:] = 1 - surface["growing_bias"]["has_run_to_stop"]
         assert verdict.can_be_another_type(surface, direction, True)
     assert not verdict.can_be_another_type(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
     assert verdict.can_be_another_type(one(STUCK, GROWING_BIAS)[1], STUCK, False)
@@ -240,19 +263,19 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
 )
 def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, found, in_coarse_sets):
     """In sets that errors declared of our own make coarse, a constant proves nothing: one type of all."""
-    fdi, surface = one(*kinds, evidence=evidence, unhidden_frames=evidence)
-    surface["oscillatory"]["half_cycles"] = half_cycles
-    assert on(verdict.type_at_fault, fdi, surface) == found
+    fdi, surface = one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence)
+    surface["oscillatory"]["n_half_cycles"] = half_cycles
+    assert on(verdict.fault_type_on_surface, fdi, surface) == found
     fdi["types"]["config"]["has_surface_errors"] = 1
-    assert on(verdict.type_at_fault, fdi, surface) == in_coarse_sets
+    assert on(verdict.fault_type_on_surface, fdi, surface) == in_coarse_sets
 
 
 @pytest.mark.parametrize("kind", [STUCK, VARYING_LOSS, GROWING_BIAS])
 def test_what_a_stop_may_have_hidden_is_waited_for(kind):
-    fdi, surface = one(kind, OSCILLATORY, evidence=99, unhidden_frames=2 * PATIENCE - 1)
-    assert on(verdict.type_at_fault, fdi, surface) == -1
+    fdi, surface = one(kind, OSCILLATORY, evidence=99, n_frames_since_stop_could_hide=2 * PATIENCE - 1)
+    assert on(verdict.fault_type_on_surface, fdi, surface) == -1
     leave(surface, kind)  # an oscillation that has been excluded is not
-    assert on(verdict.type_at_fault, fdi, surface) == kind
+    assert on(verdict.fault_type_on_surface, fdi, surface) == kind
 
 
 @pytest.mark.parametrize(
@@ -268,7 +291,7 @@ def test_what_a_stop_may_have_hidden_is_waited_for(kind):
     ],
 )  # fmt: skip
 def test_what_is_done_about_a_surface(kinds, accommodation_mode):
-    assert verdict.accommodation_mode(one(*kinds)[1]) == accommodation_mode
+    assert verdict.choose_accommodation_mode(one(*kinds)[1]) == accommodation_mode
 
 
 def test_the_surface_at_fault():
@@ -296,98 +319,111 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
     flap, evidence, has_surface_errors, estimator_excluded
 ):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
-    fdi["types"]["surface"]["evidence"]["frames"][ELEVATOR], fdi["types"]["config"]["has_surface_errors"] = (
+    (
+        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR],
+        fdi["types"]["config"]["has_surface_errors"],
+    ) = (
         evidence,
         has_surface_errors,
     )
-    fdi["types"]["surface"]["evidence"]["unhidden_frames"][FLAP] = evidence
-    assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == estimator_excluded
+    fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"][FLAP] = evidence
+    assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
         assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
     fdi["types"]["surface"]["status"]["is_candidate"][FLAP] = 0
-    assert bool(on(verdict.others_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
+    assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
 def conclude(fdi, kernel, *given, lead=()):
     """Hand a finding of the types to the conclusion."""
-    conclusion.record_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+    conclusion.record_isolation_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
 
 
 def take_lead(fdi, kernel, *given):
     """Keep a lead where the conclusion has it."""
-    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = on(kernel, fdi, *given)
+    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = on(kernel, fdi, *given)
 
 
 def test_a_decision_notes_when_surface_and_type_became_certain():
     fdi = new_case(rudder=(STUCK,), **NOBODY_ELSE)
-    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = NOT_ISOLATED, -1
     conclude(fdi, verdict.decide_surface_and_type, 3.0)
-    assert fdi["verdict"]["isolated"] == 4 + RUDDER  # its estimator of a position
-    assert fdi["verdict"]["type"] == STUCK
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 3.0)
+    assert fdi["verdict"]["isolated_estimator"] == 4 + RUDDER  # its estimator of a position
+    assert fdi["verdict"]["fault_type"] == STUCK
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 3.0)
     leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
     conclude(fdi, verdict.decide_surface_and_type, 4.0)
-    assert fdi["verdict"]["isolated"] == RUDDER  # its estimator of a loss
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
+    assert fdi["verdict"]["isolated_estimator"] == RUDDER  # its estimator of a loss
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
     conclude(fdi, verdict.decide_surface_and_type, 5.0)
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (3.0, 4.0)
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
     fdi["types"]["surface"]["estimator_excluded"][RUDDER] = 1
     conclude(fdi, verdict.decide_surface_and_type, 6.0)
-    assert fdi["verdict"]["isolated"] == UNANTICIPATED
-    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_at_s"]) == (6.0, 6.0)
-    assert fdi["verdict"]["type"] == -1
-    assert fdi["verdict"]["lead"] == NO_SURFACE
+    assert fdi["verdict"]["isolated_estimator"] == UNANTICIPATED
+    assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (6.0, 6.0)
+    assert fdi["verdict"]["fault_type"] == -1
+    assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
 
 
 def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     fdi = new_case(**NOBODY_ELSE)
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == RUDDER
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == RUDDER
     assert on(verdict.presumed_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
     assert on(verdict.presumed_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
     assert on(verdict.presumed_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
-    fdi["verdict"]["isolated"] = 4 + FLAP
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == FLAP
+    fdi["verdict"]["isolated_estimator"] = 4 + FLAP
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == FLAP
 
 
 def _open(fdi):
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
     return fdi
 
 
 def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     fdi = _open(new_case(rudder=(STUCK,), **NOBODY_ELSE))
     surface = fdi["types"]["surface"][RUDDER]
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK], surface["elapsed"]["command"] = (
+    (
+        surface["feasible_sets"]["low"][STUCK],
+        surface["feasible_sets"]["high"][STUCK],
+        surface["last_observation"]["healthy_position"],
+    ) = (
         0.1,
         0.2,
         0.3,
     )
-    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.1, 0.2
+    surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
     fdi["types"]["surface"]["accommodation"]["mode"] = 3
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (RUDDER, GIVE_UP)
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (RUDDER, GIVE_UP)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, GIVE_UP, -1]
-    surface["elapsed"]["low"], surface["elapsed"]["high"] = 0.25, 0.35  # it follows its command again
+    surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = (
+        0.25,
+        0.35,
+    )  # it follows its command again
     fdi["types"]["config"]["dt"] = 0.01
     for _ in range(19):
-        take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
-    assert fdi["verdict"]["lead"] == RUDDER
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
-    assert fdi["verdict"]["lead"] == NO_SURFACE
+        take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    assert fdi["verdict"]["accommodated_surface"] == RUDDER
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    assert fdi["verdict"]["accommodated_surface"] == NO_SURFACE
     assert surface["accommodation"]["mode"] == -1
-    surface["elapsed"]["low"] = 0.1
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
-    assert (surface["accommodation"]["frames_absent"], fdi["verdict"]["lead"]) == (0, RUDDER)
-    assert on(verdict.fault_is_present, fdi, surface, SCALE_COMMAND, True)
+    surface["last_observation"]["position_low"] = 0.1
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    assert (surface["accommodation"]["n_frames_absent"], fdi["verdict"]["accommodated_surface"]) == (
+        0,
+        RUDDER,
+    )
+    assert on(verdict.is_fault_present, fdi, surface, SCALE_COMMAND, True)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
-    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, frames_absent=0)
+    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_frames_absent=0)
     fdi["types"]["config"]["dt"] = dt
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
-    there = [bool(on(verdict.fault_is_present, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
+    there = [bool(on(verdict.is_fault_present, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
     assert there.index(False) + 1 == round(0.2 / dt)
     assert not any(there[there.index(False) :])
 
@@ -401,187 +437,217 @@ def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(d
 )  # fmt: skip
 def test_how_far_a_surface_is_off(kinds, at_fault, off):
     _, surface = one(*kinds, command=0.3, low=0.2, high=0.24)
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
-    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -0.1, 0.0
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
+    surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -0.1, 0.0
     assert verdict.deflection_error(surface, at_fault) == pytest.approx(off)
     if kinds == (BIAS,):
-        surface["feasible"]["low"][BIAS] = -np.inf
+        surface["feasible_sets"]["low"][BIAS] = -np.inf
         assert verdict.deflection_error(surface, at_fault) == pytest.approx(0.22 - 0.3)
 
 
 def test_what_a_surface_has_left():
     fdi, surface = one(CONSTANT_LOSS)
     fdi["isolation"]["estimator"]["theta"][RUDDER] = -0.1, -0.2, -0.3
-    surface["feasible"]["low"][CONSTANT_LOSS], surface["feasible"]["high"][CONSTANT_LOSS] = 0.5, 0.6
-    assert on(verdict.effectiveness_left, fdi, RUDDER) == pytest.approx(0.7)  # by its own axis, yaw
+    surface["feasible_sets"]["low"][CONSTANT_LOSS], surface["feasible_sets"]["high"][CONSTANT_LOSS] = 0.5, 0.6
+    assert on(verdict.remaining_effectiveness, fdi, RUDDER) == pytest.approx(0.7)  # by its own axis, yaw
     fdi["types"]["pair"]["enabled"] = 1
-    assert on(verdict.effectiveness_left, fdi, RUDDER) == pytest.approx(0.55)
+    assert on(verdict.remaining_effectiveness, fdi, RUDDER) == pytest.approx(0.55)
     leave(surface, VARYING_LOSS)
-    assert on(verdict.effectiveness_left, fdi, RUDDER) == pytest.approx(0.7)
+    assert on(verdict.remaining_effectiveness, fdi, RUDDER) == pytest.approx(0.7)
 
 
 # Examining frames.
 
 
 def test_orders_are_kept_for_the_frames_before():
-    fdi, means = new_case(), np.zeros(1, means_dtype(4)).view(np.recarray)[0]
+    fdi, means = new_case(), np.zeros(1, frame_means_dtype(4)).view(np.recarray)[0]
     for frame in ((0.1, 0.2), (0.3, -0.1), (0.9, 0.0)):
         for k, order in enumerate(frame):
-            fdi["types"]["config"]["length"], fdi["types"]["block"]["filled"] = 2, k
-            means["G_least"], means["G_most"] = -1.0 - order, 2.0 - k
-            means["u_least"], means["u_most"] = order - 0.01, order + 0.02
+            fdi["types"]["config"]["frames_per_block"], fdi["types"]["block"]["n_frames"] = 2, k
+            means["G_min"], means["G_max"] = -1.0 - order, 2.0 - k
+            means["u_min"], means["u_max"] = order - 0.01, order + 0.02
             on(registry.record_commands, fdi, np.full(4, order), means)
     commands = fdi["types"]["surface"][0]["commands"]
-    assert commands["given"][:, :2] == pytest.approx(
+    assert commands["command_history"][:, :2] == pytest.approx(
         np.array([[0.5, 0.0], [0.3, -0.1], [0.1, 0.2]])
     )  # within the travel
-    assert commands["low"] == pytest.approx([0.0, -0.1, 0.1])
-    assert commands["high"] == pytest.approx([0.5, 0.3, 0.2])
+    assert commands["min_command"] == pytest.approx([0.0, -0.1, 0.1])
+    assert commands["max_command"] == pytest.approx([0.5, 0.3, 0.2])
     assert (
-        fdi["types"]["surface"][0]["commands"]["G_least"],
-        fdi["types"]["surface"][0]["commands"]["G_most"],
+        fdi["types"]["surface"][0]["commands"]["min_effectiveness"],
+        fdi["types"]["surface"][0]["commands"]["max_effectiveness"],
     ) == (
         -1.9,
         2.0,
     )  # of the last block
-    assert commands["least"] == pytest.approx([-0.01, -0.11])  # of a healthy one
-    assert commands["greatest"] == pytest.approx([0.92, 0.32])
+    assert commands["min_healthy_position"] == pytest.approx([-0.01, -0.11])  # of a healthy one
+    assert commands["max_healthy_position"] == pytest.approx([0.92, 0.32])
 
 
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["Z"], surface["elapsed"]["effectiveness_variation"] = (0.5, 0.0, -2.0), 0.07
-    surface["commands"]["G_least"], surface["commands"]["G_most"] = -2.1, -1.8
+    effect["regressor"], surface["last_observation"]["effectiveness_variation"] = (0.5, 0.0, -2.0), 0.07
+    surface["commands"]["min_effectiveness"], surface["commands"]["max_effectiveness"] = -2.1, -1.8
     locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
     assert (
-        surface["elapsed"]["effectiveness_variation"],
-        surface["judged"]["effectiveness_variation"],
+        surface["last_observation"]["effectiveness_variation"],
+        surface["judged_observation"]["effectiveness_variation"],
     ) == pytest.approx((0.25 * 0.3 / 2.0, 0.07))
 
 
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["Z"], effect["offset"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
-    surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["command"] = 0.2, 0.3, 0.15
-    surface["judged"]["low"], surface["judged"]["high"] = 0.4, 0.45
+    effect["regressor"], effect["base_acceleration"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
+    (
+        surface["last_observation"]["position_low"],
+        surface["last_observation"]["position_high"],
+        surface["last_observation"]["healthy_position"],
+    ) = 0.2, 0.3, 0.15
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.4, 0.45
     # off by 0.2: 0.1 on roll, -0.4 on yaw, give or take
     locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert surface["elapsed"]["command"] == pytest.approx(0.1)
-    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
-        (0.29, 0.31)
-    )  # roll says it to 0.005 / 0.5
-    assert (surface["judged"]["low"], surface["judged"]["high"], surface["judged"]["command"]) == (
+    assert surface["last_observation"]["healthy_position"] == pytest.approx(0.1)
+    assert (
+        surface["last_observation"]["position_low"],
+        surface["last_observation"]["position_high"],
+    ) == pytest.approx((0.29, 0.31))  # roll says it to 0.005 / 0.5
+    assert (
+        surface["judged_observation"]["position_low"],
+        surface["judged_observation"]["position_high"],
+        surface["judged_observation"]["healthy_position"],
+    ) == (
         0.2,
         0.3,
         0.15,
     )
-    assert (surface["earlier"]["low"], surface["earlier"]["high"]) == (0.4, 0.45)
-    fdi["types"]["config"]["length"] = 4
+    assert (
+        surface["earlier_observation"]["position_low"],
+        surface["earlier_observation"]["position_high"],
+    ) == (0.4, 0.45)
+    fdi["types"]["config"]["frames_per_block"] = 4
     locate(fdi, RUDDER, np.array([0.1, 0.0, -0.4]), np.array([0.005, 1.0, 0.1]), effect)
-    assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
-        (0.25, 0.35)
-    )  # its own axis alone
+    assert (
+        surface["last_observation"]["position_low"],
+        surface["last_observation"]["position_high"],
+    ) == pytest.approx((0.25, 0.35))  # its own axis alone
 
 
 def test_wrong_frames_are_remembered_for_two_more():
     fdi, bound = new_case(), np.full(3, 0.1)
     for innovation in (0.2, 0.05, 0.2):
-        on(registry.observe_frame, fdi, np.array([0.0, innovation, 0.0]), bound)
-    assert fdi["types"]["surface"]["elapsed"]["anomalous"].tolist() == [1] * 4
-    assert fdi["types"]["surface"]["judged"]["anomalous"].tolist() == [0] * 4
-    assert fdi["types"]["surface"]["earlier"]["anomalous"].tolist() == [1] * 4
+        on(registry.infer_surface_positions, fdi, np.array([0.0, innovation, 0.0]), bound)
+    assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [1] * 4
+    assert fdi["types"]["surface"]["judged_observation"]["is_anomalous"].tolist() == [0] * 4
+    assert fdi["types"]["surface"]["earlier_observation"]["is_anomalous"].tolist() == [1] * 4
 
 
 @pytest.mark.parametrize(
-    ("whole", "anomalous", "judged"),
+    ("whole", "is_anomalous", "judged"),
     [
         (0, (0, 1, 1), False), (0, (1, 1, 1), True), (0, (1, 1, 0), False), (0, (1, 0, 1), False),
         (1, (0, 1, 1), True), (1, (1, 1, 1), True), (1, (1, 1, 0), True), (1, (1, 0, 1), False),
     ],
 )  # fmt: skip
 def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_frames(
-    whole, anomalous, judged
+    whole, is_anomalous, judged
 ):
     fdi = new_case()
-    fdi["types"]["config"]["whole"], fdi["types"]["frame"] = whole, 7
+    fdi["types"]["config"]["is_single_instant"], fdi["types"]["frame_index"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface(surface)
-    surface["evidence"]["frames"], surface["accommodation"]["mode"] = 5, -1
-    surface["earlier"]["anomalous"], surface["judged"]["anomalous"], surface["elapsed"]["anomalous"] = (
-        anomalous
-    )
-    surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-    on(registry.judge_frame, fdi)
-    assert surface["evidence"]["frames"] == (6 if judged else 5)
-    assert surface["evidence"]["started_at"] == (6 if judged else -1)
-    assert (surface["evidence"]["start_low"], surface["evidence"]["start_high"]) == (
+    registry.restart_surface_types(surface)
+    surface["evidence"]["n_anomalous_frames"], surface["accommodation"]["mode"] = 5, -1
+    (
+        surface["earlier_observation"]["is_anomalous"],
+        surface["judged_observation"]["is_anomalous"],
+        surface["last_observation"]["is_anomalous"],
+    ) = is_anomalous
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.1, 0.2
+    on(registry.judge_previous_frame, fdi)
+    assert surface["evidence"]["n_anomalous_frames"] == (6 if judged else 5)
+    assert surface["evidence"]["first_anomalous_frame"] == (6 if judged else -1)
+    assert (surface["evidence"]["first_position_low"], surface["evidence"]["first_position_high"]) == (
         (0.1, 0.2) if judged else (0.0, 0.0)
     )
-    assert fdi["types"]["frame"] == 8
-    assert surface["oscillatory"]["steady_since"] == (6 if judged else 7)
+    assert fdi["types"]["frame_index"] == 8
+    assert surface["oscillatory"]["sign_since_frame"] == (6 if judged else 7)
 
 
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface(surface)
+    registry.restart_surface_types(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
-        surface["judged"]["anomalous"], surface["judged"]["stop_hides"] = 1, hides
-        surface["judged"]["low"], surface["judged"]["high"] = 0.1, 0.2
-        on(registry.judge_frame, fdi)
-        counted.append(int(surface["evidence"]["unhidden_frames"]))
+        (
+            surface["judged_observation"]["is_anomalous"],
+            surface["judged_observation"]["stop_can_hide_deflection"],
+        ) = 1, hides
+        surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
+            0.1,
+            0.2,
+        )
+        on(registry.judge_previous_frame, fdi)
+        counted.append(int(surface["evidence"]["n_frames_since_stop_could_hide"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
-    assert surface["evidence"]["frames"] == 8
+    assert surface["evidence"]["n_anomalous_frames"] == 8
 
 
 def test_where_a_stop_is_follows_the_surface_by_a_frame():
     fdi = new_case()
     surface, effect = fdi["types"]["surface"][RUDDER], fdi["isolation"]["estimator"][4 + RUDDER]["effect"]
-    effect["Z"], effect["spread"], bound = (0.5, 0.0, -2.0), (9.0, 9.0, 0.02), np.array([9.0, 9.0, 0.08])
+    effect["regressor"], effect["error_bound"], bound = (
+        (0.5, 0.0, -2.0),
+        (9.0, 9.0, 0.02),
+        np.array([9.0, 9.0, 0.08]),
+    )
     for at, now in ((0.41, 1), (0.39, 0)):  # 2 (0.08 + 0.02) / 2 is 0.1 rad, the stop at 0.5
-        surface["commands"]["greatest"][0], then = at, surface["elapsed"]["stop_hides"].copy()
+        surface["commands"]["max_healthy_position"][0], then = (
+            at,
+            surface["last_observation"]["stop_can_hide_deflection"].copy(),
+        )
         locate(fdi, RUDDER, np.zeros(3), bound, effect)
-        assert surface["elapsed"]["stop_hides"].tolist() == [0, now]
-        assert surface["judged"]["stop_hides"].tolist() == then.tolist()
+        assert surface["last_observation"]["stop_can_hide_deflection"].tolist() == [0, now]
+        assert surface["judged_observation"]["stop_can_hide_deflection"].tolist() == then.tolist()
 
 
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface(surface)
-    surface["judged"]["low"], surface["judged"]["high"] = 0.2, 0.1
-    on(registry.judge_surface, fdi, surface, 6)
-    assert surface["evidence"]["started_at"] == -1
+    registry.restart_surface_types(surface)
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.2, 0.1
+    on(registry.narrow_feasible_sets, fdi, surface, 6)
+    assert surface["evidence"]["first_anomalous_frame"] == -1
 
 
-def rest_frames(low=0.1, high=0.2, frames=1, **fields):
+def n_rest_frames(low=0.1, high=0.2, frames=1, **fields):
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.15, 0.3
-    surface["judged"]["low"], surface["judged"]["high"] = low, high
-    fdi["types"]["surface"]["evidence"]["frames"] = 0
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.15, 0.3
+    surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = low, high
+    fdi["types"]["surface"]["evidence"]["n_anomalous_frames"] = 0
     put(fdi, **fields)
     for _ in range(frames):
-        on(registry.count_rest, fdi, RUDDER)
+        on(registry.count_rest_as_evidence, fdi, RUDDER)
     return fdi, surface
 
 
 def test_a_quiet_surface_given_up_does_not_swing():
-    fdi, surface = rest_frames()
-    assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [1] * 4
-    assert surface["evidence"]["rest_frames"] == 1
-    assert rest_frames(low=0.31, high=0.4)[1]["evidence"]["rest_frames"] == 0
-    assert rest_frames(low=0.0, high=0.14)[1]["evidence"]["rest_frames"] == 0
-    assert not rest_frames(frames=PATIENCE)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert rest_frames(frames=PATIENCE + 1)[1]["feasible"]["excluded"][OSCILLATORY]
-    assert not rest_frames(frames=PATIENCE + 1, has_surface_errors=1)[1]["feasible"]["excluded"][OSCILLATORY]
-    fdi, surface = rest_frames()
+    fdi, surface = n_rest_frames()
+    assert fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist() == [1] * 4
+    assert surface["evidence"]["n_rest_frames"] == 1
+    assert n_rest_frames(low=0.31, high=0.4)[1]["evidence"]["n_rest_frames"] == 0
+    assert n_rest_frames(low=0.0, high=0.14)[1]["evidence"]["n_rest_frames"] == 0
+    assert not n_rest_frames(frames=PATIENCE)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert n_rest_frames(frames=PATIENCE + 1)[1]["feasible_sets"]["excluded"][OSCILLATORY]
+    assert not n_rest_frames(frames=PATIENCE + 1, has_surface_errors=1)[1]["feasible_sets"]["excluded"][
+        OSCILLATORY
+    ]
+    fdi, surface = n_rest_frames()
     fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
-    on(registry.count_rest, fdi, RUDDER)
-    assert fdi["types"]["surface"]["evidence"]["frames"].tolist() == [
+    on(registry.count_rest_as_evidence, fdi, RUDDER)
+    assert fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist() == [
         1,
         1,
         2,
@@ -594,7 +660,7 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
     fdi = new_case()
     (
         fdi["types"]["surface"]["accommodation"]["mode"],
-        fdi["types"]["surface"]["feasible"]["high"],
+        fdi["types"]["surface"]["feasible_sets"]["high"],
         fdi["types"]["config"]["abrupt"],
     ) = (
         -1,
@@ -602,14 +668,17 @@ def test_a_surface_given_up_is_quiet_where_nothing_is_wrong_and_a_fault_stays(ab
         abrupt,
     )
     fdi["types"]["surface"][RUDDER]["accommodation"]["mode"] = GIVE_UP
-    on(registry.judge_frame, fdi)
-    assert fdi["types"]["surface"]["evidence"]["rest_frames"].tolist() == [0, 0, abrupt, 0]
+    on(registry.judge_previous_frame, fdi)
+    assert fdi["types"]["surface"]["evidence"]["n_rest_frames"].tolist() == [0, 0, abrupt, 0]
 
 
 def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     rng, fdi, length = np.random.default_rng(6), new_case(), 4
-    fdi["types"]["config"]["length"], fdi["types"]["config"]["block_s"] = length, length * DT
-    fdi["types"]["block"]["innovation"], fdi["types"]["block"]["bound"] = 9.0, 9.0
+    fdi["types"]["config"]["frames_per_block"], fdi["types"]["config"]["block_duration_s"] = (
+        length,
+        length * DT,
+    )
+    fdi["types"]["block"]["mean_innovation"], fdi["types"]["block"]["mean_innovation_bound"] = 9.0, 9.0
     innovation, eta = rng.normal(size=(length, 3)), rng.uniform(0.1, 0.2, (length, 3))
     noise = rng.uniform(0.01, 0.02, (length + 1, 3))
     Z, offset = rng.uniform(1, 2, (length, 8, 3)), rng.normal(size=(length, 8, 3))
@@ -617,20 +686,20 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     Z[:, :, YAW] += 5.0
     for k in range(length):
         fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["noise_before"], fdi["bound"]["noise"] = noise[k], noise[k + 1]
-        fdi["isolation"]["estimator"]["effect"]["Z"][:8] = Z[k]
-        fdi["isolation"]["estimator"]["effect"]["offset"][:8] = offset[k]
-        fdi["isolation"]["estimator"]["effect"]["spread"][:8] = spread[k]
-        on(registry.examine_block, fdi)
-        assert fdi["types"]["block"]["filled"] == (k + 1) % length
-        assert fdi["types"]["frame"] == (k + 1 == length)
-    assert fdi["types"]["block"]["innovation"] == pytest.approx(innovation.mean(axis=0))
+        fdi["bound"]["gyro_change_bound_before"], fdi["bound"]["gyro_change_bound"] = noise[k], noise[k + 1]
+        fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
+        fdi["isolation"]["estimator"]["effect"]["base_acceleration"][:8] = offset[k]
+        fdi["isolation"]["estimator"]["effect"]["error_bound"][:8] = spread[k]
+        on(registry.observe_and_judge_block, fdi)
+        assert fdi["types"]["block"]["n_frames"] == (k + 1) % length
+        assert fdi["types"]["frame_index"] == (k + 1 == length)
+    assert fdi["types"]["block"]["mean_innovation"] == pytest.approx(innovation.mean(axis=0))
     ends = (noise[0] + noise[-1]) / (length * DT)
-    assert fdi["types"]["block"]["bound"] == pytest.approx(eta.mean(axis=0) + ends)
-    mean = fdi["isolation"]["estimator"][4 + RUDDER]["block_effect"]
-    assert mean["Z"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
-    assert mean["offset"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
-    assert mean["spread"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
+    assert fdi["types"]["block"]["mean_innovation_bound"] == pytest.approx(eta.mean(axis=0) + ends)
+    mean = fdi["isolation"]["estimator"][4 + RUDDER]["block_mean_effect"]
+    assert mean["regressor"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
+    assert mean["base_acceleration"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
+    assert mean["error_bound"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
 
 
 # Two faults at once.
@@ -640,8 +709,8 @@ def test_alarms_are_noted_by_plane():
     for axis, planes in ((ROLL, [0, 1]), (PITCH, [1, 0]), (YAW, [0, 1])):
         fdi = new_case()
         fdi["bank"]["output"]["threshold"], fdi["bank"]["output"]["residual"][2, axis] = 0.1, -0.11
-        on(pairs.record_plane_alarms, fdi)
-        assert fdi["types"]["pair"]["alarmed"].tolist() == planes
+        on(pairs.record_group_alarms, fdi)
+        assert fdi["types"]["pair"]["group_has_alarm"].tolist() == planes
 
 
 def lateral(one_left=True, other_left=True, alarmed=1, **pair):
@@ -651,13 +720,13 @@ def lateral(one_left=True, other_left=True, alarmed=1, **pair):
     for s, kept in ((AILERON, one_left), (RUDDER, other_left)):
         if not kept:
             leave(fdi["types"]["surface"][s], BIAS)
-    fdi["types"]["pair"]["alarmed"] = 0, alarmed
+    fdi["types"]["pair"]["group_has_alarm"] = 0, alarmed
     for name, value in pair.items():
         fdi["types"]["pair"][name] = value
-    outside = on(pairs.decide_roll_and_yaw, fdi, 3.0)
+    outside = on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
     return [
-        bool(fdi["types"]["surface"]["status"]["named"][AILERON]),
-        bool(fdi["types"]["surface"]["status"]["named"][RUDDER]),
+        bool(fdi["types"]["surface"]["status"]["is_isolated"][AILERON]),
+        bool(fdi["types"]["surface"]["status"]["is_isolated"][RUDDER]),
         bool(outside),
     ]
 
@@ -668,7 +737,7 @@ def test_who_is_named_in_roll_and_yaw():
     assert lateral(other_left=False) == [True, False, False]
     assert lateral(False, False) == [True, True, False]
     assert lateral(False, False, alarmed=0) == [False, False, False]
-    assert lateral(False, False, no_lateral_pair=1) == [False, False, True]
+    assert lateral(False, False, lateral_outside_class=1) == [False, False, True]
 
 
 def test_where_nothing_explains_both_the_fault_is_outside_the_class():
@@ -676,35 +745,39 @@ def test_where_nothing_explains_both_the_fault_is_outside_the_class():
         fdi = new_case(aileron=None, rudder=None)
         leave(fdi["types"]["surface"][AILERON], BIAS)
         leave(fdi["types"]["surface"][RUDDER], BIAS)
-        fdi["types"]["pair"]["alarmed"] = 0, 1
+        fdi["types"]["pair"]["group_has_alarm"] = 0, 1
         leave(fdi["types"]["surface"][s])
-        assert on(pairs.decide_roll_and_yaw, fdi, 3.0)
+        assert on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
         leave(fdi["types"]["surface"][s], OSCILLATORY)  # it may swing yet
-        assert not on(pairs.decide_roll_and_yaw, fdi, 3.0)
-        assert not fdi["types"]["surface"]["status"]["named"].any()
+        assert not on(pairs.decide_roll_and_yaw_isolation, fdi, 3.0)
+        assert not fdi["types"]["surface"]["status"]["is_isolated"].any()
 
 
 def test_a_name_notes_when_it_was_given_and_when_its_type():
     surface = new_case()["types"]["surface"][RUDDER]
-    surface["status"]["type"] = -1
-    pairs.set_named(surface, 1, STUCK, 3.0)
+    surface["status"]["fault_type"] = -1
+    pairs.set_isolation_status(surface, 1, STUCK, 3.0)
     assert (
-        surface["status"]["named"],
-        surface["status"]["type"],
-        surface["status"]["named_at_s"],
-        surface["status"]["type_at_s"],
+        surface["status"]["is_isolated"],
+        surface["status"]["fault_type"],
+        surface["status"]["isolated_at_s"],
+        surface["status"]["type_decided_at_s"],
     ) == (
         1,
         STUCK,
         3.0,
         3.0,
     )
-    pairs.set_named(surface, 1, BIAS, 4.0)
-    assert (surface["status"]["named_at_s"], surface["status"]["type_at_s"]) == (3.0, 4.0)
-    pairs.set_named(surface, 1, BIAS, 5.0)
-    assert surface["status"]["type_at_s"] == 4.0
-    pairs.set_named(surface, 0, BIAS, 6.0)
-    assert (surface["status"]["named"], surface["status"]["type"], surface["status"]["type_at_s"]) == (
+    pairs.set_isolation_status(surface, 1, BIAS, 4.0)
+    assert (surface["status"]["isolated_at_s"], surface["status"]["type_decided_at_s"]) == (3.0, 4.0)
+    pairs.set_isolation_status(surface, 1, BIAS, 5.0)
+    assert surface["status"]["type_decided_at_s"] == 4.0
+    pairs.set_isolation_status(surface, 0, BIAS, 6.0)
+    assert (
+        surface["status"]["is_isolated"],
+        surface["status"]["fault_type"],
+        surface["status"]["type_decided_at_s"],
+    ) == (
         0,
         -1,
         6.0,
@@ -713,130 +786,162 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
-    surface["elapsed"]["command"] = 0.1
-    assert contract.set_deflection(surface, 0.2, 0.05)
-    assert (surface["elapsed"]["low"], surface["elapsed"]["high"], surface["elapsed"]["anomalous"]) == (
+    surface["last_observation"]["healthy_position"] = 0.1
+    assert types.set_observed_deflection_error(surface, 0.2, 0.05)
+    assert (
+        surface["last_observation"]["position_low"],
+        surface["last_observation"]["position_high"],
+        surface["last_observation"]["is_anomalous"],
+    ) == (
         pytest.approx(0.25),
         pytest.approx(0.35),
         1,
     )
-    assert contract.set_deflection(surface, 0.4, 0.05)
-    assert surface["elapsed"]["high"] == 0.5
-    assert not contract.set_deflection(surface, 0.5, 0.05)
-    assert contract.set_deflection(surface, -0.49, 0.05)
-    assert surface["elapsed"]["low"] == -0.4
-    contract.set_deflection(surface, 0.04, 0.05)
-    assert surface["elapsed"]["anomalous"] == 0
-    contract.set_deflection(surface, 0.05, 0.05)
-    assert surface["elapsed"]["anomalous"] == 0
+    assert types.set_observed_deflection_error(surface, 0.4, 0.05)
+    assert surface["last_observation"]["position_high"] == 0.5
+    assert not types.set_observed_deflection_error(surface, 0.5, 0.05)
+    assert types.set_observed_deflection_error(surface, -0.49, 0.05)
+    assert surface["last_observation"]["position_low"] == -0.4
+    types.set_observed_deflection_error(surface, 0.04, 0.05)
+    assert surface["last_observation"]["is_anomalous"] == 0
+    types.set_observed_deflection_error(surface, 0.05, 0.05)
+    assert surface["last_observation"]["is_anomalous"] == 0
 
 
 def test_whereabouts_cover_every_constant_type_left():
     fdi, surface = one(STUCK, FLOAT, SLOW)
-    surface["feasible"]["low"][STUCK], surface["feasible"]["high"][STUCK] = 0.1, 0.2
-    assert on(pairs.deflection_range, fdi, surface) == (0.0, 0.2)
+    surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
+    assert on(pairs.possible_deflection_interval, fdi, surface) == (0.0, 0.2)
     leave(surface, BIAS)
-    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = -np.inf, 0.0
-    assert on(pairs.deflection_range, fdi, surface) == (-0.4, 0.0)
-    surface["feasible"]["low"][BIAS], surface["feasible"]["high"][BIAS] = 0.1, np.inf
-    assert on(pairs.deflection_range, fdi, surface) == (0.1, 0.5)
+    surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, 0.0
+    assert on(pairs.possible_deflection_interval, fdi, surface) == (-0.4, 0.0)
+    surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = 0.1, np.inf
+    assert on(pairs.possible_deflection_interval, fdi, surface) == (0.1, 0.5)
 
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     fdi = new_case(elevator=(STUCK,))
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
-    fdi["types"]["pair"]["first"], elevator["status"]["is_candidate"] = ELEVATOR, 0
+    fdi["types"]["pair"]["first_fault_surface"], elevator["status"]["is_candidate"] = ELEVATOR, 0
     (
-        elevator["feasible"]["low"][STUCK],
-        elevator["feasible"]["high"][STUCK],
-        elevator["elapsed"]["command"],
+        elevator["feasible_sets"]["low"][STUCK],
+        elevator["feasible_sets"]["high"][STUCK],
+        elevator["last_observation"]["healthy_position"],
     ) = 0.1, 0.14, 0.0
     (
-        fdi["isolation"]["estimator"]["effect"]["Z"][4 + ELEVATOR, PITCH],
-        fdi["isolation"]["estimator"]["effect"]["Z"][4 + FLAP, PITCH],
+        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + ELEVATOR, PITCH],
+        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + FLAP, PITCH],
     ) = (
         -10.0,
         2.0,
     )
-    fdi["isolation"]["estimator"]["effect"]["spread"][4 + ELEVATOR, PITCH] = 0.01
-    fdi["isolation"]["estimator"]["effect"]["spread"][4 + FLAP, PITCH] = 0.02
-    fdi["bound"]["frame"][PITCH], fdi["bank"]["output"]["innovation"][PITCH], flap["elapsed"]["command"] = (
+    fdi["isolation"]["estimator"]["effect"]["error_bound"][4 + ELEVATOR, PITCH] = 0.01
+    fdi["isolation"]["estimator"]["effect"]["error_bound"][4 + FLAP, PITCH] = 0.02
+    (
+        fdi["bound"]["frame_innovation_bound"][PITCH],
+        fdi["bank"]["output"]["innovation"][PITCH],
+        flap["last_observation"]["healthy_position"],
+    ) = (
         0.03,
         -1.2 + 0.4,
         0.05,
     )
-    on(pairs.solve_pitch, fdi)
+    on(pairs.locate_pitch_surfaces, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
-    assert (flap["elapsed"]["low"], flap["elapsed"]["high"]) == pytest.approx(
-        (0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13)
+    assert (
+        flap["last_observation"]["position_low"],
+        flap["last_observation"]["position_high"],
+    ) == pytest.approx((0.05 + 0.2 - 0.13, 0.05 + 0.2 + 0.13))
+    assert flap["last_observation"]["is_anomalous"] == 1
+    assert elevator["last_observation"]["is_anomalous"] == 0
+    assert (elevator["last_observation"]["position_low"], elevator["last_observation"]["position_high"]) == (
+        0.1,
+        0.14,
     )
-    assert flap["elapsed"]["anomalous"] == 1
-    assert elevator["elapsed"]["anomalous"] == 0
-    assert (elevator["elapsed"]["low"], elevator["elapsed"]["high"]) == (0.1, 0.14)
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
-    on(pairs.solve_pitch, fdi)
-    assert flap["status"]["decided_by"] == RULED_OUT
+    on(pairs.locate_pitch_surfaces, fdi)
+    assert flap["status"]["decision_basis"] == DEDUCED_HEALTHY
 
 
-@pytest.mark.parametrize(("innovation", "anomalous"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
-def test_before_that_pitch_shows_a_fault_or_not(innovation, anomalous):
+@pytest.mark.parametrize(("innovation", "is_anomalous"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
+def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
     fdi = new_case()
-    fdi["types"]["pair"]["first"], fdi["bound"]["frame"], fdi["bank"]["output"]["innovation"] = (
+    (
+        fdi["types"]["pair"]["first_fault_surface"],
+        fdi["bound"]["frame_innovation_bound"],
+        fdi["bank"]["output"]["innovation"],
+    ) = (
         NO_SURFACE,
         0.03,
         innovation,
     )
-    on(pairs.solve_pitch, fdi)
-    assert fdi["types"]["surface"]["elapsed"]["anomalous"].tolist() == [0, anomalous, 0, anomalous]
+    on(pairs.locate_pitch_surfaces, fdi)
+    assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [
+        0,
+        is_anomalous,
+        0,
+        is_anomalous,
+    ]
 
 
 def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     fdi = new_case(elevator=(STUCK,))
     elevator = fdi["types"]["surface"][ELEVATOR]
-    fdi["types"]["pair"]["first"] = NO_SURFACE
-    elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK] = 0.1, 0.14
-    on(pairs.store_first_fault, fdi, ELEVATOR)
-    known = elevator["known"]
-    assert fdi["types"]["pair"]["first"] == ELEVATOR
+    fdi["types"]["pair"]["first_fault_surface"] = NO_SURFACE
+    elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK] = 0.1, 0.14
+    on(pairs.store_first_fault_sets, fdi, ELEVATOR)
+    known = elevator["first_fault_sets"]
+    assert fdi["types"]["pair"]["first_fault_surface"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
-    elevator["feasible"]["excluded"][STUCK], elevator["feasible"]["low"][STUCK] = 1, 0.12
+    elevator["feasible_sets"]["excluded"][STUCK], elevator["feasible_sets"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
-        on(pairs.store_first_fault, fdi, ELEVATOR)
-        assert (known["low"][STUCK], fdi["types"]["pair"]["frames_since_change"]) == (0.1, k + 1)
-    on(pairs.store_first_fault, fdi, ELEVATOR)
-    assert (known["low"][STUCK], fdi["types"]["pair"]["frames_since_change"]) == (0.12, 0)
+        on(pairs.store_first_fault_sets, fdi, ELEVATOR)
+        assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.1, k + 1)
+    on(pairs.store_first_fault_sets, fdi, ELEVATOR)
+    assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.12, 0)
 
 
 def test_a_second_begins_with_what_was_known_of_the_first():
     fdi = new_case(elevator=(), flap=(BIAS,))
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
-    fdi["types"]["pair"]["first"], elevator["known"]["low"], elevator["known"]["high"] = ELEVATOR, 0.1, 0.14
-    elevator["known"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
-    for frame in ("elapsed", "judged", "earlier"):
-        fdi["types"]["surface"][frame]["anomalous"] = 1
-    assert on(pairs.has_second_fault_in_pitch, fdi)
-    assert verdict.sole_constant_type(elevator) == STUCK
-    assert (elevator["feasible"]["low"][STUCK], elevator["feasible"]["high"][STUCK]) == (0.1, 0.14)
-    assert not flap["feasible"]["excluded"].any()
+    (
+        fdi["types"]["pair"]["first_fault_surface"],
+        elevator["first_fault_sets"]["low"],
+        elevator["first_fault_sets"]["high"],
+    ) = (
+        ELEVATOR,
+        0.1,
+        0.14,
+    )
+    elevator["first_fault_sets"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
+    for frame in ("last_observation", "judged_observation", "earlier_observation"):
+        fdi["types"]["surface"][frame]["is_anomalous"] = 1
+    assert on(pairs.has_second_pitch_fault, fdi)
+    assert verdict.sole_remaining_constant_type(elevator) == STUCK
+    assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
+    assert not flap["feasible_sets"]["excluded"].any()
     for surface in (elevator, flap):
-        assert (surface["status"]["is_candidate"], surface["status"]["decided_by"]) == (0, BY_DEDUCTION)
+        assert (surface["status"]["is_candidate"], surface["status"]["decision_basis"]) == (
+            0,
+            DEDUCED_FAULTY,
+        )
         assert (
-            surface["elapsed"]["anomalous"],
-            surface["judged"]["anomalous"],
-            surface["earlier"]["anomalous"],
+            surface["last_observation"]["is_anomalous"],
+            surface["judged_observation"]["is_anomalous"],
+            surface["earlier_observation"]["is_anomalous"],
         ) == (
             0,
             0,
             0,
         )
     assert fdi["types"]["surface"]["status"]["is_candidate"][[AILERON, RUDDER]].tolist() == [1, 1]
-    assert not on(pairs.has_second_fault_in_pitch, _first(new_case(elevator=(STUCK,)), ELEVATOR))
-    assert not on(pairs.has_second_fault_in_pitch, _first(new_case(elevator=()), NO_SURFACE))
+    assert not on(pairs.has_second_pitch_fault, _first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not on(pairs.has_second_pitch_fault, _first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
-    fdi["types"]["pair"]["first"] = surface
+    fdi["types"]["pair"]["first_fault_surface"] = surface
     return fdi
 
 
@@ -850,7 +955,12 @@ def _first(fdi, surface):
 )  # fmt: skip
 def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patient):
     assert (
-        bool(on(pairs.evidence_is_long_enough, *one(*kinds, evidence=evidence, unhidden_frames=evidence)))
+        bool(
+            on(
+                pairs.has_enough_evidence,
+                *one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence),
+            )
+        )
         == patient
     )
 
@@ -863,97 +973,118 @@ def test_in_pitch_a_jam_stays_open_as_the_other_may_be_off_by_a_constant():
         ((BIAS,), BIAS),
         ((CONSTANT_LOSS,), CONSTANT_LOSS),
     ):
-        assert on(pairs.type_in_pitch, *one(*kinds)) == found
+        assert on(pairs.pitch_fault_type, *one(*kinds)) == found
 
 
 def decided(alarmed=(1, 0), **left):
     fdi = new_case(**left)
-    fdi["types"]["pair"]["enabled"], fdi["types"]["pair"]["first"], fdi["types"]["pair"]["alarmed"] = (
+    (
+        fdi["types"]["pair"]["enabled"],
+        fdi["types"]["pair"]["first_fault_surface"],
+        fdi["types"]["pair"]["group_has_alarm"],
+    ) = (
         1,
         NO_SURFACE,
         alarmed,
     )
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
-    fdi["types"]["surface"]["status"]["type"] = -1
-    fdi["types"]["surface"]["elapsed"]["low"], fdi["types"]["surface"]["elapsed"]["high"] = -0.4, 0.5
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    fdi["types"]["surface"]["status"]["fault_type"] = -1
+    (
+        fdi["types"]["surface"]["last_observation"]["position_low"],
+        fdi["types"]["surface"]["last_observation"]["position_high"],
+    ) = -0.4, 0.5
     return fdi
 
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
-    conclude(fdi, pairs.decide_pairs, 3.0)
-    assert fdi["types"]["surface"]["status"]["named"].tolist() == [
+    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [
         0,
         0,
         0,
         0,
     ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide_pairs, 3.0)
-    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
-    assert fdi["verdict"]["isolated"] == ELEVATOR
-    assert (fdi["verdict"]["type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (ELEVATOR, SCALE_COMMAND)
+    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
+    assert fdi["verdict"]["isolated_estimator"] == ELEVATOR
+    assert (fdi["verdict"]["fault_type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+        ELEVATOR,
+        SCALE_COMMAND,
+    )
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SCALE_COMMAND, -1, -1]
-    assert fdi["types"]["pair"]["first"] == ELEVATOR
+    assert fdi["types"]["pair"]["first_fault_surface"] == ELEVATOR
 
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide_pairs, 3.0)
-    assert not fdi["types"]["surface"]["status"]["named"][ELEVATOR]
-    assert not on(pairs.law_acts_on, fdi, ELEVATOR)
+    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    assert not fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR]
+    assert not on(pairs.is_accommodated, fdi, ELEVATOR)
 
 
 def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     fdi = decided()
-    assert [bool(on(pairs.law_acts_on, fdi, s)) for s in range(4)] == [False, True, False, False]
+    assert [bool(on(pairs.is_accommodated, fdi, s)) for s in range(4)] == [False, True, False, False]
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
-    assert [bool(on(pairs.law_acts_on, only_flap, s)) for s in range(4)] == [False, False, False, True]
-    assert not on(pairs.is_named_in_pitch, fdi)
-    fdi["types"]["surface"]["status"]["named"] = 1, 0, 0, 1
-    assert on(pairs.is_named_in_pitch, fdi)
-    assert [bool(on(pairs.law_acts_on, fdi, s)) for s in range(4)] == [True, False, False, True]
+    assert [bool(on(pairs.is_accommodated, only_flap, s)) for s in range(4)] == [False, False, False, True]
+    assert not on(pairs.is_pitch_surface_isolated, fdi)
+    fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 0, 1
+    assert on(pairs.is_pitch_surface_isolated, fdi)
+    assert [bool(on(pairs.is_accommodated, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
     fdi = decided(aileron=None, rudder=None)
-    fdi["types"]["surface"]["status"]["type"][RUDDER] = STUCK
+    fdi["types"]["surface"]["status"]["fault_type"][RUDDER] = STUCK
     (
-        fdi["types"]["surface"]["status"]["type_at_s"][RUDDER],
-        fdi["types"]["surface"]["status"]["named_at_s"][RUDDER],
+        fdi["types"]["surface"]["status"]["type_decided_at_s"][RUDDER],
+        fdi["types"]["surface"]["status"]["isolated_at_s"][RUDDER],
     ) = 2.0, 1.5
     conclude(fdi, pairs.first_fault_finding, RUDDER, False, 3.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
-    assert (found["isolated"], found["type"], found["type_at_s"]) == (4 + RUDDER, STUCK, 2.0)
+    assert (found["isolated_estimator"], found["fault_type"], found["type_decided_at_s"]) == (
+        4 + RUDDER,
+        STUCK,
+        2.0,
+    )
     assert found["isolated_at_s"] == 1.5
     conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 4.0, lead=(NO_SURFACE, -1))
-    assert (found["isolated"], found["type"], found["isolated_at_s"]) == (UNANTICIPATED, -1, 4.0)
+    assert (found["isolated_estimator"], found["fault_type"], found["isolated_at_s"]) == (
+        UNANTICIPATED,
+        -1,
+        4.0,
+    )
     conclude(fdi, pairs.first_fault_finding, NO_SURFACE, True, 5.0, lead=(NO_SURFACE, -1))
     assert found["isolated_at_s"] == 4.0
     conclude(fdi, pairs.first_fault_finding, NO_SURFACE, False, 6.0, lead=(NO_SURFACE, -1))
-    assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
+    assert (found["isolated_estimator"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
 
 
 def acted(**left):
     """What the law does about each surface; each was seen where its type has it."""
     fdi = decided(**left)
     for surface in fdi["types"]["surface"]:
-        surface["feasible"]["low"], surface["feasible"]["high"] = -0.1, 0.1
+        surface["feasible_sets"]["low"], surface["feasible_sets"]["high"] = -0.1, 0.1
     return fdi
 
 
 def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
     fdi = acted(alarmed=(0, 1), aileron=(CONSTANT_LOSS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.choose_accommodation)
+    fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
+    take_lead(fdi, pairs.choose_pair_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         -1,
         SUBTRACT_OFFSET,
         -1,
     ]
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SCALE_COMMAND)
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+        AILERON,
+        SCALE_COMMAND,
+    )
 
 
 @pytest.mark.parametrize(
@@ -966,44 +1097,47 @@ def test_the_law_acts_on_all_that_are_named_and_the_lead_is_the_first():
 )
 def test_an_elevator_that_is_replaced_comes_first(kinds, accommodation_mode, lead):
     fdi = acted(aileron=(CONSTANT_LOSS,), elevator=kinds, rudder=None, flap=None)
-    fdi["types"]["surface"]["status"]["named"] = 1, 1, 0, 0
-    take_lead(fdi, pairs.choose_accommodation)
+    fdi["types"]["surface"]["status"]["is_isolated"] = 1, 1, 0, 0
+    take_lead(fdi, pairs.choose_pair_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [
         SCALE_COMMAND,
         accommodation_mode,
         -1,
         -1,
     ]
-    assert fdi["verdict"]["lead"] == lead
+    assert fdi["verdict"]["accommodated_surface"] == lead
 
 
 def test_a_rudder_that_is_fixed_does_not_come_before_the_first():
     fdi = acted(aileron=(BIAS,), rudder=(STUCK,), elevator=None, flap=None)
-    fdi["types"]["surface"]["status"]["named"] = 1, 0, 1, 0
-    take_lead(fdi, pairs.choose_accommodation)
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (AILERON, SUBTRACT_OFFSET)
+    fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 1, 0
+    take_lead(fdi, pairs.choose_pair_accommodation)
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (
+        AILERON,
+        SUBTRACT_OFFSET,
+    )
 
 
 def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     fdi = acted(elevator=None, flap=None, aileron=None, rudder=None)
     leave(fdi["types"]["surface"][ELEVATOR], STUCK)
-    take_lead(fdi, pairs.choose_accommodation)
+    take_lead(fdi, pairs.choose_pair_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SUBTRACT_OFFSET, -1, -1]
-    fdi["types"]["surface"]["status"]["named"][ELEVATOR] = 1
-    take_lead(fdi, pairs.choose_accommodation)
+    fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR] = 1
+    take_lead(fdi, pairs.choose_pair_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, GIVE_UP, -1, -1]
     (
-        fdi["types"]["surface"]["elapsed"]["low"],
-        fdi["types"]["surface"]["elapsed"]["high"],
-        fdi["types"]["surface"]["accommodation"]["frames_absent"],
+        fdi["types"]["surface"]["last_observation"]["position_low"],
+        fdi["types"]["surface"]["last_observation"]["position_high"],
+        fdi["types"]["surface"]["accommodation"]["n_frames_absent"],
     ) = (
         0.3,
         0.4,
         99,
     )
-    take_lead(fdi, pairs.choose_accommodation)
+    take_lead(fdi, pairs.choose_pair_accommodation)
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, -1, -1, -1]
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -1015,94 +1149,113 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
     for k, s in enumerate((AILERON, RUDDER)):
         effect = fdi["isolation"]["estimator"][4 + s]["effect"]
-        effect["Z"][[ROLL, YAW]], effect["spread"][[ROLL, YAW]] = Z[:, k], spread[:, k]
-        fdi["types"]["surface"][s]["elapsed"]["command"] = command[k]
-    fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame"][[ROLL, YAW]] = Z @ off, room
-    on(pairs.solve_roll_and_yaw, fdi)
+        effect["regressor"][[ROLL, YAW]], effect["error_bound"][[ROLL, YAW]] = Z[:, k], spread[:, k]
+        fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = command[k]
+    fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame_innovation_bound"][[ROLL, YAW]] = (
+        Z @ off,
+        room,
+    )
+    on(pairs.locate_roll_and_yaw_surfaces, fdi)
     slack = room + spread.sum(axis=1)
     corners = [np.linalg.solve(Z, Z @ off + slack * (a, b)) for a in (-1, 1) for b in (-1, 1)]
     least, greatest = np.min(corners, axis=0) + command, np.max(corners, axis=0) + command
     for k, s in enumerate((AILERON, RUDDER)):
         surface = fdi["types"]["surface"][s]
-        assert (surface["elapsed"]["low"], surface["elapsed"]["high"]) == pytest.approx(
-            (least[k], greatest[k])
-        )
-    assert not fdi["types"]["pair"]["no_lateral_pair"]
+        assert (
+            surface["last_observation"]["position_low"],
+            surface["last_observation"]["position_high"],
+        ) == pytest.approx((least[k], greatest[k]))
+    assert not fdi["types"]["pair"]["lateral_outside_class"]
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
-    on(pairs.solve_roll_and_yaw, fdi)
-    assert fdi["types"]["pair"]["no_lateral_pair"]
+    on(pairs.locate_roll_and_yaw_surfaces, fdi)
+    assert fdi["types"]["pair"]["lateral_outside_class"]
 
 
 def test_a_second_pitch_fault_is_named_once_it_shows():
     fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
-    fdi["types"]["pair"]["first"], fdi["types"]["surface"]["status"]["is_candidate"] = ELEVATOR, (1, 0, 1, 0)
-    fdi["types"]["surface"]["status"]["decided_by"] = 0, BY_DEDUCTION, 0, BY_DEDUCTION
+    fdi["types"]["pair"]["first_fault_surface"], fdi["types"]["surface"]["status"]["is_candidate"] = (
+        ELEVATOR,
+        (1, 0, 1, 0),
+    )
+    fdi["types"]["surface"]["status"]["decision_basis"] = 0, DEDUCED_FAULTY, 0, DEDUCED_FAULTY
     (
-        fdi["types"]["surface"]["status"]["type"][ELEVATOR],
-        fdi["types"]["surface"]["evidence"]["frames"][FLAP],
+        fdi["types"]["surface"]["status"]["fault_type"][ELEVATOR],
+        fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][FLAP],
     ) = BIAS, 0
-    on(pairs.decide_pitch, fdi, 4.0)
-    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
-    fdi["types"]["surface"]["evidence"]["frames"][FLAP] = 99
-    on(pairs.decide_pitch, fdi, 5.0)
-    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 1]
-    assert fdi["types"]["surface"]["status"]["type"].tolist()[1::2] == [BIAS, STUCK]
-    fdi["types"]["surface"]["status"]["decided_by"][FLAP] = RULED_OUT
-    on(pairs.decide_pitch, fdi, 6.0)
-    assert fdi["types"]["surface"]["status"]["named"].tolist() == [0, 1, 0, 0]
+    on(pairs.decide_pitch_isolation, fdi, 4.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
+    fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][FLAP] = 99
+    on(pairs.decide_pitch_isolation, fdi, 5.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 1]
+    assert fdi["types"]["surface"]["status"]["fault_type"].tolist()[1::2] == [BIAS, STUCK]
+    fdi["types"]["surface"]["status"]["decision_basis"][FLAP] = DEDUCED_HEALTHY
+    on(pairs.decide_pitch_isolation, fdi, 6.0)
+    assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
 
 
 def test_the_first_named_is_the_one_the_verdict_is_about():
     fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
     fdi["types"]["surface"]["estimator_excluded"][[AILERON, RUDDER]] = 1
-    fdi["types"]["surface"]["status"]["named"], fdi["types"]["surface"]["status"]["named_at_s"] = (
+    fdi["types"]["surface"]["status"]["is_isolated"], fdi["types"]["surface"]["status"]["isolated_at_s"] = (
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
     )
-    conclude(fdi, pairs.decide_pairs, 3.0)
+    conclude(fdi, pairs.decide_pair_isolation, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
-    assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated"]] == RUDDER
+    assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated_estimator"]] == RUDDER
 
 
 def test_the_first_surface_and_its_first_estimator_are_not_nobody():
     fdi = new_case(elevator=None, rudder=None, flap=None, aileron=(CONSTANT_LOSS,))
-    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = NOT_ISOLATED, -1
     for t in (3.0, 4.0):
         conclude(fdi, verdict.decide_surface_and_type, t)
         found = fdi["verdict"]
-        assert (found["isolated"], found["type"], found["lead"]) == (AILERON, CONSTANT_LOSS, AILERON)
-        assert (found["isolated_at_s"], found["type_at_s"], found["lead_kind"]) == (3.0, 3.0, SCALE_COMMAND)
+        assert (found["isolated_estimator"], found["fault_type"], found["accommodated_surface"]) == (
+            AILERON,
+            CONSTANT_LOSS,
+            AILERON,
+        )
+        assert (found["isolated_at_s"], found["type_decided_at_s"], found["accommodation_mode"]) == (
+            3.0,
+            3.0,
+            SCALE_COMMAND,
+        )
 
 
 def test_the_one_named_is_acted_upon_though_others_are_possible():
     fdi = new_case()
-    fdi["verdict"]["isolated"] = 0  # the estimator of the aileron's loss
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == AILERON
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated"]) == ELEVATOR
+    fdi["verdict"]["isolated_estimator"] = 0  # the estimator of the aileron's loss
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == AILERON
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == ELEVATOR
 
 
 def test_without_anybody_to_act_upon_there_is_no_lead():
     fdi = new_case(aileron=None, elevator=None, rudder=None, flap=None)
-    fdi["verdict"]["isolated"] = UNANTICIPATED
-    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, 2
-    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated"])
-    assert (fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"]) == (NO_SURFACE, -1)
+    fdi["verdict"]["isolated_estimator"] = UNANTICIPATED
+    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, 2
+    take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
+    assert (fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"]) == (NO_SURFACE, -1)
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
 
 
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
     fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
-    assert on(verdict.sole_surface, fdi, False) == SEVERAL_SURFACES
+    assert on(verdict.sole_possible_surface, fdi, False) == SEVERAL_SURFACES
     assert on(verdict.surface_at_fault, fdi) == AILERON
 
 
 @pytest.mark.parametrize(("s", "outside"), [(AILERON, 0), (RUDDER, 1), (NO_SURFACE, 0), (NO_SURFACE, 1)])
 def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     fdi = new_case()
-    fdi["verdict"]["isolated"], fdi["verdict"]["type"] = NOT_ISOLATED, -1
+    fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = NOT_ISOLATED, -1
     surface = fdi["types"]["surface"][s]
-    surface["status"]["type"], surface["status"]["type_at_s"], surface["status"]["named_at_s"] = (
+    (
+        surface["status"]["fault_type"],
+        surface["status"]["type_decided_at_s"],
+        surface["status"]["isolated_at_s"],
+    ) = (
         STUCK,
         4.0,
         3.0,
@@ -1110,7 +1263,10 @@ def test_of_two_faults_the_verdict_is_on_the_first_named(s, outside):
     conclude(fdi, pairs.first_fault_finding, s, outside, 5.0, lead=(NO_SURFACE, -1))
     found = fdi["verdict"]
     if s < 0:
-        assert (found["isolated"], found["type"]) == (UNANTICIPATED if outside else NOT_ISOLATED, -1)
+        assert (found["isolated_estimator"], found["fault_type"]) == (
+            UNANTICIPATED if outside else NOT_ISOLATED,
+            -1,
+        )
     else:
-        assert (found["isolated"], found["isolated_at_s"]) == (4 + s, 3.0)
-        assert (found["type"], found["type_at_s"]) == (STUCK, 4.0)
+        assert (found["isolated_estimator"], found["isolated_at_s"]) == (4 + s, 3.0)
+        assert (found["fault_type"], found["type_decided_at_s"]) == (STUCK, 4.0)

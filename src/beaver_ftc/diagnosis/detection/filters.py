@@ -9,7 +9,7 @@ therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
 alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > eta_bar; for a
-bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (docs/theory.md,
+bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (theory.md,
 section 3). Slower poles detect more if errors are correlated over frames, as measurement errors are. The
 reach of a fault is its possible effect on the filters since the start of the flight.
 
@@ -35,7 +35,7 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.bounds import poles_for_noise
+from beaver_ftc.diagnosis.bounds import detection_poles_for_noise
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
@@ -43,25 +43,33 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @kernel
-def bound_step(bound, eta_bar, decay, dt):
+def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
     """Advance ebar' = -lam ebar + eta_bar by one frame [Zhang2005, sec. IV].
 
     Units: bound rad/s, eta_bar rad/s2, decay = exp(-lam dt), dt s.
     """
-    return decay * bound + dt * eta_bar
+    return decay_factor * residual_bound + dt * eta_bar
 
 
 @kernel
-def noise_step(noise, nbar, decay):
+def advance_gyro_error_bound(filtered_gyro_bound, gyro_change_bound, decay_factor):
     """Advance the filtered bound on a gyro's changing error, rad/s, by one frame; nbar as the frame began.
 
     See bounds.py: what a residual may owe to the gyro is this and the present nbar.
     """
-    return decay * noise + (1.0 - decay) * nbar
+    return decay_factor * filtered_gyro_bound + (1.0 - decay_factor) * gyro_change_bound
 
 
 @kernel
-def interval_limits(low, high, positive_Z, negative_Z, omega, theta, bound):
+def residual_interval(
+    theta_min,
+    theta_max,
+    filtered_positive_Z,
+    filtered_negative_Z,
+    filtered_regressor,
+    theta_estimate,
+    uncertainty_bound,
+):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
     The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent
@@ -69,53 +77,69 @@ def interval_limits(low, high, positive_Z, negative_Z, omega, theta, bound):
     and fall filter the positive and the negative part of Z. The residual is that integral less omega
     thetahat, widened by the bound on the uncertainty.
     """
-    lower = low * positive_Z + high * negative_Z - omega * theta - bound
-    upper = high * positive_Z + low * negative_Z - omega * theta + bound
+    lower = (
+        theta_min * filtered_positive_Z
+        + theta_max * filtered_negative_Z
+        - filtered_regressor * theta_estimate
+        - uncertainty_bound
+    )
+    upper = (
+        theta_max * filtered_positive_Z
+        + theta_min * filtered_negative_Z
+        - filtered_regressor * theta_estimate
+        + uncertainty_bound
+    )
     return lower, upper
 
 
 @kernel
-def norm_limits(low, high, omega, theta, bound):
+def norm_bound_interval(theta_min, theta_max, filtered_regressor, theta_estimate, uncertainty_bound):
     """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
     Zhang2002].
     """
-    mu = max(theta - low, high - theta) * abs(omega) + bound
+    mu = (
+        max(theta_estimate - theta_min, theta_max - theta_estimate) * abs(filtered_regressor)
+        + uncertainty_bound
+    )
     return -mu, mu
 
 
-# The bank of detection filters; filter 0 is the published one. decay: a_m; eta, noise rad/s: parts of the
-# threshold; innovation rad/s2; residual, threshold rad/s; closest: largest share of its bound that each
-# filter has reached in healthy flight.
-BANK_CONFIG = record(n=int, decay=MAX_POLES)
-BANK_MEMORY = record(eta=(MAX_POLES, 3), noise=(MAX_POLES, 3))
-BANK_OUTPUT = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), closest=MAX_POLES)
-BANK = record(config=BANK_CONFIG, memory=BANK_MEMORY, output=BANK_OUTPUT)
+# The bank of detection filters; filter 0 is the published one. decay_factor: a_m; residual, threshold and its
+# parts rad/s; innovation rad/s2; max_threshold_ratio_so_far: of residual over threshold, in healthy flight.
+BANK_CONFIG_RECORD = record(n_filters=int, decay_factor=MAX_POLES)
+BANK_MEMORY_RECORD = record(
+    threshold_uncertainty_part=(MAX_POLES, 3), threshold_gyro_error_part=(MAX_POLES, 3)
+)
+BANK_OUTPUT_RECORD = record(
+    innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), max_threshold_ratio_so_far=MAX_POLES
+)
+BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
 
 
-def poles_of(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
+def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
     """The filters' poles, 1/s, the published one first."""
-    for_noise = poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
-    further = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
-    return (config.detection_pole_per_s, *further)[:MAX_POLES]
+    poles_for_noise = detection_poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
+    further_poles = (*config.pole_bank_per_s, *poles_for_noise) if config.sharpen.pole_bank else ()
+    return (config.detection_pole_per_s, *further_poles)[:MAX_POLES]
 
 
 def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
-    poles = poles_of(config, declared)
-    bank["config"]["n"] = len(poles)
-    bank["config"]["decay"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+    poles = filter_poles_per_s(config, declared)
+    bank["config"]["n_filters"] = len(poles)
+    bank["config"]["decay_factor"][: len(poles)] = [exp(-pole * dt) for pole in poles]
 
 
 @kernel
-def begin_bank(bank, noise):
-    """Start with the full bound on the change of the gyros' errors, noise (3,) rad/s."""
-    bank.memory.noise[: bank.config.n] = noise
+def start_bank(bank, gyro_change_bound):
+    """Start with the full bound on the change of the gyros' errors, gyro_change_bound (3,) rad/s."""
+    bank.memory.threshold_gyro_error_part[: bank.config.n_filters] = gyro_change_bound
 
 
 @kernel
-def set_bank_threshold(bank, constant):
+def set_published_filter_threshold(bank, threshold):
     """Replace the threshold of the published filter by a constant, rad/s."""
-    bank.output.threshold[0] = constant
+    bank.output.threshold[0] = threshold
 
 
 @kernel
@@ -126,11 +150,12 @@ def set_parity_directions(isolation, G):
     The bound is exact for any fixed direction; this one has power while G keeps its direction, which
     depends on alpha alone, and weakly.
     """
-    for fie in isolation.estimator[: isolation.config.n]:
-        p, r = G[0, fie.surface], G[2, fie.surface]
-        length = np.hypot(p, r)
-        if length > 0.0:
-            fie.parity_direction[0], fie.parity_direction[2] = r / length, -p / length
+    for fie in isolation.estimator[: isolation.config.n_estimators]:
+        roll_effect, yaw_effect = G[0, fie.surface], G[2, fie.surface]
+        column_length = np.hypot(roll_effect, yaw_effect)
+        if column_length > 0.0:
+            fie.parity_direction[0] = yaw_effect / column_length
+            fie.parity_direction[2] = -roll_effect / column_length
 
 
 @kernel
@@ -142,176 +167,216 @@ def update_bank(bank, bound, x, x_before, predicted_acceleration, dt):
     """
     for i in range(3):
         bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
-        bound.frame[i] = bound.eta_bar[i] + (bound.noise[i] + bound.noise_before[i]) / dt
-        for m, a in enumerate(bank.config.decay[: bank.config.n]):
-            bank.output.residual[m, i] = a * bank.output.residual[m, i] + dt * bank.output.innovation[i]
-            bank.memory.eta[m, i] = bound_step(bank.memory.eta[m, i], bound.eta_bar[i], a, dt)
-            bank.memory.noise[m, i] = noise_step(bank.memory.noise[m, i], bound.noise_before[i], a)
-            bank.output.threshold[m, i] = bank.memory.eta[m, i] + bank.memory.noise[m, i] + bound.noise[i]
+        bound.frame_innovation_bound[i] = (
+            bound.eta_bar[i] + (bound.gyro_change_bound[i] + bound.gyro_change_bound_before[i]) / dt
+        )
+        for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
+            bank.output.residual[m, i] = (
+                decay_factor * bank.output.residual[m, i] + dt * bank.output.innovation[i]
+            )
+            bank.memory.threshold_uncertainty_part[m, i] = advance_residual_bound(
+                bank.memory.threshold_uncertainty_part[m, i], bound.eta_bar[i], decay_factor, dt
+            )
+            bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
+                bank.memory.threshold_gyro_error_part[m, i], bound.gyro_change_bound_before[i], decay_factor
+            )
+            bank.output.threshold[m, i] = (
+                bank.memory.threshold_uncertainty_part[m, i]
+                + bank.memory.threshold_gyro_error_part[m, i]
+                + bound.gyro_change_bound[i]
+            )
 
 
 @kernel
 def bank_alarm_axis(bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(bank.config.n):
+        for m in range(bank.config.n_filters):
             if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
                 return i
     return -1
 
 
 @kernel
-def threshold_share(bank, m, i):
+def residual_threshold_ratio(bank, m, i):
     """The share of its bound that filter m reaches on axis i."""
-    bound = bank.output.threshold[m, i]
-    return abs(bank.output.residual[m, i]) / bound if bound > 0.0 else 0.0
+    threshold = bank.output.threshold[m, i]
+    return abs(bank.output.residual[m, i]) / threshold if threshold > 0.0 else 0.0
 
 
 @kernel
-def nearest_filter(bank, i):
+def filter_nearest_to_alarm(bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
-    m_nearest, largest = 0, 0.0
-    for m in range(bank.config.n):
-        share = threshold_share(bank, m, i)
-        if share > largest:
-            m_nearest, largest = m, share
+    m_nearest, max_ratio = 0, 0.0
+    for m in range(bank.config.n_filters):
+        ratio = residual_threshold_ratio(bank, m, i)
+        if ratio > max_ratio:
+            m_nearest, max_ratio = m, ratio
     return m_nearest
 
 
 @kernel
-def largest_share(bank):
+def max_residual_threshold_ratio(bank):
     """The largest share of its bound that a filter of the bank reaches."""
-    largest = 0.0
-    for m in range(bank.config.n):
+    max_ratio = 0.0
+    for m in range(bank.config.n_filters):
         for i in range(3):
-            largest = max(largest, threshold_share(bank, m, i))
-    return largest
+            max_ratio = max(max_ratio, residual_threshold_ratio(bank, m, i))
+    return max_ratio
 
 
 @kernel
-def note_closest_approach(bank):
+def update_max_threshold_ratios(bank):
     """Keep the largest share of its bound that each filter has reached."""
-    for m in range(bank.config.n):
+    for m in range(bank.config.n_filters):
         for i in range(3):
-            bank.output.closest[m] = max(bank.output.closest[m], threshold_share(bank, m, i))
+            bank.output.max_threshold_ratio_so_far[m] = max(
+                bank.output.max_threshold_ratio_so_far[m], residual_threshold_ratio(bank, m, i)
+            )
 
 
 @kernel
-def effect_extremes(fie, i):
+def fault_acceleration_range(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
-    base, slope, spread = fie.effect.offset[i], fie.effect.Z[i], fie.effect.spread[i]
-    one, other = base + fie.low * slope, base + fie.high * slope
-    return min(0.0, one, other) - spread, max(0.0, one, other) + spread
+    acceleration_at_zero_theta = fie.effect.base_acceleration[i]
+    acceleration_per_theta = fie.effect.regressor[i]
+    spread = fie.effect.error_bound[i]
+    at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
+    at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
+    return min(0.0, at_theta_min, at_theta_max) - spread, max(0.0, at_theta_min, at_theta_max) + spread
 
 
 @kernel
-def parity_effect_extremes(fie):
+def fault_parity_range(fie):
     """The same along `fie.parity_direction` (3,), in which the fault has little effect."""
-    effect, base, slope, spread = fie.effect, 0.0, 0.0, 0.0
+    effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.effect, 0.0, 0.0, 0.0
     for i in range(3):
-        spread += abs(fie.parity_direction[i]) * effect.spread[i]
-        base += fie.parity_direction[i] * effect.offset[i]
-        slope += fie.parity_direction[i] * effect.Z[i]
-    one, other = base + fie.low * slope, base + fie.high * slope
-    return min(0.0, one, other) - spread, max(0.0, one, other) + spread
+        spread += abs(fie.parity_direction[i]) * effect.error_bound[i]
+        acceleration_at_zero_theta += fie.parity_direction[i] * effect.base_acceleration[i]
+        acceleration_per_theta += fie.parity_direction[i] * effect.regressor[i]
+    at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
+    at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
+    return min(0.0, at_theta_min, at_theta_max) - spread, max(0.0, at_theta_min, at_theta_max) + spread
 
 
 @kernel
-def advance_reach(bank, fie, dt):
+def advance_reachable_residuals(bank, fie, dt):
     """Advance the reach of the fault in each filter since the flight began; channel 3: `parity_direction`."""
     for channel in range(4):
-        low, high = effect_extremes(fie, channel) if channel < 3 else parity_effect_extremes(fie)
-        for m, a in enumerate(bank.config.decay[: bank.config.n]):
-            fie.reach_low[m, channel] = a * fie.reach_low[m, channel] + dt * low
-            fie.reach_high[m, channel] = a * fie.reach_high[m, channel] + dt * high
+        low, high = fault_acceleration_range(fie, channel) if channel < 3 else fault_parity_range(fie)
+        for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
+            fie.reachable_effect_low[m, channel] = (
+                decay_factor * fie.reachable_effect_low[m, channel] + dt * low
+            )
+            fie.reachable_effect_high[m, channel] = (
+                decay_factor * fie.reachable_effect_high[m, channel] + dt * high
+            )
 
 
 @kernel
-def reach_explains(bank, fie, shared):
+def are_residuals_reachable(bank, fie, axes_share_theta):
     """True if the residuals are within the reach of the fault, for any course of it since the flight began.
 
-    shared: the axes share one parameter; the residual along `parity_direction` is then tested as well.
+    axes_share_theta: the axes share one parameter; the residual along `parity_direction` is then tested as
+    well.
     """
-    for m in range(bank.config.n):
-        residual, bound = 0.0, 0.0
+    for m in range(bank.config.n_filters):
+        parity_residual, parity_threshold = 0.0, 0.0
         for i in range(3):
-            r, b = bank.output.residual[m, i], bank.output.threshold[m, i]
-            if not fie.reach_low[m, i] - b <= r <= fie.reach_high[m, i] + b and not fie.ignored_axes[i]:
+            residual, threshold = bank.output.residual[m, i], bank.output.threshold[m, i]
+            if (
+                not fie.reachable_effect_low[m, i] - threshold
+                <= residual
+                <= fie.reachable_effect_high[m, i] + threshold
+                and not fie.ignored_axes[i]
+            ):
                 return False
-            residual += fie.parity_direction[i] * r
-            bound += abs(fie.parity_direction[i]) * b
-        if shared and not fie.reach_low[m, 3] - bound <= residual <= fie.reach_high[m, 3] + bound:
+            parity_residual += fie.parity_direction[i] * residual
+            parity_threshold += abs(fie.parity_direction[i]) * threshold
+        if (
+            axes_share_theta
+            and not fie.reachable_effect_low[m, 3] - parity_threshold
+            <= parity_residual
+            <= fie.reachable_effect_high[m, 3] + parity_threshold
+        ):
             return False
     return True
 
 
-# Centres of the network's basis functions, rad; and its record. gain 1/s2, weight_limit rad/s2; output: fhat,
-# rad/s2.
-ALPHA_CENTRES = np.linspace(-0.1, 0.5, 9)
-BETA_CENTRES = np.linspace(-0.3, 0.3, 5)
-N_BASIS = len(ALPHA_CENTRES) + len(BETA_CENTRES)
-NETWORK = record(
-    config=record(gain=float, leak_per_s=float, weight_limit=float),
-    memory=record(weights=(3, N_BASIS), basis=N_BASIS),
+# Centres of the network's basis functions, rad; and its record. learning_gain 1/s2, weight_limit rad/s2;
+# output: fhat, rad/s2.
+ALPHA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9)
+BETA_CENTRES_RAD = np.linspace(-0.3, 0.3, 5)
+N_BASIS_FUNCTIONS = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
+NETWORK_RECORD = record(
+    config=record(learning_gain=float, leak_per_s=float, weight_limit=float),
+    memory=record(weights=(3, N_BASIS_FUNCTIONS), basis_values=N_BASIS_FUNCTIONS),
     output=3,
 )
 
-# pole 1/s; decay: a. xhat: the estimate of the rates, rad/s; threshold_eta, threshold_noise rad/s: parts of
-# the threshold. residual, threshold rad/s.
-FDAE_CONFIG = record(pole=3, decay=3)
-FDAE_MEMORY = record(xhat=3, threshold_eta=3, threshold_noise=3)
-FDAE_OUTPUT = record(residual=3, threshold=3)
-FDAE = record(config=FDAE_CONFIG, memory=FDAE_MEMORY, output=FDAE_OUTPUT, network=NETWORK)
+# decay_factor: a. xhat: the estimate of the rates, rad/s; threshold_uncertainty_part,
+# threshold_gyro_error_part rad/s: parts of the threshold. residual, threshold rad/s.
+FDAE_CONFIG_RECORD = record(pole_per_s=3, decay_factor=3)
+FDAE_MEMORY_RECORD = record(xhat=3, threshold_uncertainty_part=3, threshold_gyro_error_part=3)
+FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
+FDAE_RECORD = record(
+    config=FDAE_CONFIG_RECORD, memory=FDAE_MEMORY_RECORD, output=FDAE_OUTPUT_RECORD, network=NETWORK_RECORD
+)
 
-_PER_STEP = np.exp(-1.0)
-_N_ALPHA, _N_BETA = len(ALPHA_CENTRES), len(BETA_CENTRES)
-_ALPHA_FIRST, _ALPHA_STEP = ALPHA_CENTRES[0], ALPHA_CENTRES[1] - ALPHA_CENTRES[0]
-_BETA_FIRST, _BETA_STEP = BETA_CENTRES[0], BETA_CENTRES[1] - BETA_CENTRES[0]
+_CHANGE_OF_GAUSSIAN_RATIO = np.exp(-1.0)
+_N_ALPHA_CENTRES, _N_BETA_CENTRES = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
+_FIRST_ALPHA_CENTRE, _ALPHA_CENTRE_SPACING = ALPHA_CENTRES_RAD[0], ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
+_FIRST_BETA_CENTRE, _BETA_CENTRE_SPACING = BETA_CENTRES_RAD[0], BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 
 def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
     """Fill in the estimator's pole, and how its network learns."""
     config, network = scenario.control, fdae["network"]
-    fdae["config"]["pole"] = scenario.fdi.detection_pole_per_s
-    fdae["config"]["decay"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
-    network["config"]["gain"], network["config"]["leak_per_s"] = (
-        config.network_gain_per_s2,
-        config.network_leak_per_s,
-    )
+    fdae["config"]["pole_per_s"] = scenario.fdi.detection_pole_per_s
+    fdae["config"]["decay_factor"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
+    network["config"]["learning_gain"] = config.network_gain_per_s2
+    network["config"]["leak_per_s"] = config.network_leak_per_s
     network["config"]["weight_limit"] = config.network_weight_limit_rad_s2
 
 
 @kernel
-def fill_gaussians(place, count, first, out):
+def fill_gaussians(grid_position, n_gaussians, first_index, out):
     """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; return the squares' sum.
 
     From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
     """
-    value, change = np.exp(-0.5 * place * place), np.exp(place - 0.5)
-    square = 0.0
-    for j in range(count):
-        out[first + j] = value
-        square += value * value
-        value *= change
-        change *= _PER_STEP
-    return square
+    value, ratio = np.exp(-0.5 * grid_position * grid_position), np.exp(grid_position - 0.5)
+    sum_of_squares = 0.0
+    for j in range(n_gaussians):
+        out[first_index + j] = value
+        sum_of_squares += value * value
+        value *= ratio
+        ratio *= _CHANGE_OF_GAUSSIAN_RATIO
+    return sum_of_squares
 
 
 @kernel
-def fill_basis(alpha, beta, out):
-    """Fill out (N_BASIS,) with the normalised radial basis functions at (alpha, beta), rad.
+def fill_basis_functions(alpha, beta, out):
+    """Fill out (N_BASIS_FUNCTIONS,) with the normalised radial basis functions at (alpha, beta), rad.
 
     Each width equals the spacing of its centres; outside the grid the nearest edge answers.
     """
-    a = min(max((alpha - _ALPHA_FIRST) / _ALPHA_STEP, 0.0), _N_ALPHA - 1.0)
-    b = min(max((beta - _BETA_FIRST) / _BETA_STEP, 0.0), _N_BETA - 1.0)
-    norm = np.sqrt(fill_gaussians(a, _N_ALPHA, 0, out) + fill_gaussians(b, _N_BETA, _N_ALPHA, out))
-    for j in range(N_BASIS):
+    alpha_grid_position = min(
+        max((alpha - _FIRST_ALPHA_CENTRE) / _ALPHA_CENTRE_SPACING, 0.0), _N_ALPHA_CENTRES - 1.0
+    )
+    beta_grid_position = min(
+        max((beta - _FIRST_BETA_CENTRE) / _BETA_CENTRE_SPACING, 0.0), _N_BETA_CENTRES - 1.0
+    )
+    norm = np.sqrt(
+        fill_gaussians(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
+        + fill_gaussians(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
+    )
+    for j in range(N_BASIS_FUNCTIONS):
         out[j] /= norm
 
 
 @kernel
-def dead_zone(residual, threshold):
+def apply_dead_zone(residual, threshold):
     """D[eps]: zero inside the threshold, the excess over it outside."""
     if residual > threshold:
         return residual - threshold
@@ -323,42 +388,44 @@ def dead_zone(residual, threshold):
 @kernel
 def evaluate_network(network, alpha, beta):
     """Fill network.output (3,) rad/s2 for the present alpha and beta."""
-    fill_basis(alpha, beta, network.memory.basis)
+    fill_basis_functions(alpha, beta, network.memory.basis_values)
     for i in range(3):
         total = 0.0
-        for j in range(N_BASIS):
-            total += network.memory.weights[i, j] * network.memory.basis[j]
+        for j in range(N_BASIS_FUNCTIONS):
+            total += network.memory.weights[i, j] * network.memory.basis_values[j]
         network.output[i] = total
 
 
 @kernel
-def train_network(network, residual, threshold, leaking, dt):
+def train_network(network, residual, threshold, do_weights_leak, dt):
     """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
 
-    `leaking` lets go of what was learnt once another estimate explains the fault.
+    `do_weights_leak` lets go of what was learnt once another estimate explains the fault.
     """
-    keep = np.exp(-network.config.leak_per_s * dt) if leaking else 1.0
-    limit = network.config.weight_limit
+    leak_factor = np.exp(-network.config.leak_per_s * dt) if do_weights_leak else 1.0
+    weight_limit = network.config.weight_limit
     for i in range(3):
-        drive = dt * network.config.gain * dead_zone(residual[i], threshold[i])
-        for j in range(N_BASIS):
-            weight = keep * network.memory.weights[i, j] + drive * network.memory.basis[j]
-            network.memory.weights[i, j] = min(max(weight, -limit), limit)
+        learning_step = dt * network.config.learning_gain * apply_dead_zone(residual[i], threshold[i])
+        for j in range(N_BASIS_FUNCTIONS):
+            weight = (
+                leak_factor * network.memory.weights[i, j] + learning_step * network.memory.basis_values[j]
+            )
+            network.memory.weights[i, j] = min(max(weight, -weight_limit), weight_limit)
 
 
 @kernel
-def begin_fdae(fdae, noise, x):
+def start_fdae(fdae, gyro_change_bound, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
 
-    noise (3,) rad/s: by how much the gyros' errors may change.
+    gyro_change_bound (3,) rad/s: by how much the gyros' errors may change.
     """
-    fdae.memory.xhat[:], fdae.memory.threshold_noise[:] = x, noise
+    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, gyro_change_bound
 
 
 @kernel
-def set_fdae_threshold(fdae, constant):
+def set_fdae_threshold(fdae, threshold):
     """Replace the threshold by a constant, rad/s."""
-    fdae.output.threshold[:] = constant
+    fdae.output.threshold[:] = threshold
 
 
 @kernel
@@ -387,40 +454,46 @@ def alarm_axis(bank, authority, statistical_alarm):
     statistical_alarm: `ALARM` of the statistical detector.
     """
     axis = bank_alarm_axis(bank) if authority != STATISTICAL_DETECTOR else -1
-    if axis < 0 and authority != WORST_CASE_DETECTOR and statistical_alarm.score > 1.0:
+    if axis < 0 and authority != WORST_CASE_DETECTOR and statistical_alarm.score_over_alarm_level > 1.0:
         axis = statistical_alarm.axis
     return axis
 
 
 @kernel
-def predict_fdae(fdae, bound, x, predicted_acceleration, detected, leaking, dt):
-    """Advance the FDAE and its threshold by one frame; once `detected`, the network learns what exceeds the
-    threshold.
+def predict_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
+    """Advance the FDAE and its threshold by one frame; once `is_fault_detected`, the network learns what
+    exceeds the threshold.
 
     x (3,) rad/s; predicted_acceleration (3,) rad/s2 is f + G u, with the isolated fault once there is one.
     """
-    if detected:
-        train_network(fdae.network, fdae.output.residual, fdae.output.threshold, leaking, dt)
+    if is_fault_detected:
+        train_network(fdae.network, fdae.output.residual, fdae.output.threshold, do_weights_leak, dt)
     for i in range(3):
-        rate, decay = predicted_acceleration[i] + fdae.network.output[i], fdae.config.decay[i]
-        fdae.memory.xhat[i] = x[i] + dt * rate + decay * (fdae.memory.xhat[i] - x[i])
-        fdae.memory.threshold_eta[i] = bound_step(fdae.memory.threshold_eta[i], bound.eta_bar[i], decay, dt)
-        fdae.memory.threshold_noise[i] = noise_step(
-            fdae.memory.threshold_noise[i], bound.noise_before[i], decay
+        rate, decay_factor = predicted_acceleration[i] + fdae.network.output[i], fdae.config.decay_factor[i]
+        fdae.memory.xhat[i] = x[i] + dt * rate + decay_factor * (fdae.memory.xhat[i] - x[i])
+        fdae.memory.threshold_uncertainty_part[i] = advance_residual_bound(
+            fdae.memory.threshold_uncertainty_part[i], bound.eta_bar[i], decay_factor, dt
+        )
+        fdae.memory.threshold_gyro_error_part[i] = advance_gyro_error_bound(
+            fdae.memory.threshold_gyro_error_part[i], bound.gyro_change_bound_before[i], decay_factor
         )
         fdae.output.threshold[i] = (
-            fdae.memory.threshold_eta[i] + fdae.memory.threshold_noise[i] + bound.noise[i]
+            fdae.memory.threshold_uncertainty_part[i]
+            + fdae.memory.threshold_gyro_error_part[i]
+            + bound.gyro_change_bound[i]
         )
 
 
 @kernel
-def fdae_unknown_acceleration(fdae, noise, out):
+def fill_fdae_unknown_acceleration(fdae, gyro_change_bound, out):
     """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's noise (3,) rad/s alone explains stays out of
-    it, and off the surfaces.
+    weights, at the bandwidth of the estimator. What the gyro's gyro_change_bound (3,) rad/s alone explains
+    stays out of it, and off the surfaces.
     """
     for i in range(3):
-        explained = fdae.memory.threshold_noise[i] + noise[i]
-        out[i] = fdae.network.output[i] + fdae.config.pole[i] * dead_zone(fdae.output.residual[i], explained)
+        noise_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_change_bound[i]
+        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * apply_dead_zone(
+            fdae.output.residual[i], noise_bound
+        )

@@ -9,7 +9,7 @@ a_i, m/s2, is the reading; qdyn, Pa, the dynamic pressure; S, m2, the wing area;
 model's coefficient at the measured flow and the commanded surfaces. A fault of a surface changes e_i and the
 angular acceleration in the ratio of the surface's terms. An error of a vane changes both in another ratio.
 Terms of forces have the same declared tolerance as those of moments, and the whole force has that of the
-mass. Noise of the accelerometers is jitter; their declared bias and slope are tolerated constants.
+mass. Noise of the accelerometers is model noise; their declared bias and slope are tolerated constants.
 
 The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
 rate of the run before.
@@ -22,236 +22,310 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
-from beaver_ftc.diagnosis.gusts import stop_accelerometers, stop_gust_filter
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_M_S2
+from beaver_ftc.diagnosis.gusts import stop_accelerometers, stop_gust_estimate
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
-SIDE, NORMAL = range(2)  # across the body, and normal to it
-COMPONENTS = ("CY", "CZ")
-CY = FORCES.index("CY")
-TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
-SETTLED_UPDATES = 2  # updates: from the second one on the rate of sideslip of the run before is known
-MODEL_LAG_S = 0.002  # time between force and flow of one instant in JSBSim, at most; 0.001 was measured
-DRIFT_CHANGE_SHARE = 0.3  # share of a drift that may change within a second
-RATE_TOLERANCE = {False: 0.05, True: 0.2}  # of the term in the rate of sideslip: gusts have a part in it
+SIDE_COMPONENT, NORMAL_COMPONENT = range(2)  # across the body, and normal to it
+FORCE_COEFFICIENT_NAMES = ("CY", "CZ")
+SIDE_FORCE_TABLE_INDEX = FORCES.index("CY")
+TYPICAL_BODY_RATE_RAD_S, TYPICAL_PATH_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
+MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
+# Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
+MAX_FORCE_FLOW_LAG_S = 0.002
+DRIFT_SHARE_CHANGING_PER_S = 0.3  # share of a drift that may change within a second
+SIDESLIP_RATE_TERM_TOLERANCE = {
+    False: 0.05,
+    True: 0.2,
+}  # of the term in the rate of sideslip: gusts have a part in it
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
-MAX_ERRORS = MAX_TERMS_OF_ONE + 3
+MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
-Trim = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
-FORCE = record(
+FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame, rad/s2
     # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
     # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
-    inertial=float, angle=float, drift=float, angle_sensitivity=float, drift_intensity=float,
+    innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
+    innovation_per_flow_angle_drift=float, innovation_drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    column=MAX_SURFACES, column_predicted=MAX_SURFACES, effect=MAX_SURFACES, column_error=MAX_SURFACES,
+    surface_effect_per_rad=MAX_SURFACES, predicted_surface_effect_per_rad=MAX_SURFACES,
+    surface_effect_at_command=MAX_SURFACES, surface_effect_per_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
-    vane=2, vane_roll=float,
-    trim_variance=2, jitter=2,  # variance of e in trim and now: with the vane, without it; (rad/s2)2
-    damping=3, deflection=float,  # e per rad/s of rotation of the air; bound by errors of deflections
-    model=float, lag_error=float,  # e of the model; bound on its error by a time lag, rad/s2
-    accelerometer_variance=float,  # of e, by noise of the accelerometer; independent of the pressure
-    n=int, tolerance=MAX_ERRORS, regressor=MAX_ERRORS,
+    vane_error_effect_per_rad=2, vane_error_roll_acceleration_per_rad=float,
+    # variance of e in trim and now: with the vane, without it; (rad/s2)2
+    noise_variance_in_trim=2, noise_variance=2,
+    # e per rad/s of rotation of the air; bound on e by errors of deflections
+    damping=3, deflection_error_effect=float,
+    predicted_scaled_force=float,  # e of the model, rad/s2
+    lag_error_bound=float,  # bound on its error by a time lag, rad/s2
+    # variance of e by noise of the accelerometer; independent of the pressure
+    accelerometer_innovation_variance=float,
+    n_regressors=int, regressor_tolerance=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
 )  # fmt: skip
-MEASURED_FORCES = record(
-    known=int, per_chord=float,  # whether forces are used; one over the chord, 1/m
-    gravity=float, span=float,  # m/s2; m
-    pressure=float, pressure_noise=float,  # Pa: in trim, and noise of its reading
-    pressure_ratio=float,  # dynamic pressure over that in trim: forces scale with it
+MEASURED_FORCES_RECORD = record(
+    in_use=int, inverse_chord_per_m=float,  # whether forces are used
+    gravity=float, wing_span=float,  # m/s2; m
+    trim_dynamic_pressure=float, dynamic_pressure_noise_std=float,  # Pa
+    dynamic_pressure_over_trim=float,  # forces scale with it
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
-    sideslip_rate_coefficient=float, rate=2, n_updates=int,  # updates so far, up to SETTLED
-    gust_noise=3,  # noise of the gust estimate from forces, rad/s2
-    y=N_Y, component=(FORCE, 2),
+    sideslip_rate_coefficient=float, flow_angle_rate=2,
+    n_updates=int,  # updates so far, up to MIN_FORCE_UPDATES
+    gust_estimate_noise_std=3,  # noise of the gust estimate from forces, rad/s2
+    y_without_vanes=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
 
 
 @kernel
-def update_forces(forces, air, measured, u, dt):
+def update_forces(forces, gust, measured, u, dt):
     """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
     if forces.n_updates == 0:
-        fill_flow_rates(forces, measured)
-    evaluate(air.memory.force_table, measured.x, measured.y)
-    forces.pressure_ratio = measured.y[QDYN] / forces.pressure
+        fill_flow_angle_rates(forces, measured)
+    evaluate(gust.memory.force_table, measured.x, measured.y)
+    forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
     for f in range(2):
-        before = forces.component[f].model
-        update_force(forces, air, f, measured, u)
-        fill_lag_error(forces.component[f], before, forces.n_updates, dt)
-        integrate_flow_angle(forces, forces.component[f], f, measured.y, dt)
-    fill_flow_rates(forces, measured)
-    forces.n_updates = min(forces.n_updates + 1, SETTLED_UPDATES)
+        scaled_force_before = forces.component[f].predicted_scaled_force
+        update_force_innovation(forces, gust, f, measured, u)
+        fill_lag_error_bound(forces.component[f], scaled_force_before, forces.n_updates, dt)
+        integrate_inertial_flow_angle(forces, forces.component[f], f, measured.y, dt)
+    fill_flow_angle_rates(forces, measured)
+    forces.n_updates = min(forces.n_updates + 1, MIN_FORCE_UPDATES)
 
 
 @kernel
-def fill_lag_error(force, before, begun, dt):
-    """Fill `lag_error` from the change of the model's e since `before`: force and flow differ in time."""
-    force.lag_error = MODEL_LAG_S * abs(force.model - before) / dt if begun else 0.0
+def fill_lag_error_bound(force, scaled_force_before, has_earlier_update, dt):
+    """Fill `lag_error_bound` from the change of the model's e since `scaled_force_before`: force and flow
+    differ in time."""
+    force.lag_error_bound = (
+        MAX_FORCE_FLOW_LAG_S * abs(force.predicted_scaled_force - scaled_force_before) / dt
+        if has_earlier_update
+        else 0.0
+    )
 
 
 @kernel
-def fill_readings_without_vanes(forces, rotation, y):
+def fill_readings_without_vanes(forces, air_rotation, y):
     """Fill `y` with the readings y, but alpha and beta worked out from the forces.
 
-    rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
+    air_rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
     """
-    forces.y[:] = y
+    forces.y_without_vanes[:] = y
     for f in range(2):
-        force, place, damped = forces.component[f], BETA if f == SIDE else ALPHA, 0.0
+        force, vane_index, rotation_effect = forces.component[f], BETA if f == SIDE_COMPONENT else ALPHA, 0.0
         for k in range(3):
-            damped += force.damping[k] * rotation[k]
-        forces.y[place] -= (force.innovation / forces.pressure_ratio + damped) / force.vane[1]
+            rotation_effect += force.damping[k] * air_rotation[k]
+        forces.y_without_vanes[vane_index] -= (
+            force.innovation / forces.dynamic_pressure_over_trim + rotation_effect
+        ) / force.vane_error_effect_per_rad[1]
 
 
 @kernel
-def stop_forces(forces, air, inertial_air):
+def stop_using_forces(forces, gust, inertial_gust):
     """Stop using forces, and estimate the gust without accelerometers."""
-    stop_accelerometers(air)
-    stop_gust_filter(inertial_air)
-    forces.known = 0
+    stop_accelerometers(gust)
+    stop_gust_estimate(inertial_gust)
+    forces.in_use = 0
 
 
 @kernel
-def integrate_flow_angle(forces, force, f, y, dt):
+def integrate_inertial_flow_angle(forces, force, f, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    reading, slope = y[BETA if f == SIDE else ALPHA], force.vane[1] * forces.pressure_ratio
-    force.angle = force.angle + dt * forces.rate[f] if forces.n_updates else reading
-    force.angle_sensitivity += dt * slope
-    force.inertial = force.innovation - slope * (reading - force.angle)
+    vane_angle = y[BETA if f == SIDE_COMPONENT else ALPHA]
+    innovation_per_rad = force.vane_error_effect_per_rad[1] * forces.dynamic_pressure_over_trim
+    force.inertial_flow_angle = (
+        force.inertial_flow_angle + dt * forces.flow_angle_rate[f] if forces.n_updates else vane_angle
+    )
+    force.innovation_per_flow_angle_drift += dt * innovation_per_rad
+    force.innovation_at_inertial_flow_angle = force.innovation - innovation_per_rad * (
+        vane_angle - force.inertial_flow_angle
+    )
 
 
 @kernel
-def update_force(forces, air, f, measured, u):
+def update_force_innovation(forces, gust, f, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
-    table, force = air.memory.force_table, forces.component[f]
-    first, last = table.free_from[CY + f], table.surface_to[CY + f]
-    scale, whole = measured.y[QDYN] * air.config.area_per_mass * forces.per_chord, 0.0
-    force.column_predicted[:] = force.column
-    force.column[:], force.column_error[:] = 0.0, 0.0
-    for k in range(first, last):
-        s, of_one = table.surface[k], scale * table.power[table.monomial[k]]
+    table, force = gust.memory.force_table, forces.component[f]
+    first_term = table.free_from[SIDE_FORCE_TABLE_INDEX + f]
+    end_term = table.surface_to[SIDE_FORCE_TABLE_INDEX + f]
+    acceleration_per_coefficient = (
+        measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
+    )
+    scaled_force = 0.0
+    force.predicted_surface_effect_per_rad[:] = force.surface_effect_per_rad
+    force.surface_effect_per_rad[:], force.surface_effect_per_rad_error_bound[:] = 0.0, 0.0
+    for k in range(first_term, end_term):
+        s, unit_effect = table.surface[k], acceleration_per_coefficient * table.power[table.monomial[k]]
         if s >= 0:
-            force.column[s] += table.value[k] * of_one
-            force.column_error[s] += force.tolerance[k - first] * abs(of_one)
-            of_one *= u[s]
-        force.regressor[k - first] = of_one
-        whole += table.value[k] * of_one
-    if f == SIDE:
-        turning = (
-            scale
+            force.surface_effect_per_rad[s] += table.value[k] * unit_effect
+            force.surface_effect_per_rad_error_bound[s] += force.regressor_tolerance[k - first_term] * abs(
+                unit_effect
+            )
+            unit_effect *= u[s]
+        force.regressor[k - first_term] = unit_effect
+        scaled_force += table.value[k] * unit_effect
+    if f == SIDE_COMPONENT:
+        sideslip_rate_effect = (
+            acceleration_per_coefficient
             * forces.sideslip_rate_coefficient
-            * forces.rate[SIDE]
-            * forces.span
+            * forces.flow_angle_rate[SIDE_COMPONENT]
+            * forces.wing_span
             / (2.0 * measured.y[AIRSPEED])
         )
-        force.regressor[last - first] = turning
-        whole += turning
-    force.regressor[force.n - 1], force.model = whole, whole
+        force.regressor[end_term - first_term] = sideslip_rate_effect
+        scaled_force += sideslip_rate_effect
+    force.regressor[force.n_regressors - 1], force.predicted_scaled_force = scaled_force, scaled_force
     if forces.n_updates == 0:
-        force.column_predicted[:] = force.column
+        force.predicted_surface_effect_per_rad[:] = force.surface_effect_per_rad
     for s in range(u.size):
-        force.effect[s] = force.column_predicted[s] * u[s]
-    force.innovation = measured.force[1 + f] * forces.per_chord - whole
-    by_pressure = whole * forces.pressure_noise / measured.y[QDYN]
+        force.surface_effect_at_command[s] = force.predicted_surface_effect_per_rad[s] * u[s]
+    force.innovation = measured.force[1 + f] * forces.inverse_chord_per_m - scaled_force
+    pressure_noise_effect = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     for k in range(2):
-        force.jitter[k] = (
-            force.trim_variance[k] * forces.pressure_ratio**2
-            + by_pressure * by_pressure
-            + force.accelerometer_variance
+        force.noise_variance[k] = (
+            force.noise_variance_in_trim[k] * forces.dynamic_pressure_over_trim**2
+            + pressure_noise_effect * pressure_noise_effect
+            + force.accelerometer_innovation_variance
         )
 
 
 @kernel
-def fill_flow_rates(forces, measured):
-    """Fill `rate` with d beta / dt and d alpha / dt in still air, rad/s.
+def fill_flow_angle_rates(forces, measured):
+    """Fill `flow_angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
     They follow from accelerometers, rates, attitude and flow.
     """
     gravity, x, a = forces.gravity, measured.x, measured.force
     phi, theta = measured.attitude[0], measured.attitude[1]
     alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
-    ahead, right = np.cos(alpha) * np.cos(beta), np.sin(beta)
-    down = np.sin(alpha) * np.cos(beta)
-    pull = a[0] - gravity * np.sin(theta)
-    push = a[1] + gravity * np.cos(theta) * np.sin(phi)
-    fall = a[2] + gravity * np.cos(theta) * np.cos(phi)
-    faster = ahead * pull + right * push + down * fall
-    sideways = push + V * (x[0] * down - x[2] * ahead)
-    forces.rate[SIDE] = (sideways - faster * right) / (V * np.cos(beta))
-    forwards, downwards = pull + V * (x[2] * right - x[1] * down), fall + V * (x[1] * ahead - x[0] * right)
-    forces.rate[NORMAL] = (downwards * np.cos(alpha) - forwards * np.sin(alpha)) / (V * np.cos(beta))
+    flow_forward, flow_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
+    flow_down = np.sin(alpha) * np.cos(beta)
+    forward_acceleration = a[0] - gravity * np.sin(theta)
+    right_acceleration = a[1] + gravity * np.cos(theta) * np.sin(phi)
+    down_acceleration = a[2] + gravity * np.cos(theta) * np.cos(phi)
+    airspeed_rate = (
+        flow_forward * forward_acceleration + flow_right * right_acceleration + flow_down * down_acceleration
+    )
+    right_velocity_rate = right_acceleration + V * (x[0] * flow_down - x[2] * flow_forward)
+    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * flow_right) / (
+        V * np.cos(beta)
+    )
+    forward_velocity_rate = forward_acceleration + V * (x[2] * flow_right - x[1] * flow_down)
+    down_velocity_rate = down_acceleration + V * (x[1] * flow_forward - x[0] * flow_right)
+    forces.flow_angle_rate[NORMAL_COMPONENT] = (
+        down_velocity_rate * np.cos(alpha) - forward_velocity_rate * np.sin(alpha)
+    ) / (V * np.cos(beta))
 
 
 def force_terms(aircraft: Aircraft, f: int) -> list[Term]:
-    """The terms of one direction, as `update_force` goes through them."""
-    return [term for term in aircraft.measurable_forces if term.coefficient == COMPONENTS[f]]
+    """The terms of one direction, as `update_force_innovation` goes through them."""
+    return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_COEFFICIENT_NAMES[f]]
 
 
-def configure_forces(fdi: np.void, declared: Declared, trim: Trim, along_y: np.ndarray, dt_s: float) -> None:
+def configure_forces(
+    fdi: np.void, declared: Declared, trim: TrimState, acceleration_slopes_by_y: np.ndarray, dt_s: float
+) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
-    along_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
+    acceleration_slopes_by_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
     y, statistical, aircraft, sensors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
-    forces, air, size = statistical["forces"], statistical["air"], aircraft.geometry
-    forces["per_chord"], forces["gravity"] = 1.0 / size.chord_m, air["config"]["gravity"]
-    forces["pressure"], forces["pressure_noise"] = y[QDYN], sensors["qdyn"].random
-    rates = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
-    forces["span"], forces["sideslip_rate_coefficient"] = size.span_m, sum(rates)
-    scale = y[QDYN] * air["config"]["area_per_mass"] * forces["per_chord"]
-    errors = sensors.each("random", ("alpha", "beta", "V", *AXES))
-    by_airspeed, by_others = _slipstream_noise(y, fdi["bound"]["declared_errors"], sensors)
+    forces, gust, geometry = statistical["forces"], statistical["gust"], aircraft.geometry
+    forces["inverse_chord_per_m"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
+    forces["trim_dynamic_pressure"], forces["dynamic_pressure_noise_std"] = y[QDYN], sensors["qdyn"].random
+    sideslip_rate_coefficients = [
+        t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)
+    ]
+    forces["wing_span"] = geometry.span_m
+    forces["sideslip_rate_coefficient"] = sum(sideslip_rate_coefficients)
+    acceleration_per_coefficient = (
+        y[QDYN] * gust["config"]["wing_area_per_mass"] * forces["inverse_chord_per_m"]
+    )
+    reading_noise_std = sensors.each("random", ("alpha", "beta", "V", *AXES))
+    slipstream_per_airspeed, other_slipstream_variance = _slipstream_slope_and_noise_variance(
+        y, fdi["bound"]["declared_errors"], sensors
+    )
     for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force, terms = forces["component"][f], force_terms(aircraft, f)
-        every = scale * _coefficient_slopes(aircraft, COMPONENTS[f], trim)
-        slopes, slipstream = every[:-1], every[-1]
-        force["vane"], force["vane_roll"] = (-along_y[axis, vane], -slopes[vane]), -along_y[0, vane]
+        slopes_with_slipstream = acceleration_per_coefficient * _force_coefficient_slopes(
+            aircraft, FORCE_COEFFICIENT_NAMES[f], trim
+        )
+        slopes, slipstream_slope = slopes_with_slipstream[:-1], slopes_with_slipstream[-1]
+        force["vane_error_effect_per_rad"] = (-acceleration_slopes_by_y[axis, vane], -slopes[vane])
+        force["vane_error_roll_acceleration_per_rad"] = -acceleration_slopes_by_y[0, vane]
         force["damping"] = slopes[3:]
-        total = slopes.copy()
-        total[AIRSPEED] += slipstream * by_airspeed
-        parts = (total * errors) ** 2
-        quiet = parts.sum() + slipstream**2 * by_others
-        force["trim_variance"] = quiet, quiet - parts[vane]
-        noise = sensors[ACCELEROMETERS[1 + f]].random
-        force["accelerometer_variance"] = (forces["per_chord"] * noise) ** 2
-        _configure_force_tolerances(force, declared, terms, y, slopes[vane] / scale, f, forces["per_chord"])
-        turned = scale * sum(abs(term.value) for term in terms if term.surface)
-        force["deflection"] = turned * declared.actuators.deflection_rad
-        force["drift"] = _angle_drift(sensors, air["config"]["gravity"], y[AIRSPEED], f)
-        drift_intensity = (DRIFT_CHANGE_SHARE * force["drift"]) ** 2 + dt_s * (noise / y[AIRSPEED]) ** 2
-        force["drift_intensity"] = slopes[vane] ** 2 * (
+        total_slopes = slopes.copy()
+        total_slopes[AIRSPEED] += slipstream_slope * slipstream_per_airspeed
+        variance_parts = (total_slopes * reading_noise_std) ** 2
+        variance = variance_parts.sum() + slipstream_slope**2 * other_slipstream_variance
+        force["noise_variance_in_trim"] = variance, variance - variance_parts[vane]
+        accelerometer_noise_std = sensors[ACCELEROMETERS[1 + f]].random
+        force["accelerometer_innovation_variance"] = (
+            forces["inverse_chord_per_m"] * accelerometer_noise_std
+        ) ** 2
+        _configure_force_tolerances(
+            force,
+            declared,
+            terms,
+            y,
+            slopes[vane] / acceleration_per_coefficient,
+            f,
+            forces["inverse_chord_per_m"],
+        )
+        acceleration_per_rad = acceleration_per_coefficient * sum(
+            abs(term.value) for term in terms if term.surface
+        )
+        force["deflection_error_effect"] = acceleration_per_rad * declared.actuators.deflection_rad
+        force["flow_angle_drift_bound"] = _flow_angle_drift_bound(
+            sensors, gust["config"]["gravity"], y[AIRSPEED], f
+        )
+        drift_intensity = (DRIFT_SHARE_CHANGING_PER_S * force["flow_angle_drift_bound"]) ** 2 + dt_s * (
+            accelerometer_noise_std / y[AIRSPEED]
+        ) ** 2
+        force["innovation_drift_intensity"] = slopes[vane] ** 2 * (
             drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 
 
-def _slipstream_noise(y: np.ndarray, declared_errors: np.void, declared: SensorErrors) -> tuple[float, float]:
+def _slipstream_slope_and_noise_variance(
+    y: np.ndarray, declared_errors: np.void, sensor_errors: SensorErrors
+) -> tuple[float, float]:
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
-    if not declared_errors["engine"]:
+    if not declared_errors["has_engine_errors"]:
         return 0.0, 0.0
-    by_airspeed, by_pressure, per_kw = slipstream_slopes(y, declared_errors["thin_air_kw"])
-    power_kw = declared_errors["engine_kw"] / NOISE_LIMIT_SIGMA
-    return by_airspeed, float((by_pressure * declared["qdyn"].random) ** 2 + (per_kw * power_kw) ** 2)
+    slope_by_airspeed, slope_by_pressure, slope_per_kw = slipstream_slopes(
+        y, declared_errors["density_power_error_kw"]
+    )
+    power_noise_kw = declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
+    return slope_by_airspeed, float(
+        (slope_by_pressure * sensor_errors["qdyn"].random) ** 2 + (slope_per_kw * power_noise_kw) ** 2
+    )
 
 
-def _angle_drift(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
-    """How fast the angle that is followed can drift, rad/s. Gravity acts along the path's slope only on the
-    incidence, and in full on sideslip."""
-    tilt = errors["phi"].steady + errors["theta"].steady
-    turning = sum(errors[gyro].steady + TYPICAL_RATE_RAD_S * errors[gyro].slope for gyro in AXES)
+def _flow_angle_drift_bound(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
+    """Bound the drift of the flow angle from inertial motion, rad/s. Gravity acts along the path's slope only
+    on the incidence, and in full on sideslip."""
+    attitude_error = errors["phi"].steady + errors["theta"].steady
+    gyro_error = sum(errors[gyro].steady + TYPICAL_BODY_RATE_RAD_S * errors[gyro].slope for gyro in AXES)
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
-    own = errors[ACCELEROMETERS[1 + f]]
-    across_flow = (
-        own.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + gravity * (own.slope if f == NORMAL else 0.0)
+    accelerometer = errors[ACCELEROMETERS[1 + f]]
+    accelerometer_error = (
+        accelerometer.steady
+        + TYPICAL_PATH_SLOPE_RAD * errors["ax"].steady
+        + gravity * (accelerometer.slope if f == NORMAL_COMPONENT else 0.0)
     )
-    falls = (
-        gravity * tilt * (TYPICAL_SLOPE_RAD if f == NORMAL else 1.0) + EARTH_ACCELERATION_M_S2 + across_flow
+    acceleration_error = (
+        gravity * attitude_error * (TYPICAL_PATH_SLOPE_RAD if f == NORMAL_COMPONENT else 1.0)
+        + EARTH_ACCELERATION_BOUND_M_S2
+        + accelerometer_error
     )
-    return float(EARTH_RATE_RAD_S + turning + falls / airspeed_mps)
+    return float(EARTH_RATE_RAD_S + gyro_error + acceleration_error / airspeed_mps)
 
 
 def _configure_force_tolerances(
@@ -261,40 +335,58 @@ def _configure_force_tolerances(
     y: np.ndarray,
     vane_slope: float,
     f: int,
-    per_chord: float,
+    inverse_chord_per_m: float,
 ) -> None:
-    """Of each term: that of the coefficients, and what constant errors of vane and pressure do; of the
-    accelerometer's bias, m/s2; of the whole."""
-    share, errors = declared.coefficients.largest, declared.sensors
-    vane, accelerometer = errors["alpha" if f == NORMAL else "beta"], errors[ACCELEROMETERS[1 + f]]
-    pressure = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
+    """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
+    pressure do; of the accelerometer's bias, m/s2; of the whole."""
+    coefficient_tolerance, errors = declared.coefficients.largest, declared.sensors
+    vane, accelerometer = errors["alpha" if f == NORMAL_COMPONENT else "beta"], errors[ACCELEROMETERS[1 + f]]
+    pressure_error_share = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     for k, term in enumerate(terms):
-        force["tolerance"][k] = (share + pressure + vane.slope) * abs(term.value)
+        force["regressor_tolerance"][k] = (coefficient_tolerance + pressure_error_share + vane.slope) * abs(
+            term.value
+        )
         if term.is_constant:
-            force["tolerance"][k] += vane.steady * abs(vane_slope)
-    n = len(terms)
-    if f == SIDE:
-        force["tolerance"][n], n = share + RATE_TOLERANCE[declared.air.moves], n + 1
+            force["regressor_tolerance"][k] += vane.steady * abs(vane_slope)
+    n_regressors = len(terms)
+    if f == SIDE_COMPONENT:
+        force["regressor_tolerance"][n_regressors] = (
+            coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE[declared.air.moves]
+        )
+        n_regressors = n_regressors + 1
     if accelerometer.steady:
-        force["tolerance"][n], force["regressor"][n], n = accelerometer.steady, per_chord, n + 1
-    force["tolerance"][n], force["n"] = MASS_TOLERANCE + accelerometer.slope, n + 1
+        force["regressor_tolerance"][n_regressors] = accelerometer.steady
+        force["regressor"][n_regressors] = inverse_chord_per_m
+        n_regressors = n_regressors + 1
+    force["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer.slope
+    force["n_regressors"] = n_regressors + 1
 
 
-def _force_coefficient(aircraft: Aircraft, name: str, at: Trim) -> float:
+def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
     """A force coefficient at x (3,) rad/s, y, u rad."""
-    x, y, u = at
-    size, V = aircraft.geometry, y[AIRSPEED]
-    hats = x * (size.span_m / (2.0 * V), size.chord_m / V, size.span_m / (2.0 * V))
-    of = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
-    of |= dict(zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *hats, 0.0), strict=True))
-    return float(aircraft.coefficient(name, of))
+    x, y, u = state
+    geometry, V = aircraft.geometry, y[AIRSPEED]
+    normalised_rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
+    factor_values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
+        zip(aircraft.signals, y[4:], strict=True)
+    )
+    factor_values |= dict(
+        zip(
+            ("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE),
+            (y[0], y[1], *normalised_rates, 0.0),
+            strict=True,
+        )
+    )
+    return float(aircraft.coefficient(name, factor_values))
 
 
-def _coefficient_slopes(aircraft: Aircraft, name: str, trim: Trim) -> np.ndarray:
+def _force_coefficient_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
     (x, y, u), step = trim, 1e-5
-    states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
-    states += [(x + step * e, y, u) for e in np.eye(3)]
-    states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    here = _force_coefficient(aircraft, name, trim)
-    return np.array([(_force_coefficient(aircraft, name, state) - here) / step for state in states])
+    changed_states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
+    changed_states += [(x + step * e, y, u) for e in np.eye(3)]
+    changed_states += [(x, y + step * (np.arange(y.size) == DPT), u)]
+    trim_coefficient = _force_coefficient(aircraft, name, trim)
+    return np.array(
+        [(_force_coefficient(aircraft, name, state) - trim_coefficient) / step for state in changed_states]
+    )

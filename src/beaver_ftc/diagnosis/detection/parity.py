@@ -39,15 +39,17 @@ is linear, so the whitened innovation contains the same tone. For each frequency
 
     N = sum exp((i w - 1 / T) t) g / sqrt(S)          summed over past frames; t s is the age of a frame
 
-with S the variance of g, (rad/s)2, and T = MEMORY_S. Without a fault the real and the imaginary part of N are
-normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with a probability of exp(-x^2 / 2) at
-most. Two errors can add to |N| without a fault (symbols as in likelihood.py):
+with S the variance of g, (rad/s)2, and T = TONE_MEMORY_S. Without a fault the real and the imaginary part of
+N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with a probability of exp(-x^2 /
+2) at most. Two errors can add to |N| without a fault (symbols as in likelihood.py):
 
 * Errors of coefficients add at most sum_j tol_j |R_j|, where R_j is the same sum over regressor j.
 * A bounded uncertainty |d| <= eta_bar adds at most |W(w)| sum eta_bar exp(-t / T) |cos|, where W is the gain
-  of the whitening filter at w. The limited rate of change of d reduces this a little (`bounded_gain_at`).
+  of the whitening filter at w. The limited rate of change of d reduces this a little
+  (`max_bounded_uncertainty_gain`).
 
-The sums are updated once per SUMMED_S: no frequency of the grid changes its phase much in that time.
+The sums are updated once per TONE_UPDATE_INTERVAL_S: no frequency of the grid changes its phase much in that
+time.
 """
 
 from collections.abc import Iterator
@@ -62,53 +64,70 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import axis_of_term
 from beaver_ftc.diagnosis.detection import forces, likelihood
-from beaver_ftc.diagnosis.detection.forces import COMPONENTS, NORMAL, SETTLED_UPDATES, SIDE, force_terms
+from beaver_ftc.diagnosis.detection.forces import (
+    FORCE_COEFFICIENT_NAMES,
+    MIN_FORCE_UPDATES,
+    NORMAL_COMPONENT,
+    SIDE_COMPONENT,
+    force_terms,
+)
 from beaver_ftc.diagnosis.detection.likelihood import (
-    LATERAL,
+    LATERAL_BLOCK,
     MAX_HYPOTHESES,
-    N_READINGS,
+    N_INPUT_READINGS,
     PITCH_BLOCK,
-    STEP,
+    STEP_FAULT,
     Capacity,
     normalised_evidence,
 )
-from beaver_ftc.diagnosis.gusts import full_gust_drift, project_on_axis, remaining_gust_drift
+from beaver_ftc.diagnosis.gusts import (
+    full_gust_drift_intensity,
+    project_on_gust_axis,
+    remaining_gust_drift_intensity,
+)
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 
-N_TONES = 16
+N_TONE_FREQUENCIES = 16
 # A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears
 # with 0.7 of its amplitude.
-MEMORY_S = 2.5
-FREQUENCIES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
-SUMMED_S = 0.04
+TONE_MEMORY_S = 2.5
+TONE_FREQUENCIES_RAD_S = np.linspace(1.0, 13.0, N_TONE_FREQUENCIES)
+TONE_UPDATE_INTERVAL_S = 0.04
 # Share of the alarm level reserved for noise in addition to a bounded uncertainty. It is reserved without
-# noise too, because `whitening_gain` assumes constant gains, and the gains vary with a varying bound.
-NOISE_SHARE = 0.5
+# noise too, because `tone_whitening_gain` assumes constant gains, and the gains vary with a varying bound.
+TONE_NOISE_SHARE_OF_ALARM_LEVEL = 0.5
 # The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
-MAX_AIRSPEED_RATIO, MAX_INCIDENCE_RAD = 2.0, 0.5
+MAX_AIRSPEED_OVER_TRIM, MAX_VANE_ANGLE_RAD = 2.0, 0.5
 
 # Configuration that all views share.
-TONE_CONFIG = record(
-    slowest=float, fastest=float,  # airspeeds, m/s, between which the tests run
-    frames_per_sum=int, level=float,  # alarm level, standard deviations
-    keep=float,  # factor by which a sum decays from one update to the next
-    # (cos, sin) of the phase change per frame; per update, and twice that, both times `keep`
-    rotation=(2, N_TONES), rotation_kept=(2, N_TONES), rotation_twice=(2, N_TONES),
-    bounded_gain=N_TONES,  # largest mean of cos(w t) d(t) for a bounded uncertainty |d| <= 1
-    noise_variance=N_TONES,  # larger variance of real and imaginary part of N; the sum of both is 1
+TONE_CONFIG_RECORD = record(
+    min_airspeed=float, max_airspeed=float,  # airspeeds, m/s, between which the tests run
+    frames_per_update=int, alarm_level=float,  # alarm level, standard deviations
+    sum_decay_factor=float,  # factor by which a sum decays from one update to the next
+    # (cos, sin) of the phase change per frame; per update, and twice that, both times `sum_decay_factor`
+    phase_rotation_per_frame=(2, N_TONE_FREQUENCIES), decayed_rotation_per_update=(2, N_TONE_FREQUENCIES),
+    decayed_double_rotation_per_update=(2, N_TONE_FREQUENCIES),
+    # largest mean of cos(w t) d(t) for a bounded uncertainty |d| <= 1
+    bounded_uncertainty_gain=N_TONE_FREQUENCIES,
+    # larger variance of real and imaginary part of N; the sum of both is 1
+    larger_part_variance_share=N_TONE_FREQUENCIES,
 )  # fmt: skip
 
 
 @sized
-def tones_dtype(regressors: int) -> np.dtype:
+def tone_tests_dtype(n_regressors: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
-        count=int, sum=float, sums=regressors,  # frames since the last update; sums of g and of regressors
-        tone=(2, N_TONES), overlap=(regressors, 2, N_TONES),  # N and R_j: real and imaginary parts
+        # frames since the last update; sums of g and of n_regressors
+        frames_since_update=int, innovation_sum=float, regressor_sums=n_regressors,
+        # N and R_j: real and imaginary parts
+        correlation=(2, N_TONE_FREQUENCIES), regressor_overlap=(n_regressors, 2, N_TONE_FREQUENCIES),
         # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, the
         # filtered bound: its mean, and its component at twice the frequency
-        coefficient_part=N_TONES, uncertainty_part=N_TONES, bound_mean=N_TONES, bound_harmonic=(2, N_TONES),
-        information=float,  # variance of N without a fault
+        coefficient_error_part=N_TONE_FREQUENCIES, max_uncertainty_part=N_TONE_FREQUENCIES,
+        uncertainty_bound_mean=N_TONE_FREQUENCIES,
+        uncertainty_bound_harmonic=(2, N_TONE_FREQUENCIES),
+        correlation_variance=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
     )  # fmt: skip
 
@@ -119,273 +138,326 @@ def is_within_envelope(tone_config, y):
 
     Outside, the tolerances of the tests, which are worked out for trim, do not hold.
     """
-    within = tone_config.slowest < y[AIRSPEED] < tone_config.fastest
-    return within and abs(y[ALPHA]) < MAX_INCIDENCE_RAD and abs(y[BETA]) < MAX_INCIDENCE_RAD
+    within = tone_config.min_airspeed < y[AIRSPEED] < tone_config.max_airspeed
+    return within and abs(y[ALPHA]) < MAX_VANE_ANGLE_RAD and abs(y[BETA]) < MAX_VANE_ANGLE_RAD
 
 
 @kernel
-def update_tones(view, tone_config, alarm_level, within_envelope, has_tolerances, dt):
+def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
     tolerated: true if the block has regressors. Without `within_envelope` the frame counts as zero, so the
     sums decay.
     """
-    tones, block = view.tones, view.block
-    n = block.n_regressors if has_tolerances else 0
-    root = np.sqrt(block.S_inverse[0, 0]) if within_envelope else 0.0
-    tones.sum += root * block.innovation[0]
-    for j in range(n):
-        tones.sums[j] += root * block.regressor_response[j, 0]
-    tones.count += 1
-    if tones.count < tone_config.frames_per_sum:
+    tone_tests, block = view.tone_tests, view.block
+    n_regressors = block.n_regressors if has_regressors else 0
+    inverse_std = np.sqrt(block.S_inverse[0, 0]) if within_envelope else 0.0
+    tone_tests.innovation_sum += inverse_std * block.innovation[0]
+    for j in range(n_regressors):
+        tone_tests.regressor_sums[j] += inverse_std * block.regressor_response[j, 0]
+    tone_tests.frames_since_update += 1
+    if tone_tests.frames_since_update < tone_config.frames_per_update:
         return
-    advance_resonators(tone_config, tones.tone, tones.sum)
-    for j in range(n):
-        advance_resonators(tone_config, tones.overlap[j], tones.sums[j])
-        tones.sums[j] = 0.0
-    tones.information = tone_config.keep * tone_config.keep * tones.information + tones.count
-    update_uncertainty_part(tones, tone_config, block, root * view.bounded[0], dt)
-    fill_coefficient_part(tones, block.tolerance, n)
-    fill_score(tones, tone_config, alarm_level)
-    tones.sum, tones.count = 0.0, 0
+    advance_resonators(tone_config, tone_tests.correlation, tone_tests.innovation_sum)
+    for j in range(n_regressors):
+        advance_resonators(tone_config, tone_tests.regressor_overlap[j], tone_tests.regressor_sums[j])
+        tone_tests.regressor_sums[j] = 0.0
+    tone_tests.correlation_variance = (
+        tone_config.sum_decay_factor * tone_config.sum_decay_factor * tone_tests.correlation_variance
+        + tone_tests.frames_since_update
+    )
+    update_uncertainty_part(tone_tests, tone_config, block, inverse_std * view.uncertainty_bound[0], dt)
+    fill_coefficient_part(tone_tests, block.regressor_tolerance, n_regressors)
+    fill_tone_score(tone_tests, tone_config, alarm_level)
+    tone_tests.innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
 
 @kernel
-def advance_resonators(tone_config, tone, drive):
-    """Advance N at every frequency, tone (2, N_TONES), by one update: rotate, decay, add the drive."""
-    rotation = tone_config.rotation_kept
-    for f in range(tone.shape[1]):
-        real, imaginary = tone[0, f], tone[1, f]
-        tone[0, f] = rotation[0, f] * real - rotation[1, f] * imaginary + drive
-        tone[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
+def advance_resonators(tone_config, resonator_state, input_sum):
+    """Advance N at every frequency, resonator_state (2, N_TONE_FREQUENCIES), by one update: rotate, decay,
+    add the drive."""
+    rotation = tone_config.decayed_rotation_per_update
+    for f in range(resonator_state.shape[1]):
+        real, imaginary = resonator_state[0, f], resonator_state[1, f]
+        resonator_state[0, f] = rotation[0, f] * real - rotation[1, f] * imaginary + input_sum
+        resonator_state[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
 
 
 @kernel
-def whitening_gain(K_x, K_d, keep, cos, sin, dt):
+def tone_whitening_gain(K_x, K_d, drift_decay, cos, sin, dt):
     """Amplitude, rad/s, of the whitened response to a tone of amplitude 1 rad/s2, at constant filter gains.
 
     cos, sin: of the phase change of the tone per frame, of dt s.
     """
-    apart = (cos - keep) * (cos - keep) + sin * sin
-    real = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - keep) / apart
-    imaginary = (1.0 - K_x) * sin - dt * K_d * sin / apart
+    squared_distance = (cos - drift_decay) * (cos - drift_decay) + sin * sin
+    real = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - drift_decay) / squared_distance
+    imaginary = (1.0 - K_x) * sin - dt * K_d * sin / squared_distance
     return dt / np.sqrt(real * real + imaginary * imaginary)
 
 
 @kernel
-def update_uncertainty_part(tones, tone_config, block, bounded, dt):
-    """Update `uncertainty_part`: the most that an uncertainty |d| <= bounded, in whitened units, adds to |N|.
+def update_uncertainty_part(tone_tests, tone_config, block, uncertainty_bound, dt):
+    """Update `max_uncertainty_part`: the most that an uncertainty |d| <= bounded, in whitened units, adds to
+    |N|.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
-    rotation, keep, per_sum = tone_config.rotation_twice, tone_config.keep, bounded * tones.count
-    for f in range(tones.uncertainty_part.size):
-        cos, sin = tone_config.rotation[0, f], tone_config.rotation[1, f]
-        bounded_input = per_sum * whitening_gain(block.K_x[0, 0], block.K_d[0, 0], block.keep, cos, sin, dt)
-        real, imaginary = tones.bound_harmonic[0, f], tones.bound_harmonic[1, f]
-        tones.bound_harmonic[0, f] = rotation[0, f] * real - rotation[1, f] * imaginary + bounded_input
-        tones.bound_harmonic[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
-        tones.bound_mean[f] = keep * tones.bound_mean[f] + bounded_input
-        tones.uncertainty_part[f] = tone_config.bounded_gain[f] * (
-            tones.bound_mean[f] + np.hypot(tones.bound_harmonic[0, f], tones.bound_harmonic[1, f])
+    rotation = tone_config.decayed_double_rotation_per_update
+    sum_decay = tone_config.sum_decay_factor
+    bound_sum = uncertainty_bound * tone_tests.frames_since_update
+    for f in range(tone_tests.max_uncertainty_part.size):
+        cos, sin = tone_config.phase_rotation_per_frame[0, f], tone_config.phase_rotation_per_frame[1, f]
+        bounded_input = bound_sum * tone_whitening_gain(
+            block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos, sin, dt
+        )
+        real = tone_tests.uncertainty_bound_harmonic[0, f]
+        imaginary = tone_tests.uncertainty_bound_harmonic[1, f]
+        tone_tests.uncertainty_bound_harmonic[0, f] = (
+            rotation[0, f] * real - rotation[1, f] * imaginary + bounded_input
+        )
+        tone_tests.uncertainty_bound_harmonic[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
+        tone_tests.uncertainty_bound_mean[f] = (
+            sum_decay * tone_tests.uncertainty_bound_mean[f] + bounded_input
+        )
+        tone_tests.max_uncertainty_part[f] = tone_config.bounded_uncertainty_gain[f] * (
+            tone_tests.uncertainty_bound_mean[f]
+            + np.hypot(
+                tone_tests.uncertainty_bound_harmonic[0, f], tone_tests.uncertainty_bound_harmonic[1, f]
+            )
         )
 
 
 @kernel
-def fill_coefficient_part(tones, tolerance, n):
-    """Fill `coefficient_part`: the most that the declared errors of the first n coefficients add to |N|.
+def fill_coefficient_part(tone_tests, tolerance, n_regressors):
+    """Fill `coefficient_error_part`: the most that the declared errors of the first n coefficients add to
+    |N|.
 
     The magnitude of R_j is at most its larger part plus (sqrt 2 - 1) times its smaller part.
     """
-    tones.coefficient_part[:] = 0.0
-    for j in range(n):
-        overlap, tol = tones.overlap[j], tolerance[j]
-        for f in range(tones.coefficient_part.size):
-            one, other = abs(overlap[0, f]), abs(overlap[1, f])
-            tones.coefficient_part[f] += tol * (max(one, other) + 0.41421356237309515 * min(one, other))
+    tone_tests.coefficient_error_part[:] = 0.0
+    for j in range(n_regressors):
+        overlap, coefficient_tolerance = tone_tests.regressor_overlap[j], tolerance[j]
+        for f in range(tone_tests.coefficient_error_part.size):
+            real_part, imaginary_part = abs(overlap[0, f]), abs(overlap[1, f])
+            tone_tests.coefficient_error_part[f] += coefficient_tolerance * (
+                max(real_part, imaginary_part) + 0.41421356237309515 * min(real_part, imaginary_part)
+            )
 
 
 @kernel
-def fill_score(tones, tone_config, alarm_level):
+def fill_tone_score(tone_tests, tone_config, alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
-    loudest = 0.0
-    for f in range(tones.coefficient_part.size):
-        evidence = np.hypot(tones.tone[0, f], tones.tone[1, f]) - tones.coefficient_part[f]
-        variance = tone_config.noise_variance[f] * tones.information
-        loudest = max(
-            loudest,
+    max_score = 0.0
+    for f in range(tone_tests.coefficient_error_part.size):
+        evidence = (
+            np.hypot(tone_tests.correlation[0, f], tone_tests.correlation[1, f])
+            - tone_tests.coefficient_error_part[f]
+        )
+        variance = tone_config.larger_part_variance_share[f] * tone_tests.correlation_variance
+        max_score = max(
+            max_score,
             normalised_evidence(
-                tone_config.level, NOISE_SHARE, evidence, tones.uncertainty_part[f], variance
+                tone_config.alarm_level,
+                TONE_NOISE_SHARE_OF_ALARM_LEVEL,
+                evidence,
+                tone_tests.max_uncertainty_part[f],
+                variance,
             ),
         )
-    tones.score = loudest * alarm_level / tone_config.level
+    tone_tests.score = max_score * alarm_level / tone_config.alarm_level
 
 
-def bounded_gain_at(frequency_rad_s: np.ndarray, pace_rad_s: float) -> np.ndarray:
-    """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= pace; frequencies w (n,) rad/s.
+def max_bounded_uncertainty_gain(frequency_rad_s: np.ndarray, change_rate_per_s: float) -> np.ndarray:
+    """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
 
-    The largest is reached by a square wave with edges of the slope `pace`, or, at frequencies where these
+    The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
     edges do not reach 1, by a triangular wave.
     """
-    x = frequency_rad_s / pace_rad_s
-    return 2.0 / pi * np.where(x < pi / 2.0, np.sin(x), 1.0) / x
+    normalised_frequency = frequency_rad_s / change_rate_per_s
+    return (
+        2.0
+        / pi
+        * np.where(normalised_frequency < pi / 2.0, np.sin(normalised_frequency), 1.0)
+        / normalised_frequency
+    )
 
 
-def configure_tones(
-    tone_config: np.void, chance: float, airspeed_mps: float, pace_rad_s: float, dt_s: float
+def configure_tone_tests(
+    tone_config: np.void,
+    false_alarm_probability: float,
+    airspeed_mps: float,
+    change_rate_per_s: float,
+    dt_s: float,
 ) -> None:
     """Fill the configuration that all views share.
 
-    chance: probability of a false alarm granted to one test in one frame. airspeed_mps: in trim. pace_rad_s:
-    largest rate of change of a bounded uncertainty, in bounds per second.
+    false_alarm_probability: probability of a false alarm granted to one test in one frame. airspeed_mps: in
+    trim. change_rate_per_s: largest rate of change of a bounded uncertainty, in bounds per second.
     """
-    tone_config["bounded_gain"] = bounded_gain_at(FREQUENCIES_RAD_S, pace_rad_s)
-    tone_config["slowest"], tone_config["fastest"] = (
-        airspeed_mps / MAX_AIRSPEED_RATIO,
-        airspeed_mps * MAX_AIRSPEED_RATIO,
+    tone_config["bounded_uncertainty_gain"] = max_bounded_uncertainty_gain(
+        TONE_FREQUENCIES_RAD_S, change_rate_per_s
     )
-    frames_per_sum = max(round(SUMMED_S / dt_s), 1)
-    angle = FREQUENCIES_RAD_S * dt_s
-    keep = exp(-frames_per_sum * dt_s / MEMORY_S)
-    tone_config["frames_per_sum"], tone_config["keep"], tone_config["level"] = (
-        frames_per_sum,
-        keep,
-        sqrt(-2.0 * np.log(chance)),
+    tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_OVER_TRIM
+    tone_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_OVER_TRIM
+    frames_per_update = max(round(TONE_UPDATE_INTERVAL_S / dt_s), 1)
+    phase_per_frame = TONE_FREQUENCIES_RAD_S * dt_s
+    decay_factor = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
+    tone_config["frames_per_update"] = frames_per_update
+    tone_config["sum_decay_factor"] = decay_factor
+    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability))
+    tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame), np.sin(phase_per_frame)
+    tone_config["decayed_rotation_per_update"] = (
+        decay_factor * np.cos(frames_per_update * phase_per_frame),
+        decay_factor * np.sin(frames_per_update * phase_per_frame),
     )
-    tone_config["rotation"] = np.cos(angle), np.sin(angle)
-    tone_config["rotation_kept"] = (
-        keep * np.cos(frames_per_sum * angle),
-        keep * np.sin(frames_per_sum * angle),
-    )
-    tone_config["rotation_twice"] = (
-        keep * np.cos(2.0 * frames_per_sum * angle),
-        keep * np.sin(2.0 * frames_per_sum * angle),
+    tone_config["decayed_double_rotation_per_update"] = (
+        decay_factor * np.cos(2.0 * frames_per_update * phase_per_frame),
+        decay_factor * np.sin(2.0 * frames_per_update * phase_per_frame),
     )
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    difference = (1.0 - keep**2) / np.abs(1.0 - keep**2 * np.exp(2j * frames_per_sum * angle))
-    tone_config["noise_variance"] = 0.5 * (1.0 + difference)
+    variance_difference = (1.0 - decay_factor**2) / np.abs(
+        1.0 - decay_factor**2 * np.exp(2j * frames_per_update * phase_per_frame)
+    )
+    tone_config["larger_part_variance_share"] = 0.5 * (1.0 + variance_difference)
 
 
-VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
-PEAK_MEMORY = 5.0  # time constant of `peak_score` over the one with which evidence is forgotten
-MIN_FORCE_SHARE = 0.9  # component of a direction of length 1, above which a view counts as one of the force
-MIN_COLUMN_LENGTH = 0.1  # least length that the errors leave of a column, as a share of its length
+VANE_EFFECT_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
+PEAK_SCORE_MEMORY_RATIO = (
+    5.0  # time constant of `decaying_peak_score` over the one with which evidence is forgotten
+)
+MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
+    0.9  # component of a direction of length 1, above which a view counts as one of the force
+)
+MIN_COLUMN_LENGTH_SHARE = 0.1  # least length that the errors leave of a column, as a share of its length
 PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL_FORCE), (ROLL, YAW), (YAW, SIDE_FORCE)
 
-# Values of `surface` in a view without one: a view of an axis; one across the column of an error of a vane.
+# Values of `orthogonal_to_surface` in a view without one: a view of an axis; one across the column of an
+# error of a vane.
 AXIS_VIEW, VANE_VIEW = -1, -2
 
 
-class RecordSize(NamedTuple):
+class StatisticalRecordSize(NamedTuple):
     """Capacities of a record: of a block of the rates, of a view; numbers of views and of error-map boxes."""
 
-    rates: Capacity
-    view: Capacity
-    views: int
-    boxes: int
+    rate_block: Capacity
+    view_block: Capacity
+    n_views: int
+    n_error_map_boxes: int
 
 
-USUAL_SIZE = RecordSize(
+USUAL_RECORD_SIZE = StatisticalRecordSize(
     Capacity(23, MAX_HYPOTHESES), Capacity(36, 3), 13, 6
-)  # enough for most aircraft: see `size_for`
+)  # enough for most aircraft: see `required_record_size`
 
 
 @sized
-def view_dtype(capacity: Capacity) -> np.dtype:
+def parity_view_dtype(capacity: Capacity) -> np.dtype:
     """A view whose block has these capacities."""
     return record(
-        surface=int,  # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
-        axis=int,  # reported with an alarm of this view
-        direction=5, column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
-        plane=(int, 2),  # the two components that the column has
-        across_gust=int,  # whether m is orthogonal to the rolling gust as well
-        has_tolerance=int,  # whether regressors count in this view even if they do in no other block
-        inertial=int,  # whether the force is that at the flow angle from inertial motion
-        immune_to_vane=int,  # whether an error of a vane does not appear in this view
-        confirmed_by=int,  # force of the views that confirm this one; 0 if no vane is used
+        orthogonal_to_surface=int,  # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
+        alarm_axis=int,  # reported with an alarm of this view
+        direction=5, unit_column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
+        plane_axes=(int, 2),  # the two components that the column has
+        is_orthogonal_to_rolling_gust=int,  # whether m is orthogonal to the rolling gust as well
+        always_has_regressors=int,  # whether regressors count in this view even if they do in no other block
+        uses_inertial_flow_angle=int,  # whether the force is that at the flow angle from inertial motion
+        is_immune_to_vane_error=int,  # whether an error of a vane does not appear in this view
+        confirming_force=int,  # force of the views that confirm this one; 0 if no vane is used
         # of this frame: whether the view is used; which share of nu along the column leaks into it
-        active=int, column_leak=float,
-        bounded=1,  # bound on the uncertainty along m, rad/s2
-        gust_on_rates=3, gust_on_forces=3,  # effect of the air's rotation about the body axes, 1/s
-        peak_score=float,  # largest score, decaying slowly
-        block=likelihood.block_dtype(capacity), tones=tones_dtype(capacity.regressors),
+        is_used=int, column_leak=float,
+        uncertainty_bound=1,  # bound on the uncertainty along m, rad/s2
+        # effect of the air's rotation about the body axes, 1/s
+        rate_gust_sensitivity=3, force_gust_sensitivity=3,
+        decaying_peak_score=float,  # largest score, decaying slowly
+        block=likelihood.block_dtype(capacity), tone_tests=tone_tests_dtype(capacity.max_regressors),
     )  # fmt: skip
 
 
 @kernel
-def innovation_component(view, forces, air, inertial_air, innovation, i):
+def innovation_component(view, forces, gust, inertial_gust, innovation, i):
     """Component i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if i < SIDE_FORCE:
-        gust = 0.0
-        if uses_gust_estimate(view, air):
-            gust = gust_estimate_for(view, air, inertial_air).output.mean[i]
-        return innovation[i] - gust
+        gust_acceleration = 0.0
+        if uses_gust_estimate(view, gust):
+            gust_acceleration = gust_estimate_of_view(
+                view, gust, inertial_gust
+            ).output.mean_gust_acceleration[i]
+        return innovation[i] - gust_acceleration
     force = forces.component[i - SIDE_FORCE]
-    return force.inertial if view.inertial else force.innovation
+    return force.innovation_at_inertial_flow_angle if view.uses_inertial_flow_angle else force.innovation
 
 
 @kernel
-def column_component(view, forces, bound, G, j):
+def column_entry_and_error(view, forces, bound, G, j):
     """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
-    i, s = view.plane[j], view.surface
+    i, s = view.plane_axes[j], view.orthogonal_to_surface
     if s == VANE_VIEW:
-        size = forces.component[view.plane[1] - SIDE_FORCE].vane[j]
-        return size, VANE_TOLERANCE * abs(size)
+        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].vane_error_effect_per_rad[j]
+        return entry, VANE_EFFECT_TOLERANCE * abs(entry)
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
-        return force.column_predicted[s], force.column_error[s]
-    return G[i, s], bound.surface_error_per_rad[i, s] if bound.has_surface_errors else 0.0
+        return force.predicted_surface_effect_per_rad[s], force.surface_effect_per_rad_error_bound[s]
+    return G[i, s], bound.effectiveness_error_per_rad[i, s] if bound.has_surface_errors else 0.0
 
 
 @kernel
-def set_direction(view, forces, air, bound, G):
-    """Fill `direction` and `column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
+def set_view_direction(view, forces, gust, bound, G):
+    """Fill `direction` and `unit_column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
 
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
-    if view.across_gust:
-        return set_direction_across_gust(view, forces, air)
-    first, second = view.plane[0], view.plane[1]
-    first_entry, first_error = column_component(view, forces, bound, G, 0)
-    second_entry, second_error = column_component(view, forces, bound, G, 1)
-    size = np.sqrt(first_entry * first_entry + second_entry * second_entry)
-    if size == 0.0:
+    if view.is_orthogonal_to_rolling_gust:
+        return set_view_direction_across_gust(view, forces, gust)
+    first, second = view.plane_axes[0], view.plane_axes[1]
+    first_entry, first_error = column_entry_and_error(view, forces, bound, G, 0)
+    second_entry, second_error = column_entry_and_error(view, forces, bound, G, 1)
+    column_length = np.sqrt(first_entry * first_entry + second_entry * second_entry)
+    if column_length == 0.0:
         return 0.0
-    view.direction[first], view.direction[second] = -second_entry / size, first_entry / size
-    view.column[first], view.column[second] = first_entry / size, second_entry / size
-    leak = abs(view.direction[first]) * first_error + abs(view.direction[second]) * second_error
-    shorter = abs(view.direction[second]) * first_error + abs(view.direction[first]) * second_error
-    return leak / max(size - shorter, MIN_COLUMN_LENGTH * size)
+    view.direction[first], view.direction[second] = -second_entry / column_length, first_entry / column_length
+    view.unit_column[first] = first_entry / column_length
+    view.unit_column[second] = second_entry / column_length
+    leaking_error = abs(view.direction[first]) * first_error + abs(view.direction[second]) * second_error
+    length_error = abs(view.direction[second]) * first_error + abs(view.direction[first]) * second_error
+    return leaking_error / max(column_length - length_error, MIN_COLUMN_LENGTH_SHARE * column_length)
 
 
 @kernel
-def set_direction_across_gust(view, forces, air):
+def set_view_direction_across_gust(view, forces, gust):
     """The same for the direction across two vectors: their vector product in (roll, yaw, side force).
 
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
     """
     force = forces.component[0]
-    roll, yaw, side = force.vane_roll, force.vane[0], force.vane[1]
-    roll_gust, yaw_gust = (
-        project_on_axis(air.output.damping[ROLL], air.output.axes, 0),
-        project_on_axis(air.output.damping[YAW], air.output.axes, 0),
+    roll = force.vane_error_roll_acceleration_per_rad
+    yaw = force.vane_error_effect_per_rad[0]
+    side_force = force.vane_error_effect_per_rad[1]
+    roll_gust = project_on_gust_axis(gust.output.rate_damping[ROLL], gust.output.gust_axes_in_body, 0)
+    yaw_gust = project_on_gust_axis(gust.output.rate_damping[YAW], gust.output.gust_axes_in_body, 0)
+    roll_component = -side_force * yaw_gust
+    yaw_component = side_force * roll_gust
+    side_component = roll * yaw_gust - yaw * roll_gust
+    length = np.sqrt(
+        roll_component * roll_component + yaw_component * yaw_component + side_component * side_component
     )
-    by_roll, by_yaw, by_side = -side * yaw_gust, side * roll_gust, roll * yaw_gust - yaw * roll_gust
-    length = np.sqrt(by_roll * by_roll + by_yaw * by_yaw + by_side * by_side)
     if length == 0.0:
         return 0.0
-    size, leak = np.sqrt(roll * roll + yaw * yaw + side * side), 0.0
-    for i, of_vane, by in ((ROLL, roll, by_roll), (YAW, yaw, by_yaw), (SIDE_FORCE, side, by_side)):
-        view.direction[i], view.column[i] = by / length, of_vane / size
-        leak += VANE_TOLERANCE * abs(view.direction[i] * of_vane)
-    return leak / ((1.0 - VANE_TOLERANCE) * size)
+    vane_column_length, leaking_error = np.sqrt(roll * roll + yaw * yaw + side_force * side_force), 0.0
+    for i, vane_entry, direction_entry in (
+        (ROLL, roll, roll_component),
+        (YAW, yaw, yaw_component),
+        (SIDE_FORCE, side_force, side_component),
+    ):
+        view.direction[i], view.unit_column[i] = direction_entry / length, vane_entry / vane_column_length
+        leaking_error += VANE_EFFECT_TOLERANCE * abs(view.direction[i] * vane_entry)
+    return leaking_error / ((1.0 - VANE_EFFECT_TOLERANCE) * vane_column_length)
 
 
 @kernel
-def uses_gust_estimate(view, air):
+def uses_gust_estimate(view, gust):
     """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
-    return view.confirmed_by > 0 and air.output.uses_accelerometers == 1
+    return view.confirming_force > 0 and gust.output.uses_accelerometers == 1
 
 
 @kernel
@@ -395,70 +467,92 @@ def uses_force(view):
 
 
 @kernel
-def gust_estimate_for(view, air, inertial_air):
+def gust_estimate_of_view(view, gust, inertial_gust):
     """The gust estimate that a view uses: from the vanes, or from inertial motion if it must not use them."""
-    return inertial_air if view.immune_to_vane else air
+    return inertial_gust if view.is_immune_to_vane_error else gust
 
 
 @kernel
-def fill_gust_sensitivity(view, forces, damping):
-    """Fill `gust_on_rates` and `gust_on_forces` (3,), 1/s: the gust sensitivity of a view.
+def fill_gust_sensitivity(view, forces, rate_damping):
+    """Fill `rate_gust_sensitivity` and `force_gust_sensitivity` (3,), 1/s: the gust sensitivity of a view.
 
-    It is the projected acceleration per rad/s of rotation of the air about each body axis. damping (3, 3)
-    1/s: that of the rates.
+    It is the projected acceleration per rad/s of rotation of the air about each body axis. rate_damping (3,
+    3) 1/s: that of the rates.
     """
     m = view.direction
     for k in range(3):
-        roll, pitch, yaw = m[ROLL] * damping[ROLL, k], m[PITCH] * damping[PITCH, k], m[YAW] * damping[YAW, k]
-        view.gust_on_rates[k] = roll + pitch + yaw
-        view.gust_on_forces[k] = 0.0
+        roll = m[ROLL] * rate_damping[ROLL, k]
+        pitch = m[PITCH] * rate_damping[PITCH, k]
+        yaw = m[YAW] * rate_damping[YAW, k]
+        view.rate_gust_sensitivity[k] = roll + pitch + yaw
+        view.force_gust_sensitivity[k] = 0.0
         for f in range(2):
-            view.gust_on_forces[k] += (
-                m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.pressure_ratio
+            view.force_gust_sensitivity[k] += (
+                m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.dynamic_pressure_over_trim
             )
 
 
 @kernel
-def set_view_noise(view, noise, blocks, forces, air, inertial_air, V):
-    """Fill measurement noise, jitter, drift intensity and bound of a view from the declared ones; V m/s."""
+def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
+    """Fill measurement noise, model noise, drift intensity and bound of a view from the declared ones; V
+    m/s."""
     block, m = view.block, view.direction
-    variance, jitter, bound, drift = 0.0, 0.0, 0.0, 0.0
+    gyro_noise_variance, model_noise_std, uncertainty_bound, drift_intensity = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        variance += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL].noise[i // 2]
-        jitter += abs(m[i]) * np.sqrt(noise.jitter[i])
-        if view.immune_to_vane:
-            jitter += abs(m[i]) * forces.gust_noise[i]
-        bound += abs(m[i]) * (noise.bounded[i] + noise.further_error[i])
+        gyro_noise_variance += (
+            m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].gyro_noise_variance[i // 2]
+        )
+        model_noise_std += abs(m[i]) * np.sqrt(noise_model.input_noise_variance[i])
+        if view.is_immune_to_vane_error:
+            model_noise_std += abs(m[i]) * forces.gust_estimate_noise_std[i]
+        uncertainty_bound += abs(m[i]) * (
+            noise_model.uncertainty_bound[i] + noise_model.surface_anywhere_additional_bound[i]
+        )
     for f, force in enumerate(forces.component):
-        jitter += abs(m[SIDE_FORCE + f]) * np.sqrt(force.jitter[view.inertial])
-        if view.inertial:
-            drift += (m[SIDE_FORCE + f] * forces.pressure_ratio) ** 2 * force.drift_intensity
-        bound += abs(m[SIDE_FORCE + f]) * (force.deflection * forces.pressure_ratio + force.lag_error)
-    if air.output.moving:
-        fill_gust_sensitivity(view, forces, air.output.damping)
-        if uses_gust_estimate(view, air):
-            drift += remaining_gust_drift(
-                gust_estimate_for(view, air, inertial_air), V, view.gust_on_rates, view.gust_on_forces
+        model_noise_std += abs(m[SIDE_FORCE + f]) * np.sqrt(
+            force.noise_variance[view.uses_inertial_flow_angle]
+        )
+        if view.uses_inertial_flow_angle:
+            drift_intensity += (
+                m[SIDE_FORCE + f] * forces.dynamic_pressure_over_trim
+            ) ** 2 * force.innovation_drift_intensity
+        uncertainty_bound += abs(m[SIDE_FORCE + f]) * (
+            force.deflection_error_effect * forces.dynamic_pressure_over_trim + force.lag_error_bound
+        )
+    if gust.output.is_turbulent:
+        fill_gust_sensitivity(view, forces, gust.output.rate_damping)
+        if uses_gust_estimate(view, gust):
+            drift_intensity += remaining_gust_drift_intensity(
+                gust_estimate_of_view(view, gust, inertial_gust),
+                V,
+                view.rate_gust_sensitivity,
+                view.force_gust_sensitivity,
             )
         else:
-            drift += full_gust_drift(air, V, view.gust_on_rates, view.gust_on_forces)
+            drift_intensity += full_gust_drift_intensity(
+                gust, V, view.rate_gust_sensitivity, view.force_gust_sensitivity
+            )
         for i in range(3):
             for j in range(3):
-                block.P_dd[0, 0] += m[i] * m[j] * air.output.turn_variance[i, j]
-    size = max(bound, likelihood.LEAST_UNCERTAINTY_RAD_S2)
-    block.noise[0], block.jitter[0], view.bounded[0] = variance, jitter * jitter, bound
-    block.drift[0, 0] = drift + noise.walk_intensity * size * size
+                block.P_dd[0, 0] += m[i] * m[j] * gust.output.axes_turn_variance[i, j]
+    drift_bound = max(uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+    block.gyro_noise_variance[0] = gyro_noise_variance
+    block.model_noise_variance[0] = model_noise_std * model_noise_std
+    view.uncertainty_bound[0] = uncertainty_bound
+    block.drift_intensity[0, 0] = (
+        drift_intensity + noise_model.relative_walk_intensity * drift_bound * drift_bound
+    )
 
 
 @kernel
-def fill_view_regressors(view, blocks, forces, air, inertial_air, innovation):
+def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
     """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
 
     innovation (3,) rad/s2.
     """
     block, m = view.block, view.direction
-    first, second = view.plane[0], view.plane[1]
-    block_of_rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL]
+    first, second = view.plane_axes[0], view.plane_axes[1]
+    block_of_rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL_BLOCK]
     for j in range(block_of_rates.n_regressors):
         if first == PITCH:
             block.regressor[j, 0] = m[PITCH] * block_of_rates.regressor[j, 0]
@@ -469,243 +563,328 @@ def fill_view_regressors(view, blocks, forces, air, inertial_air, innovation):
     n = block_of_rates.n_regressors
     if second >= SIDE_FORCE and m[second] != 0.0:
         force = forces.component[second - SIDE_FORCE]
-        for j in range(force.n):
+        for j in range(force.n_regressors):
             block.regressor[n + j, 0] = m[second] * force.regressor[j]
-        n += force.n
-        if view.inertial:
-            block.regressor[n, 0], n = m[second] * force.angle_sensitivity, n + 1
-    if view.surface != AXIS_VIEW:
+        n += force.n_regressors
+        if view.uses_inertial_flow_angle:
+            block.regressor[n, 0], n = m[second] * force.innovation_per_flow_angle_drift, n + 1
+    if view.orthogonal_to_surface != AXIS_VIEW:
         block.regressor[n, 0] = 0.0
         for i in range(m.size):
-            if view.column[i] != 0.0:
-                component = innovation_component(view, forces, air, inertial_air, innovation, i)
-                block.regressor[n, 0] += view.column_leak * view.column[i] * component
+            if view.unit_column[i] != 0.0:
+                component = innovation_component(view, forces, gust, inertial_gust, innovation, i)
+                block.regressor[n, 0] += view.column_leak * view.unit_column[i] * component
 
 
 @kernel
-def update_directions(views, forces, air, bound, G, Gu):
+def update_view_directions(views, forces, gust, bound, G, Gu):
     """Bring the direction and the signatures of each view to this frame.
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
     """
     for view in views:
-        view.active = not uses_force(view) or (forces.known and forces.n_updates == SETTLED_UPDATES)
-        if view.active:
+        view.is_used = not uses_force(view) or (forces.in_use and forces.n_updates == MIN_FORCE_UPDATES)
+        if view.is_used:
             view.column_leak = (
-                set_direction(view, forces, air, bound, G) if view.surface != AXIS_VIEW else 0.0
+                set_view_direction(view, forces, gust, bound, G)
+                if view.orthogonal_to_surface != AXIS_VIEW
+                else 0.0
             )
             fill_view_signatures(view, forces, Gu)
 
 
 @kernel
-def project_innovation(views, has_tolerances, noise, blocks, forces, air, inertial_air, innovation, V):
+def project_innovation(
+    views, has_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
+):
     """Project the innovation (3,) rad/s2 on the direction of each view, into `scratch` of its block.
 
-    Noise follows, and if constant errors are `has_tolerances`, their regressors; V m/s.
+    Noise follows, and if constant errors are `has_regressors`, their regressors; V m/s.
     """
     for view in views:
-        if not view.active:
+        if not view.is_used:
             continue
-        set_view_noise(view, noise, blocks, forces, air, inertial_air, V)
-        m, projected = view.direction, view.block.scratch
+        set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V)
+        m, projected = view.direction, view.block.frame_innovation
         projected[0] = 0.0
         for i in range(m.size):
             if m[i] != 0.0:
-                projected[0] += m[i] * innovation_component(view, forces, air, inertial_air, innovation, i)
-        if has_tolerances or view.has_tolerance:
-            fill_view_regressors(view, blocks, forces, air, inertial_air, innovation)
+                projected[0] += m[i] * innovation_component(view, forces, gust, inertial_gust, innovation, i)
+        if has_regressors or view.always_has_regressors:
+            fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation)
 
 
 @kernel
-def update_views(views, tests, tone_config, y, dt, k, latched):
+def update_view_tests(views, test_config, tone_config, y, dt, frame, is_alarm_latched):
     """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
     within_envelope = is_within_envelope(tone_config, y)
-    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_reset(k)
+    evidence_decay = test_config.evidence_decay_factor if is_alarm_latched else 1.0
+    slot = likelihood.onset_slot_to_reset(frame)
     for view in views:
-        if not view.active:
-            view.peak_score = 0.0
+        if not view.is_used:
+            view.decaying_peak_score = 0.0
             continue
-        if not latched:
-            likelihood.reset_onset(view.block, slot)
-        has_tolerances = tests.has_tolerances or view.has_tolerance
-        likelihood.update_block(view.block, view.bounded, has_tolerances, dt, keep)
-        if not view.inertial:  # the error of the integrated angle oscillates with the aircraft's own modes
-            update_tones(view, tone_config, tests.alarm_level, within_envelope, has_tolerances, dt)
-        view.peak_score = max((1.0 - (1.0 - tests.keep) / PEAK_MEMORY) * view.peak_score, largest_score(view))
+        if not is_alarm_latched:
+            likelihood.reset_onset_slot(view.block, slot)
+        has_regressors = test_config.has_regressors or view.always_has_regressors
+        likelihood.update_block(view.block, view.uncertainty_bound, has_regressors, dt, evidence_decay)
+        if (
+            not view.uses_inertial_flow_angle
+        ):  # the error of the integrated angle oscillates with the aircraft's own modes
+            update_tone_tests(view, tone_config, test_config.alarm_level, within_envelope, has_regressors, dt)
+        view.decaying_peak_score = max(
+            (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_MEMORY_RATIO)
+            * view.decaying_peak_score,
+            max_test_score(view),
+        )
 
 
 @kernel
-def is_sensitive_to(view, forces, s, column):
-    """True if a fault of surface s, with this column (3,) of G, changes the projection of a view."""
-    if view.surface == s:
+def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
+    """True if a fault of surface s, with this effectiveness_column (3,) of G, changes the projection of a
+    view."""
+    if view.orthogonal_to_surface == s:
         return False
     m, sensitivity = view.direction, 0.0
     for i in range(3):
-        sensitivity += m[i] * column[i]
+        sensitivity += m[i] * effectiveness_column[i]
     for f in range(2):
-        sensitivity += m[SIDE_FORCE + f] * forces.component[f].column[s]
+        sensitivity += m[SIDE_FORCE + f] * forces.component[f].surface_effect_per_rad[s]
     return sensitivity != 0.0
 
 
 @kernel
-def largest_score(view):
+def max_test_score(view):
     """The largest score of the tests of a view."""
-    largest = view.tones.score
+    largest = view.tone_tests.score
     for h in range(view.block.n_hypotheses):
         largest = max(largest, view.block.hypothesis[h].score)
     return largest
 
 
 @kernel
-def confirmed_score(view, views, tests, forces, air):
+def vane_confirmed_score(view, views, test_config, forces, gust):
     """The score of a view, limited by the views that confirm that it is not an error of a vane.
 
     A view of the rates alone needs no confirmation: no error of a vane changes the rates alone. Peak scores
     are compared because the view and its confirmation may reach their levels at different times. The
     confirming view must reach the naming level.
     """
-    if uses_force(view) and not forces.known:
+    if uses_force(view) and not forces.in_use:
         return 0.0
-    if view.immune_to_vane or not (uses_force(view) or uses_gust_estimate(view, air)):
-        return largest_score(view)
-    confirming = 0.0
+    if view.is_immune_to_vane_error or not (uses_force(view) or uses_gust_estimate(view, gust)):
+        return max_test_score(view)
+    confirming_score = 0.0
     for other in views:
-        if other.immune_to_vane and other.plane[1] == view.confirmed_by:
-            confirming = max(confirming, other.peak_score)
-    return min(view.peak_score, confirming * tests.alarm_level / np.sqrt(2.0 * tests.naming_level))
+        if other.is_immune_to_vane_error and other.plane_axes[1] == view.confirming_force:
+            confirming_score = max(confirming_score, other.decaying_peak_score)
+    return min(
+        view.decaying_peak_score,
+        confirming_score * test_config.alarm_level / np.sqrt(2.0 * test_config.isolation_llr_margin),
+    )
 
 
 @kernel
-def alarm_score(view, views, tests, forces, air):
+def alarm_score(view, views, test_config, forces, gust):
     """The score with which a view raises the alarm, 0 if it raises none.
 
-    Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a force,
-    if accelerometers cannot break.
+    Views raise it only where no block of the rates test_config: for an oscillation about an axis, and for a
+    force, if accelerometers cannot break.
     """
-    if view.surface == AXIS_VIEW and not view.inertial:
-        return view.tones.score
-    is_mostly_force = view.plane[1] >= SIDE_FORCE and abs(view.direction[view.plane[1]]) > MIN_FORCE_SHARE
-    if view.surface >= 0 and is_mostly_force and air.output.uses_accelerometers == 1:
-        return confirmed_score(view, views, tests, forces, air)
+    if view.orthogonal_to_surface == AXIS_VIEW and not view.uses_inertial_flow_angle:
+        return view.tone_tests.score
+    is_mostly_force = (
+        view.plane_axes[1] >= SIDE_FORCE
+        and abs(view.direction[view.plane_axes[1]]) > MIN_FORCE_COMPONENT_OF_FORCE_VIEW
+    )
+    if view.orthogonal_to_surface >= 0 and is_mostly_force and gust.output.uses_accelerometers == 1:
+        return vane_confirmed_score(view, views, test_config, forces, gust)
     return 0.0
 
 
 @kernel
-def excludes_surface(views, tests, forces, air, s, column):
-    """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
+def excludes_surface(views, test_config, forces, gust, s, effectiveness_column):
+    """True if a view detects a signal that no fault of surface s, with this effectiveness_column (3,) of G,
+    can cause."""
     for view in views:
-        tests_surface = not view.immune_to_vane and not is_sensitive_to(view, forces, s, column)
-        if tests_surface and confirmed_score(view, views, tests, forces, air) > tests.alarm_level:
+        can_exclude_surface = not view.is_immune_to_vane_error and not is_view_sensitive_to_fault(
+            view, forces, s, effectiveness_column
+        )
+        if (
+            can_exclude_surface
+            and vane_confirmed_score(view, views, test_config, forces, gust) > test_config.alarm_level
+        ):
             return True
     return False
 
 
-class Direction(NamedTuple):
+class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    column_of: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW; direction: at the
-    start; losses: surfaces whose losses are tested; inertial: at the flow angle from inertial motion.
+    orthogonal_to_surface: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW;
+    direction: at the start; losses: surfaces whose losses are tested; uses_inertial_flow_angle: at the flow
+    angle from inertial motion.
     """
 
-    column_of: int
+    orthogonal_to_surface: int
     direction: tuple[float, ...]
-    plane: tuple[int, int]
-    losses: list[int]
-    inertial: bool = False
+    plane_axes: tuple[int, int]
+    surfaces_tested_for_loss: list[int]
+    uses_inertial_flow_angle: bool = False
     uses_vane: bool = False  # for the gust estimate in moving air, which has no rolling component
 
 
-def views_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[Direction]:
+def parity_directions_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[ParityDirection]:
     """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
 
     With accelerometers also, in the plane of a rate and its force, across the column of each surface that
     moves both and across that of the vane; and the force at the flow angle from inertial motion.
     """
-    in_pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
-    lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield Direction(AXIS_VIEW, _along((PITCH,)), PITCH_PLANE, in_pitch, uses_vane=True)
-    yield Direction(AXIS_VIEW, _along((ROLL,)), LATERAL_PLANE, lateral)
-    yield Direction(AXIS_VIEW, _along((YAW,)), LATERAL_PLANE, lateral, uses_vane=True)
-    for s in lateral:
-        past_roll, others = aircraft.dominant_axis[s] == ROLL, [other for other in lateral if other != s]
-        yield Direction(s, _along((ROLL,)), LATERAL_PLANE, others, uses_vane=past_roll)
+    pitch_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
+    lateral_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
+    yield ParityDirection(
+        AXIS_VIEW, _sum_of_unit_vectors((PITCH,)), PITCH_PLANE, pitch_surfaces, uses_vane=True
+    )
+    yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, lateral_surfaces)
+    yield ParityDirection(
+        AXIS_VIEW, _sum_of_unit_vectors((YAW,)), LATERAL_PLANE, lateral_surfaces, uses_vane=True
+    )
+    for s in lateral_surfaces:
+        crosses_roll_column = aircraft.dominant_axis[s] == ROLL
+        others = [other for other in lateral_surfaces if other != s]
+        yield ParityDirection(
+            s, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, others, uses_vane=crosses_roll_column
+        )
     if not with_force:
         return
-    for f, plane, movers in ((NORMAL, PITCH_PLANE, in_pitch), (SIDE, YAW_PLANE, lateral)):
-        found = aircraft.separated_by_force(COMPONENTS[f])
-        for s in found:
-            own = aircraft.dominant_axis[s], plane[1]
-            yield Direction(s, _along(own), own, [other for other in movers if other != s])
-        if found:
-            yield Direction(VANE_VIEW, _along(plane), plane, movers)
-            yield Direction(AXIS_VIEW, _along(plane[1:]), plane, movers, inertial=True)
+    for f, plane_axes, moving_surfaces in (
+        (NORMAL_COMPONENT, PITCH_PLANE, pitch_surfaces),
+        (SIDE_COMPONENT, YAW_PLANE, lateral_surfaces),
+    ):
+        separated_surfaces = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[f])
+        for s in separated_surfaces:
+            own_components = aircraft.dominant_axis[s], plane_axes[1]
+            yield ParityDirection(
+                s,
+                _sum_of_unit_vectors(own_components),
+                own_components,
+                [other for other in moving_surfaces if other != s],
+            )
+        if separated_surfaces:
+            yield ParityDirection(VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, moving_surfaces)
+            yield ParityDirection(
+                AXIS_VIEW,
+                _sum_of_unit_vectors(plane_axes[1:]),
+                plane_axes,
+                moving_surfaces,
+                uses_inertial_flow_angle=True,
+            )
 
 
-def _along(components: tuple[int, ...]) -> tuple[float, ...]:
+def _sum_of_unit_vectors(components: tuple[int, ...]) -> tuple[float, ...]:
     return tuple(float(i in components) for i in range(NORMAL_FORCE + 1))
 
 
-def size_for(aircraft: Aircraft) -> RecordSize:
+def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     """The capacities that the records of an aircraft need."""
     axes = [axis_of_term(term) for term in aircraft.moments]
-    views = list(views_of(aircraft, aircraft.forces_separate_surfaces))
-    rates = N_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
-    errors = max(len(force_terms(aircraft, f)) for f in (SIDE, NORMAL)) + forces.MAX_ERRORS - MAX_TERMS_OF_ONE
-    turns = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
-    losses = max(turns.count(PITCH), turns.count(ROLL) + turns.count(YAW))
-    tried = max(len(view.losses) for view in views)
+    views = list(parity_directions_of(aircraft, aircraft.forces_separate_surfaces))
+    n_rate_regressors = N_INPUT_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
+    n_force_regressors = (
+        max(len(force_terms(aircraft, f)) for f in (SIDE_COMPONENT, NORMAL_COMPONENT))
+        + forces.MAX_FORCE_REGRESSORS
+        - MAX_TERMS_OF_ONE
+    )
+    loss_axes = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
+    n_losses = max(loss_axes.count(PITCH), loss_axes.count(ROLL) + loss_axes.count(YAW))
+    n_tested_losses = max(len(view.surfaces_tested_for_loss) for view in views)
     error_map = aircraft.file.model_error_map
-    boxes = len(error_map.boxes) if error_map else 0
-    return RecordSize(
-        Capacity(rates, 3 * losses + 2), Capacity(rates + errors + 2, tried + 1), len(views), boxes
+    n_boxes = len(error_map.boxes) if error_map else 0
+    return StatisticalRecordSize(
+        Capacity(n_rate_regressors, 3 * n_losses + 2),
+        Capacity(n_rate_regressors + n_force_regressors + 2, n_tested_losses + 1),
+        len(views),
+        n_boxes,
     )
 
 
 def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    separated = [aircraft.separated_by_force(COMPONENTS[f]) for f in (SIDE, NORMAL)]
-    with_air = forces["known"] and statistical["air"]["output"]["moving"] and all(separated)
-    views = list(views_of(aircraft, bool(forces["known"])))[: len(statistical["views"])]
+    surfaces_separated_by_force = [
+        aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[f]) for f in (SIDE_COMPONENT, NORMAL_COMPONENT)
+    ]
+    subtracts_gust = (
+        forces["in_use"]
+        and statistical["gust"]["output"]["is_turbulent"]
+        and all(surfaces_separated_by_force)
+    )
+    views = list(parity_directions_of(aircraft, bool(forces["in_use"])))[: len(statistical["views"])]
     statistical["n_views"] = len(views)
-    for view, (surface, direction, plane, movers, inertial, uses_vane) in zip(
-        statistical["views"], views, strict=False
-    ):
-        view["surface"], view["direction"], view["plane"], block = surface, direction, plane, view["block"]
-        view["axis"] = direction.index(1.0) if surface == AXIS_VIEW and not inertial else plane[0]
-        axes = statistical["block"][PITCH_BLOCK if plane == PITCH_PLANE else LATERAL]
+    for view, (
+        orthogonal_to_surface,
+        direction,
+        plane_axes,
+        moving_surfaces,
+        uses_inertial_flow_angle,
+        uses_vane,
+    ) in zip(statistical["views"], views, strict=False):
+        view["orthogonal_to_surface"], view["direction"], view["plane_axes"], block = (
+            orthogonal_to_surface,
+            direction,
+            plane_axes,
+            view["block"],
+        )
+        view["alarm_axis"] = (
+            direction.index(1.0)
+            if orthogonal_to_surface == AXIS_VIEW and not uses_inertial_flow_angle
+            else plane_axes[0]
+        )
+        rate_block = statistical["block"][PITCH_BLOCK if plane_axes == PITCH_PLANE else LATERAL_BLOCK]
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
-        answered = statistical["air"]["output"]["moving"] and direction[PITCH]
-        tried = [] if answered else movers[: len(block["hypothesis"]) - 1]
-        kinds, n = [STEP, *(LOSS for _ in tried)], int(axes["n_regressors"])
-        block["n"], block["n_hypotheses"], block["keep"] = 1, len(kinds), 1.0
-        block["P_xx"][0, 0], block["P_dd"][0, 0] = axes["noise"].max(), likelihood.PRIOR_DRIFT_RAD_S2**2
-        for name in ("level", "noise_share", "pace"):
-            block[name] = axes[name]
-        block["tolerance"][:n] = axes["tolerance"][:n]
-        if uses_vane and with_air:
-            view["confirmed_by"] = NORMAL_FORCE if plane == PITCH_PLANE else SIDE_FORCE
+        law_reacts_to_gust = statistical["gust"]["output"]["is_turbulent"] and direction[PITCH]
+        tested_losses = [] if law_reacts_to_gust else moving_surfaces[: len(block["hypothesis"]) - 1]
+        kinds, n_regressors = [STEP_FAULT, *(LOSS for _ in tested_losses)], int(rate_block["n_regressors"])
+        block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(kinds), 1.0
+        block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
+        block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
+        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_per_frame"):
+            block[name] = rate_block[name]
+        block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
+        if uses_vane and subtracts_gust:
+            view["confirming_force"] = NORMAL_FORCE if plane_axes == PITCH_PLANE else SIDE_FORCE
         if any(direction[SIDE_FORCE:]):
-            force, view["confirmed_by"] = forces["component"][plane[1] - SIDE_FORCE], plane[1]
-            view["has_tolerance"], of_force = 1, int(force["n"])
-            block["tolerance"][n : n + of_force] = force["tolerance"][:of_force]
-            n += of_force
-            if inertial:
-                block["tolerance"][n], n = force["drift"], n + 1
-        block["n_regressors"] = n + (surface != AXIS_VIEW)
-        block["tolerance"][n] = float(surface != AXIS_VIEW)  # of the leak, which is worked out in flight
+            force, view["confirming_force"] = (
+                forces["component"][plane_axes[1] - SIDE_FORCE],
+                plane_axes[1],
+            )
+            view["always_has_regressors"], n_force_regressors = 1, int(force["n_regressors"])
+            block["regressor_tolerance"][n_regressors : n_regressors + n_force_regressors] = force[
+                "regressor_tolerance"
+            ][:n_force_regressors]
+            n_regressors += n_force_regressors
+            if uses_inertial_flow_angle:
+                block["regressor_tolerance"][n_regressors] = force["flow_angle_drift_bound"]
+                n_regressors = n_regressors + 1
+        block["n_regressors"] = n_regressors + (orthogonal_to_surface != AXIS_VIEW)
+        block["regressor_tolerance"][n_regressors] = float(
+            orthogonal_to_surface != AXIS_VIEW
+        )  # of the leak, which is worked out in flight
         hypotheses = block["hypothesis"][: len(kinds)]
-        hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tried]
-        view["across_gust"] = (
-            surface == VANE_VIEW and plane == YAW_PLANE and statistical["air"]["output"]["moving"]
+        hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tested_losses]
+        view["is_orthogonal_to_rolling_gust"] = (
+            orthogonal_to_surface == VANE_VIEW
+            and plane_axes == YAW_PLANE
+            and statistical["gust"]["output"]["is_turbulent"]
         )
-        view["inertial"], view["immune_to_vane"] = inertial, inertial or surface == VANE_VIEW
+        view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
+        view["is_immune_to_vane_error"] = uses_inertial_flow_angle or orthogonal_to_surface == VANE_VIEW
         likelihood.set_supporting_signs(block, kinds)
 
 
 @kernel
-def fill_block_signatures(blocks, Gu, cubic):
+def fill_block_signatures(blocks, Gu, alpha_cubed_acceleration):
     """Fill the signatures of the blocks of the rates, rad/s2.
 
     Gu (3, n) rad/s2: effect of each surface, mean over the frame; cubic rad/s2: pitch acceleration of a
@@ -713,13 +892,13 @@ def fill_block_signatures(blocks, Gu, cubic):
     """
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            for i in range(block.n):
+            for i in range(block.n_axes):
                 if hypothesis.surface >= 0:
                     hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
-                elif hypothesis.kind == STEP:
+                elif hypothesis.kind == STEP_FAULT:
                     hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
                 else:
-                    hypothesis.signature[i] = cubic
+                    hypothesis.signature[i] = alpha_cubed_acceleration
 
 
 @kernel
@@ -732,8 +911,8 @@ def fill_view_signatures(view, forces, Gu):
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         s = hypothesis.surface
         hypothesis.signature[0] = 1.0
-        if hypothesis.kind != STEP:
-            moment = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+        if hypothesis.kind != STEP_FAULT:
+            loss_signature = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for f in range(2):
-                moment += m[SIDE_FORCE + f] * forces.component[f].effect[s]
-            hypothesis.signature[0] = moment
+                loss_signature += m[SIDE_FORCE + f] * forces.component[f].surface_effect_at_command[s]
+            hypothesis.signature[0] = loss_signature

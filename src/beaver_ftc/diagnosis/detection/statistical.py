@@ -2,276 +2,779 @@
 
 Pitch is one block; roll and yaw, whose noise is correlated, are another. Roll and yaw have two blocks with
 different models of the drift. A random walk reacts fast and ignores constant errors. A drift that returns to
-zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The declared rate of
-false alarms holds for the declared noise. The worst-case scheme needs no probability; the scenario's
-`fdi.authority` sets whose alarms and exclusions count.
+zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The worst-case
+scheme needs no probability; the scenario's `fdi.authority` sets whose alarms and exclusions count.
+
+The noise model follows from what a scenario declares, and the declared rate of false alarms holds for the
+declared noise. An error e of an air-data reading changes f + G u by e times its derivative with that reading,
+to first order. The derivative depends on the flight condition and is evaluated in flight. A steady error is a
+constant times a known regressor, like an error of a coefficient; noise is model noise. dpt is worked out from
+the engine's power, airspeed and dynamic pressure, so it has their errors.
 """
+
+from collections.abc import Iterator
+from math import exp, hypot, sqrt
+from statistics import NormalDist
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED, N_SIGNALS, QDYN, evaluate, regressors
+from beaver_ftc.design import rotation_lengths
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    N_SIGNALS,
+    PH,
+    QDYN,
+    RH,
+    directional,
+    evaluate,
+    jacobian,
+    regressors,
+    slipstream_slopes,
+    whole_sum,
+)
 from beaver_ftc.diagnosis import gusts
-from beaver_ftc.diagnosis.bounds import UNKNOWN_IN_FILTERS_RAD_S2, add_published_bound, further_map_error
-from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity
-from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES
+from beaver_ftc.diagnosis.bounds import (
+    UNMAPPED_ERROR_IN_FILTERS_RAD_S2,
+    add_published_bound,
+    additional_map_error,
+    axis_of_term,
+    moment_term_tolerances,
+)
+from beaver_ftc.diagnosis.detection import likelihood, parity
+from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES_RECORD, TrimState, configure_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ENDING,
-    GROWING,
-    LATERAL,
-    N_BLOCKS,
-    N_READINGS,
+    ALPHA_CUBED_EFFECT,
+    GROWING_LOSS,
+    LATERAL_BLOCK,
+    LOSS_END,
+    N_FILTER_BLOCKS,
+    N_INPUT_READINGS,
+    N_ONSET_SLOTS,
+    STEP_FAULT,
     block_dtype,
 )
-from beaver_ftc.diagnosis.detection.parity import TONE_CONFIG, USUAL_SIZE, RecordSize, view_dtype
-from beaver_ftc.diagnosis.gusts import GUST_RECORD
-from beaver_ftc.diagnosis.state import DAMAGE_POSSIBLE, LOSS
+from beaver_ftc.diagnosis.detection.parity import (
+    AXIS_VIEW,
+    N_TONE_FREQUENCIES,
+    TONE_CONFIG_RECORD,
+    USUAL_RECORD_SIZE,
+    ParityDirection,
+    StatisticalRecordSize,
+    configure_tone_tests,
+    configure_views,
+    parity_directions_of,
+    parity_view_dtype,
+)
+from beaver_ftc.diagnosis.gusts import (
+    GUST_RECORD,
+    MIN_UNMEASURED_INTENSITY_SHARES,
+    UNMEASURED_SHARE_BY_FORCE_ERROR,
+    add_gust_estimate_noise,
+    configure_gust_estimate,
+    configure_speed_error,
+)
+from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE, WEAKLY_EXCLUDED_BY_DAMAGE
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
+from beaver_ftc.scenario.declared import Declared, SensorErrors
+from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
+
+PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
+_READING_INDEX_BY_SENSOR = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
+_ENGINE_POWER_READING_INDEX = N_INPUT_READINGS - 1  # of the engine, kW
+_SLIPSTREAM_SIGNAL_INDEX = RH + 1  # the first of the declared signals
+N_TESTED_SIGNS_BY_KIND = {
+    LOSS: 1,
+    GROWING_LOSS: 1,
+    LOSS_END: 1,
+    STEP_FAULT: 2,
+    ALPHA_CUBED_EFFECT: 2,
+}  # a loss has a sign, a step may go either way
+# Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
+# faster; a constant loss explains the rest.
+LOSS_GROWTH_RATE_PER_S = 1.5
+
+# Share of the alarm level reserved for noise in addition to an uncertainty at its bound (theory.md,
+# section 7).
+NOISE_SHARE_OF_ALARM_LEVEL = 0.5
+DAMAGE_DRIFT_FREQUENCY_RAD_S = (
+    3.0  # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
+)
+MIN_GYRO_NOISE_STD_RAD_S = (
+    1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
+)
+# (kind, surface, axis, raises alarms)
+Hypothesis = tuple[int, int, int, int]
+
+
+def block_hypotheses(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothesis, ...]], ...]:
+    """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
+    are held against. Roll and yaw are there twice, see above."""
+    pitch = (
+        *_loss_hypotheses(aircraft, PITCH_AXES),
+        *_step_fault_hypotheses(PITCH_AXES),
+        (ALPHA_CUBED_EFFECT, -1, 1, 0),
+    )
+    lateral = (*_loss_hypotheses(aircraft, LATERAL_AXES), *_step_fault_hypotheses(LATERAL_AXES))
+    pitch, lateral = (
+        (*hypotheses, *_growing_and_ending_hypotheses(hypotheses)) for hypotheses in (pitch, lateral)
+    )
+    return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
+
+
+def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
+        if surface in aircraft.class_of_losses and axis in axes:
+            yield LOSS, s, axis, 1
+
+
+def _growing_and_ending_hypotheses(members: tuple[Hypothesis, ...]) -> Iterator[Hypothesis]:
+    losses = [(surface, axis) for kind, surface, axis, _ in members if kind == LOSS]
+    return ((kind, surface, axis, 0) for surface, axis in losses for kind in (GROWING_LOSS, LOSS_END))
+
+
+def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+    return ((STEP_FAULT, -1, axis, 1) for axis in axes)
+
+
+def n_tests_per_frame(aircraft: Aircraft, *views: ParityDirection) -> int:
+    """The number of one-sided tests that the detector makes in a frame, those of these views included."""
+    kinds = [kind for _, members in block_hypotheses(aircraft) for kind, _, _, alarms in members if alarms]
+    n_tone_tests = 0
+    for view in views:
+        if view.orthogonal_to_surface >= 0 and any(view.direction[SIDE_FORCE:]):
+            kinds += [STEP_FAULT, *(LOSS for _ in view.surfaces_tested_for_loss)]
+            n_tone_tests += N_TONE_FREQUENCIES
+        elif view.orthogonal_to_surface == AXIS_VIEW and not view.uses_inertial_flow_angle:
+            n_tone_tests += N_TONE_FREQUENCIES
+    return N_ONSET_SLOTS * sum(N_TESTED_SIGNS_BY_KIND[kind] for kind in kinds) + n_tone_tests
+
+
+def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
+    """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame.
+
+    By the union bound the rate is at most `false_alarms_per_h`.
+    """
+    return -NormalDist().inv_cdf(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
+
+
+def derive_isolation_llr_margin(
+    wrong_isolation_probability: float, rate_hz: float, aircraft: Aircraft
+) -> float:
+    """Difference of log-likelihood ratios that noise exceeds in a second with this probability at most."""
+    return (
+        0.5 * NormalDist().inv_cdf(wrong_isolation_probability / (rate_hz * n_tests_per_frame(aircraft))) ** 2
+    )
+
+
+def configure_statistical_detector(
+    fdi: np.void,
+    config: FdiConfig,
+    declared: Declared,
+    design: np.void,
+    mass: MassProperties,
+    trim: TrimState,
+    rate_hz: float,
+) -> None:
+    """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
+    statistical, settings = fdi["statistical"], config.statistical
+    statistical["alarm"]["detected_at_s"] = -1.0
+    if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
+        return
+    test_config, gust, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
+    errors, dt_s, n_instants = declared.sensors, 1.0 / rate_hz, int(fdi["config"]["n_substeps"])
+    airspeed_mps = float(trim[1][AIRSPEED])
+    uncertainty_change = uncertainty_change_per_frame(settings, aircraft, dt_s)
+    test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants, 1)
+    test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    statistical["forces"]["in_use"] = forces = declared.uses_accelerometers
+    gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
+    configure_gust_estimate(gust, declared, mass)
+    uses_parity_views = config.compares_across(n_instants)
+    n_tests = n_tests_per_frame(
+        aircraft, *(parity_directions_of(aircraft, forces) if uses_parity_views else ())
+    )
+    test_config["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
+    configure_speed_error(gust, declared, float(test_config["alarm_level"]), airspeed_mps)
+    test_config["isolation_llr_margin"] = derive_isolation_llr_margin(settings.misnaming, rate_hz, aircraft)
+    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    _configure_blocks(statistical, errors, aircraft)
+    _configure_bounded_uncertainty(statistical, config, declared, uncertainty_change, dt_s)
+    statistical["noise"]["base_uncertainty_change_per_frame"] = settings.uncertainty_rad_s * dt_s
+    _configure_drift_and_model_noise(
+        statistical, drift_frequency(settings, aircraft), declared, design, trim, dt_s
+    )
+    tolerance = moment_term_tolerances(declared, design, mass, *trim[1:])
+    _configure_tolerances(statistical, aircraft, tolerance)
+    configure_reading_regressors(statistical, errors, fdi["bound"]["declared_errors"])
+    if uses_parity_views:
+        false_alarm_probability = settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
+        configure_tone_tests(
+            statistical["tone_config"],
+            false_alarm_probability,
+            airspeed_mps,
+            uncertainty_change * rate_hz,
+            dt_s,
+        )
+        if forces:
+            acceleration_slopes_by_y = jacobian(design, *trim)[3]
+            configure_forces(fdi, declared, trim, acceleration_slopes_by_y, dt_s)
+            gust["output"][
+                "uses_accelerometers"
+            ] = not declared.monitors_sensors  # the monitor may find them broken
+            statistical["inertial_gust"] = gust
+            statistical["inertial_gust"]["output"]["is_turbulent"] *= gust["output"]["uses_accelerometers"]
+            statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
+                np.add(MIN_UNMEASURED_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
+            )
+        configure_views(statistical, aircraft)
+    mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
+    rolling_gust_length_m = (
+        float(gust["config"]["rolling_gust_correlation_length"]) if gust["output"]["is_turbulent"] else 0.0
+    )
+    gust_lengths_m = (
+        rotation_lengths(gust["config"]["wing_span"])
+        if gust["config"]["only_coarse_estimate"]
+        else [rolling_gust_length_m]
+    )
+    mean_reverting_block["correlation_length"] = drift_correlation_length(
+        statistical, airspeed_mps, rate_hz, float(min(gust_lengths_m))
+    )
+    if gust["output"]["is_turbulent"]:
+        # the filters that assume no gust: they trim as the others, with a drift in any direction
+        for name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
+            statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
+        mean_reverting_block["drift_intensity_scale"] = (
+            rolling_gust_length_m / mean_reverting_block["correlation_length"]
+        ) ** 2
+        if not gust["output"]["is_gust_measured"]:
+            pitching_gust_length_m = float(rotation_lengths(gust["config"]["wing_span"])[1])
+            pitch_block["correlation_length"] = drift_correlation_length(
+                statistical, airspeed_mps, rate_hz, pitching_gust_length_m
+            )
+            pitch_block["drift_intensity_scale"] = (
+                pitching_gust_length_m / pitch_block["correlation_length"]
+            ) ** 2
+        add_gust_estimate_noise(statistical, errors, design, *trim[1:], dt_s)
+
+
+def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
+    blocks = block_hypotheses(aircraft)
+    losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
+    statistical["test_config"]["n_score_columns"] = len(losses) + len(AXES)
+    for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
+        block["n_axes"], block["n_hypotheses"] = len(axes), len(members)
+        block["n_regressors"] = sum(axis_of_term(term) in axes for term in aircraft.moments)
+        block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
+        for i, axis in enumerate(axes):
+            block["axis"][i] = axis
+            variance = max(errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
+            block["gyro_noise_variance"][i] = block["P_xx"][i, i] = variance
+            block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
+        likelihood.set_supporting_signs(block, [kind for kind, *_ in members])
+        for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
+            hypothesis["kind"], hypothesis["surface"] = kind, surface
+            hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
+            hypothesis["log_column_index"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+
+
+def uncertainty_change_per_frame(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
+    """Largest change of a bounded uncertainty within a frame, over its bound.
+
+    The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
+    from one end of the bound to the other. If the error is mapped, its rate of change is worked out in flight
+    (`statistical.update_uncertainty_change`).
+    """
+    return 2.0 if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
+
+
+def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
+    """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
+
+    The evidence that the uncertainty explains is bounded by its declared rate of change in any case
+    (`likelihood.max_uncertainty_part`). The drift only sets how much of it the filters remove. If damage may
+    take surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the
+    model.
+    """
+    return (
+        min(DAMAGE_DRIFT_FREQUENCY_RAD_S, settings.uncertainty_rad_s)
+        if aircraft.loses_surfaces
+        else settings.uncertainty_rad_s
+    )
+
+
+def _configure_bounded_uncertainty(
+    statistical: np.void, config: FdiConfig, declared: Declared, uncertainty_change: float, dt_s: float
+) -> None:
+    """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
+    not grow."""
+    is_noise_free = declared.is_noise_free
+    for block in statistical["block"]:
+        block["alarm_level"] = statistical["test_config"]["alarm_level"]
+        block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
+        block["uncertainty_change_per_frame"] = uncertainty_change
+        kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
+        if config.fault_profile == "abrupt":
+            block["n_hypotheses"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
+        block["hypothesis"]["growth_decay_factor"] = exp(-LOSS_GROWTH_RATE_PER_S * dt_s)
+
+
+def _configure_drift_and_model_noise(
+    statistical: np.void,
+    uncertainty_frequency_rad_s: float,
+    declared: Declared,
+    design: np.void,
+    trim: TrimState,
+    dt_s: float,
+) -> None:
+    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
+    u."""
+    errors = declared.sensors.each("random")
+    gyro_noise_std = float(errors[:3].max())
+    max_bound = max(declared.constant_rad_s2)
+    alarm_level = float(statistical["test_config"]["alarm_level"])
+    statistical["noise"]["relative_walk_intensity"] = derive_relative_walk_intensity(
+        max_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
+    )
+    _, G, f_x, f_y = jacobian(design, *trim)
+    statistical["noise"]["input_noise_variance_without_air_data"] = f_x**2 @ errors[:3] ** 2
+    air_data_variance = (
+        f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2
+    )  # later as `add_reading_regressors` says
+    statistical["noise"]["input_noise_variance"] = (
+        statistical["noise"]["input_noise_variance_without_air_data"] + air_data_variance
+    )
+    statistical["noise"]["deflection_error_effect_bound"] = (
+        np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
+    )
+
+
+def derive_relative_walk_intensity(
+    eta_bar: float, uncertainty_frequency_rad_s: float, gyro_noise_std: float, alarm_level: float, dt_s: float
+) -> float:
+    """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
+
+    An uncertainty of eta_bar sin(omega t) moves the test for a step by eta_bar omega sqrt(2 sqrt 2 / i w0),
+    w0 = (i / n)^(1/4), for a walk of intensity i and gyro noise of density n = noise^2 dt (theory.md).
+    Almost without noise w0 is the frame rate. The evidence for a loss under a moving command grows together
+    with the uncertainty while both have the same sign: by eta_bar sqrt(omega / i) times 1.204, the largest
+    value of sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then
+    takes up no more than the other half. eta_bar rad/s2; omega, noise rad/s; level in standard deviations.
+    """
+    eta_bar = max(eta_bar, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+    swing = 8.0 * sqrt(2.0) * (eta_bar * uncertainty_frequency_rad_s / alarm_level) ** 2  # of i w0
+    ramp = 4.0 * (1.204 * eta_bar / alarm_level) ** 2 * uncertainty_frequency_rad_s
+    walk = (swing * (gyro_noise_std**2 * dt_s) ** 0.25) ** 0.8
+    return max(hypot(walk, ramp), swing * dt_s) / eta_bar**2
+
+
+def drift_correlation_length(
+    statistical: np.void, airspeed_mps: float, rate_hz: float, gust_correlation_length_m: float
+) -> float:
+    """Return length, m, of the drift in the second block of roll and yaw, or of pitch without gust estimate.
+
+    gust_correlation_length_m: correlation length of the gust, m; 0 in still air. The drift returns as soon as
+    a bounded uncertainty permits: over the longest window T an uncertainty that oscillates with the fault
+    moves a test, for a drift of intensity i and lag tau, by eta_bar sqrt(T / 2 i) / tau; half the alarm level
+    is left for this. The drift returns no later than the gust. A gust with a longer correlation length is
+    represented by a stronger one, of equal power at low frequency and more power at high frequency.
+    """
+    if statistical["noise"]["relative_walk_intensity"] == 0.0:
+        # 0 in still air: nothing is declared that drifts, and the two views are one
+        return gust_correlation_length_m
+    longest_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
+    alarm_level = float(statistical["test_config"]["alarm_level"])
+    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["relative_walk_intensity"]) / alarm_level
+    return min(airspeed_mps * lag_s, gust_correlation_length_m or np.inf)
+
+
+def _configure_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
+    """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
+    axis = np.array([axis_of_term(term) for term in aircraft.moments])
+    for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
+        block_tolerance = tolerance[np.isin(axis, axes)]
+        block["regressor_tolerance"][: block_tolerance.size] = block_tolerance
+    statistical["test_config"]["has_regressors"] = bool(np.any(tolerance))
+
+
+def configure_reading_regressors(
+    statistical: np.void, errors: SensorErrors, declared_errors: np.void
+) -> None:
+    """Add the readings of the air data to the regressors of the blocks."""
+    steady_error, noise_std = np.zeros(N_INPUT_READINGS), statistical["noise"]["reading_noise_std"]
+    for name, reading_index in _READING_INDEX_BY_SENSOR.items():
+        steady_error[reading_index], noise_std[reading_index] = errors[name].steady, errors[name].random
+    steady_error[_ENGINE_POWER_READING_INDEX] = declared_errors[
+        "engine_power_error_kw"
+    ]  # all of it: so many standard deviations are part of that
+    noise_std[_ENGINE_POWER_READING_INDEX] = declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
+    if not (steady_error.any() or noise_std.any()):
+        return
+    statistical["noise"]["has_reading_errors"] = statistical["test_config"]["has_regressors"] = 1
+    for block in statistical["block"]:
+        first_regressor = int(block["n_regressors"])
+        block["n_regressors"] = first_regressor + N_INPUT_READINGS
+        block["regressor_tolerance"][first_regressor : first_regressor + N_INPUT_READINGS] = steady_error
+
+
+@kernel
+def fill_signal_change_per_reading(table, declared_errors, y, reading_index, signal_change):
+    """Fill signal_change (N_SIGNALS,) with the change of a table's signals per unit of a reading."""
+    signal_change[:] = 0.0
+    if reading_index < AIRSPEED:  # a vane
+        signal_change[reading_index] = 1.0
+    if reading_index == AIRSPEED:
+        for k in range(PH, RH + 1):
+            signal_change[k] = -table.signal[k] / y[AIRSPEED]
+    if declared_errors.has_engine_errors and reading_index >= AIRSPEED:
+        slope_by_airspeed, slope_by_pressure, slope_per_kw = slipstream_slopes(
+            y, declared_errors.density_power_error_kw
+        )
+        other_slope = slope_by_pressure if reading_index == QDYN else slope_per_kw
+        signal_change[_SLIPSTREAM_SIGNAL_INDEX] = (
+            slope_by_airspeed if reading_index == AIRSPEED else other_slope
+        )
+
+
+@kernel
+def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_change, out):
+    """Fill out (3,) rad/s2 with the change of the accelerations per unit of a reading.
+
+    monomial_change: the change of the monomials per unit of it.
+    """
+    table, dynamic_force = design.moments, y[QDYN] * design.S
+    for i in range(3):
+        out[i] = whole_sum(table, i, monomial_change, u)
+        if reading_index == QDYN:
+            out[i] += whole_sum(table, i, table.power, u) / y[QDYN]
+    L = dynamic_force * design.b * out[0]
+    M = dynamic_force * design.c * out[1]
+    N = dynamic_force * design.b * out[2]
+    out[0], out[1], out[2] = design.Pl * L + design.Pn * N, design.Qm * M, design.Rl * L + design.Rn * N
+
+
+@kernel
+def add_reading_regressors(frame_share, noise_model, blocks, declared_errors, design, y, u):
+    """Add this instant, a `frame_share` of the frame, to the readings' regressors, rad/s2 per unit, and fill
+    the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
+    table, out = design.moments, noise_model.acceleration_change_per_reading
+    noise_model.input_noise_variance[:] = noise_model.input_noise_variance_without_air_data
+    for reading_index in range(N_INPUT_READINGS):
+        fill_signal_change_per_reading(
+            table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
+        )
+        directional(
+            table,
+            table.signal,
+            table.power,
+            noise_model.signal_change_per_reading,
+            noise_model.monomial_change_per_reading,
+        )
+        fill_acceleration_change_per_reading(
+            design, y, u, reading_index, noise_model.monomial_change_per_reading, out
+        )
+        for i in range(3):
+            noise_model.input_noise_variance[i] += (
+                out[i] * noise_model.reading_noise_std[reading_index]
+            ) ** 2
+        pitch = blocks[likelihood.PITCH_BLOCK]
+        pitch.regressor[pitch.n_regressors - N_INPUT_READINGS + reading_index, 0] += frame_share * out[1]
+        for block in blocks[LATERAL_BLOCK:]:
+            j = block.n_regressors - N_INPUT_READINGS + reading_index
+            block.regressor[j, 0] += frame_share * out[0]
+            block.regressor[j, 1] += frame_share * out[2]
+
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
-# (docs/theory.md, section 7).
-MIN_CONSTANT_SHARE = 0.25
+# (docs/explanation/statistical.md).
+MIN_LLR_SHARE_OF_CONSTANT_LOSS = 0.25
 # The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
 # moves by this share of its travel.
-REVERSAL_TRAVEL_SHARE = 0.25
-PACE_PER_TRAVEL = 2.0 / REVERSAL_TRAVEL_SHARE
-LEAST_TRAVEL_RAD = 1e-6
+TRAVEL_SHARE_REVERSING_ERROR = 0.25
+UNCERTAINTY_CHANGE_PER_TRAVEL = 2.0 / TRAVEL_SHARE_REVERSING_ERROR
+MIN_TRAVEL_RAD = 1e-6
 
 # Configuration of the tests.
-TESTS = record(
+TEST_CONFIG_RECORD = record(
     enabled=int,
-    alarm_level=float, naming_level=float,  # standard deviations; difference of log-likelihood ratios
-    keep=float,  # factor by which evidence decays per frame after the alarm
-    n_log_columns=int,
-    has_tolerances=int,  # whether unknown constants have tolerances
-    share=float,  # one over the number of instants in a frame
-    mapped=int,  # whether the model's error is mapped
+    alarm_level=float, isolation_llr_margin=float,  # standard deviations; difference of log-likelihood ratios
+    evidence_decay_factor=float,  # factor by which evidence decays per frame after the alarm
+    n_score_columns=int,
+    has_regressors=int,  # whether unknown constants have tolerances
+    frame_share_per_instant=float,  # one over the number of instants in a frame
+    has_error_map=int,  # whether the model's error is mapped
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
-NOISE = record(
-    walk_intensity=float,  # of the drift that represents a bounded uncertainty, over bound squared, 1/s
-    pace=float,  # share of its bound by which the uncertainty changes in a frame if no surface moves
-    bounded=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
-    further_error=3,  # what one surface anywhere in its travel adds to it, rad/s2
-    deflection=3,  # share of the bound by errors of the deflections, rad/s2
-    jitter=3, own_jitter=3,  # variance by noise of all inputs of the model; without the air data; (rad/s2)2
-    read=int, reading=N_READINGS,  # whether errors of the air data count; their noise, units of the readings
-    terms=MAX_TERMS, direction=N_SIGNALS, slope=MAX_MONOMIALS, moved=3,  # scratch
+NOISE_RECORD = record(
+    # of the drift that represents a bounded uncertainty, over bound squared, 1/s
+    relative_walk_intensity=float,
+    # share of its bound by which the uncertainty changes in a frame if no surface moves
+    base_uncertainty_change_per_frame=float,
+    uncertainty_bound=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
+    surface_anywhere_additional_bound=3,  # what one surface anywhere in its travel adds to it, rad/s2
+    deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
+    # variance by noise of all inputs of the model; without the air data; (rad/s2)2
+    input_noise_variance=3, input_noise_variance_without_air_data=3,
+    # whether errors of the air data count; their noise, units of the readings
+    has_reading_errors=int, reading_noise_std=N_INPUT_READINGS,
+    # scratch
+    coefficient_regressor=MAX_TERMS, signal_change_per_reading=N_SIGNALS,
+    monomial_change_per_reading=MAX_MONOMIALS, acceleration_change_per_reading=3,
 )  # fmt: skip
 
 # Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
 # flight; time of the first alarm, s, or -1.
-ALARM = record(score=float, axis=int, closest=float, detected_at_s=float)
+ALARM_RECORD = record(
+    score_over_alarm_level=float, axis=int, max_score_over_alarm_level=float, detected_at_s=float
+)
 
 
 @sized
-def statistical_dtype(size: RecordSize = USUAL_SIZE) -> np.dtype:
+def statistical_dtype(size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
-        tests=TESTS, noise=NOISE, alarm=ALARM, block=(block_dtype(size.rates), N_BLOCKS),
-        n_views=int, views=(view_dtype(size.view), size.views), tone_config=TONE_CONFIG,
-        forces=MEASURED_FORCES, air=GUST_RECORD, inertial_air=GUST_RECORD,
+        test_config=TEST_CONFIG_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
+        block=(block_dtype(size.rate_block), N_FILTER_BLOCKS),
+        n_views=int, views=(parity_view_dtype(size.view_block), size.n_views), tone_config=TONE_CONFIG_RECORD,
+        forces=MEASURED_FORCES_RECORD, gust=GUST_RECORD, inertial_gust=GUST_RECORD,
     )  # fmt: skip
 
 
 @kernel
-def update_blocks(tests, bounded, blocks, air, innovation, dt, k, latched, ends=False):
-    """Update the blocks with frame k, of dt s: innovation and bound `bounded`, both (3,) rad/s2.
+def update_blocks(
+    test_config, uncertainty_bound, blocks, gust, innovation, dt, frame, is_alarm_latched, may_loss_end=False
+):
+    """Update the blocks with frame k, of dt s: innovation and bound `uncertainty_bound`, both (3,) rad/s2.
 
-    latched: the detector has raised its alarm; ends: a loss may end.
+    is_alarm_latched: the detector has raised its alarm; may_loss_end: a loss may end.
     """
-    keep, slot = tests.keep if latched else 1.0, likelihood.slot_to_reset(k)
+    evidence_decay = test_config.evidence_decay_factor if is_alarm_latched else 1.0
+    slot = likelihood.onset_slot_to_reset(frame)
     for b, block in enumerate(blocks):
-        if not latched:
-            likelihood.reset_onset(block, slot)
-        for i, axis in enumerate(block.axis[: block.n]):
-            block.scratch[i] = innovation[axis] - air.output.mean[axis]
-        block.has_coarse_gust = air.config.coarse
-        if air.config.coarse:
-            likelihood.set_gust_response(block, air.output.coarse_acceleration)
-        if air.output.moving:
-            add_turn_variance(air, block)
-            if b < likelihood.LATERAL_RETURNING:
-                likelihood.whiten_without_gust(block, dt)
+        if not is_alarm_latched:
+            likelihood.reset_onset_slot(block, slot)
+        for i, axis in enumerate(block.axis[: block.n_axes]):
+            block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
+        block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
+        if gust.config.only_coarse_estimate:
+            likelihood.set_coarse_gust_response(block, gust.output.coarse_gust_acceleration)
+        if gust.output.is_turbulent:
+            add_turn_to_drift_covariance(gust, block)
+            if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
+                likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
-                block.no_gust_filter.innovation[:] = blocks[LATERAL].no_gust_filter.innovation
-        memory = tests.keep if ends else 0.0
-        likelihood.update_block(block, bounded, tests.has_tolerances, dt, keep, memory, tests.mapped)
+                block.no_gust_filter.innovation[:] = blocks[LATERAL_BLOCK].no_gust_filter.innovation
+        upper_bound_decay = test_config.evidence_decay_factor if may_loss_end else 0.0
+        likelihood.update_block(
+            block,
+            uncertainty_bound,
+            test_config.has_regressors,
+            dt,
+            evidence_decay,
+            upper_bound_decay,
+            test_config.has_error_map,
+        )
 
 
 @kernel
-def add_turn_variance(air, block):
+def add_turn_to_drift_covariance(gust, block):
     """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
-    for i in range(block.n):
-        for j in range(block.n):
-            block.P_dd[i, j] += block.drift_scale * air.output.turn_variance[block.axis[i], block.axis[j]]
+    for i in range(block.n_axes):
+        for j in range(block.n_axes):
+            block.P_dd[i, j] += (
+                block.drift_intensity_scale * gust.output.axes_turn_variance[block.axis[i], block.axis[j]]
+            )
 
 
 @kernel
-def track_residual_mean(blocks, air, innovation_after_known_faults, dt):
+def filter_residual_mean(blocks, gust, innovation_after_known_faults, dt):
     """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
-    for block in blocks[: likelihood.LATERAL_RETURNING]:
-        for i, axis in enumerate(block.axis[: block.n]):
-            block.scratch[i] = innovation_after_known_faults[axis] - air.output.mean[axis]
-        likelihood.whiten(block, block.residual_state, block.scratch, dt, block.scratch)
+    for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
+        for i, axis in enumerate(block.axis[: block.n_axes]):
+            block.frame_innovation[i] = (
+                innovation_after_known_faults[axis] - gust.output.mean_gust_acceleration[axis]
+            )
+        likelihood.whiten(
+            block, block.residual_filter_state, block.frame_innovation, dt, block.frame_innovation
+        )
 
 
 @kernel
-def statistical_unknown_acceleration(blocks, air, out):
+def fill_statistical_unknown_acceleration(blocks, gust, out):
     """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
 
     It is the estimated drift plus the effect of the gust estimated from the vanes.
     """
-    for block in blocks[: likelihood.LATERAL_RETURNING]:
-        for i, axis in enumerate(block.axis[: block.n]):
-            out[axis] = block.residual_state[2 + i] + air.output.acceleration[axis]
+    for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
+        for i, axis in enumerate(block.axis[: block.n_axes]):
+            out[axis] = block.residual_filter_state[2 + i] + gust.output.gust_acceleration[axis]
 
 
 @kernel
-def update_alarm(alarm, tests, blocks, views, forces, air, t, known=True):
+def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_error_known=True):
     """Fill the largest score over the alarm level, its axis, and at the first alarm its time t s.
 
-    The score is 0 where the model's error is not `known`.
+    The score is 0 where the model's error is not `is_model_error_known`.
     """
-    alarm.score = 0.0
-    if not known:
+    alarm.score_over_alarm_level = 0.0
+    if not is_model_error_known:
         return
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.raises_alarm:
-                keep_largest_score(alarm, tests.alarm_level, hypothesis.score, hypothesis.axis)
+                keep_largest_alarm_score(alarm, test_config.alarm_level, hypothesis.score, hypothesis.axis)
     for view in views:
-        keep_largest_score(
-            alarm, tests.alarm_level, parity.alarm_score(view, views, tests, forces, air), view.axis
+        keep_largest_alarm_score(
+            alarm,
+            test_config.alarm_level,
+            parity.alarm_score(view, views, test_config, forces, gust),
+            view.alarm_axis,
         )
-    if alarm.score > 1.0 and alarm.detected_at_s < 0.0:
+    if alarm.score_over_alarm_level > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
 
 @kernel
-def note_closest_approach(alarm):
+def update_max_score(alarm):
     """Keep the largest score over the alarm level so far."""
-    alarm.closest = max(alarm.closest, alarm.score)
+    alarm.max_score_over_alarm_level = max(alarm.max_score_over_alarm_level, alarm.score_over_alarm_level)
 
 
 @kernel
-def keep_largest_score(alarm, level, score, axis):
+def keep_largest_alarm_score(alarm, alarm_level, score, axis):
     """Keep a score if it is the largest."""
-    share = score / level
-    if share > alarm.score:
-        alarm.score, alarm.axis = share, axis
+    score_over_level = score / alarm_level
+    if score_over_level > alarm.score_over_alarm_level:
+        alarm.score_over_alarm_level, alarm.axis = score_over_level, axis
 
 
 @kernel
-def log_scores(tests, blocks, views, forces, air, row):
+def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
     """Write the last columns of a log row: scores over the alarm level, first of losses, then of steps.
 
     Scores of forces and of oscillations are in the column of the step on their axis.
     """
-    first = row.size - tests.n_log_columns
-    row[first:] = 0.0
+    first_column = row.size - test_config.n_score_columns
+    row[first_column:] = 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.raises_alarm:
-                place = first + hypothesis.log_column
-                row[place] = max(row[place], hypothesis.score / tests.alarm_level)
+                column = first_column + hypothesis.log_column_index
+                row[column] = max(row[column], hypothesis.score / test_config.alarm_level)
     for view in views:
-        place = row.size - 3 + view.axis
-        row[place] = max(row[place], parity.alarm_score(view, views, tests, forces, air) / tests.alarm_level)
+        column = row.size - 3 + view.alarm_axis
+        row[column] = max(
+            row[column], parity.alarm_score(view, views, test_config, forces, gust) / test_config.alarm_level
+        )
 
 
 @kernel
-def is_not_excluded(estimators, loss_estimator, surface):
+def is_loss_not_excluded(estimators, loss_estimator, surface):
     """True if a loss of this surface has not been excluded."""
     return loss_estimator[surface] < 0 or not estimators[loss_estimator[surface]].excluded
 
 
 @kernel
-def best_alternative_llr(block, estimators, loss_estimator, surface, every=False):
+def best_alternative_llr_bound(block, estimators, loss_estimator, surface, includes_excluded=False):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
-    Excluded losses are no alternatives, unless `every`: as evidence decays, an uncertainty that correlates
-    with the commands may support them again.
+    Excluded losses are no alternatives, unless `includes_excluded`: as evidence decays, an uncertainty that
+    correlates with the commands may support them again.
     """
-    best = 0.0
+    best_bound = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
-        if hypothesis.kind in (GROWING, ENDING):
+        if hypothesis.kind in (GROWING_LOSS, LOSS_END):
             continue
         other = hypothesis.surface
         if hypothesis.kind != LOSS or (
-            other != surface and (every or is_not_excluded(estimators, loss_estimator, other))
+            other != surface
+            and (includes_excluded or is_loss_not_excluded(estimators, loss_estimator, other))
         ):
-            best = max(best, hypothesis.min_llr)
-    return best
+            best_bound = max(best_bound, hypothesis.llr_lower_bound)
+    return best_bound
 
 
 @kernel
-def max_llr(block, surface, ending):
-    """Upper bound on the log-likelihood ratio of a loss of this surface, or, if `ending`, of its end.
+def loss_llr_upper_bound(block, surface, is_loss_end):
+    """Upper bound on the log-likelihood ratio of a loss of this surface, or, if `is_loss_end`, of its end.
 
     It is 0 if the block has no such hypothesis.
     """
-    most = 0.0
+    upper_bound = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
-        if hypothesis.surface == surface and (hypothesis.kind == ENDING) == ending:
-            most = max(most, hypothesis.max_llr)
-    return most
+        if hypothesis.surface == surface and (hypothesis.kind == LOSS_END) == is_loss_end:
+            upper_bound = max(upper_bound, hypothesis.llr_upper_bound)
+    return upper_bound
 
 
 @kernel
-def confirms_loss(tests, blocks, estimators, loss_estimator, surface):
+def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
     """True if a loss of this surface explains the data better than all alternatives, by the naming level.
 
     estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
-    is weakly excluded by DAMAGE_POSSIBLE, excluded losses are alternatives as well.
+    is weakly excluded by WEAKLY_EXCLUDED_BY_DAMAGE, excluded losses are alternatives as well.
     """
-    every = (
+    includes_excluded = (
         loss_estimator[surface] >= 0
-        and estimators[loss_estimator[surface]].weakly_excluded == DAMAGE_POSSIBLE
+        and estimators[loss_estimator[surface]].weakly_excluded == WEAKLY_EXCLUDED_BY_DAMAGE
     )
     for block in blocks:
-        least = 0.0
+        loss_lower_bound = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING):
-                least = max(least, hypothesis.min_llr)
+            if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING_LOSS):
+                loss_lower_bound = max(loss_lower_bound, hypothesis.llr_lower_bound)
         if (
-            least - best_alternative_llr(block, estimators, loss_estimator, surface, every)
-            > tests.naming_level
+            loss_lower_bound
+            - best_alternative_llr_bound(block, estimators, loss_estimator, surface, includes_excluded)
+            > test_config.isolation_llr_margin
         ):
             return True
     return False
 
 
 @kernel
-def excludes_loss(tests, blocks, estimators, loss_estimator, surface, ends, abrupt):
+def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_loss_end_in_pitch, is_abrupt):
     """True if an alternative explains the data better than a loss of this surface, by the naming level.
 
     Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
-    only. A loss that is not declared `abrupt` may grow. A constant theta then explains only a part of its
-    effect, so the loss is excluded only if its ratio is also below MIN_CONSTANT_SHARE of the best. The same
-    holds for a loss that begins inside a frame of several instants, and for the end of a loss there. The end
-    of a loss in pitch counts only if `ends` is set: a fault outside the class may look like it. Arguments as
-    in `confirms_loss`.
+    only. A loss that is not declared `is_abrupt` may grow. A constant theta then explains only a part of its
+    effect, so the loss is excluded only if its ratio is also below MIN_LLR_SHARE_OF_CONSTANT_LOSS of the
+    best. The same holds for a loss that begins inside a frame of several instants, and for the end of a loss
+    there. The end of a loss in pitch counts only if `may_loss_end_in_pitch` is set: a fault outside the class
+    may look like it. Arguments as in `confirms_loss`.
     """
-    pitch, single_instant = blocks[likelihood.PITCH_BLOCK], tests.share == 1.0
-    part = 1.0 if abrupt and single_instant else MIN_CONSTANT_SHARE
-    end_part = 1.0 if single_instant else MIN_CONSTANT_SHARE
-    for lateral in blocks[LATERAL:]:
-        better = best_alternative_llr(pitch, estimators, loss_estimator, surface)
-        better = max(better, best_alternative_llr(lateral, estimators, loss_estimator, surface))
-        worse = max(max_llr(pitch, surface, False), max_llr(lateral, surface, False))
-        ended = max_llr(lateral, surface, True)
-        if ends:
-            ended = max(ended, max_llr(pitch, surface, True))
-        small = worse < part * better and ended < end_part * better
-        if small and better - max(worse, ended) > tests.naming_level:
+    pitch, single_instant = blocks[likelihood.PITCH_BLOCK], test_config.frame_share_per_instant == 1.0
+    loss_share = 1.0 if is_abrupt and single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
+    loss_end_share = 1.0 if single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
+    for lateral in blocks[LATERAL_BLOCK:]:
+        alternative_llr = best_alternative_llr_bound(pitch, estimators, loss_estimator, surface)
+        alternative_llr = max(
+            alternative_llr, best_alternative_llr_bound(lateral, estimators, loss_estimator, surface)
+        )
+        loss_llr = max(
+            loss_llr_upper_bound(pitch, surface, False), loss_llr_upper_bound(lateral, surface, False)
+        )
+        loss_end_llr = loss_llr_upper_bound(lateral, surface, True)
+        if may_loss_end_in_pitch:
+            loss_end_llr = max(loss_end_llr, loss_llr_upper_bound(pitch, surface, True))
+        is_loss_unlikely = (
+            loss_llr < loss_share * alternative_llr and loss_end_llr < loss_end_share * alternative_llr
+        )
+        if (
+            is_loss_unlikely
+            and alternative_llr - max(loss_llr, loss_end_llr) > test_config.isolation_llr_margin
+        ):
             return True
     return False
 
 
 @kernel
-def estimated_loss(blocks, surface):
+def estimate_loss(blocks, surface):
     """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
     theta, information = 0.0, 0.0
     for block in blocks:
@@ -279,111 +782,150 @@ def estimated_loss(blocks, surface):
             if (
                 hypothesis.kind == LOSS
                 and hypothesis.surface == surface
-                and hypothesis.information > information
+                and hypothesis.theta_information > information
             ):
-                theta, information = hypothesis.theta, hypothesis.information
+                theta, information = hypothesis.theta_estimate, hypothesis.theta_information
     return theta, information
 
 
 @kernel
-def prepare_tests(tests, noise, blocks, air, bound, design, measured, u, dt):
-    """Prepare the next frame, of dt s: gust, regressors, drift and jitter at this instant.
+def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measured, u, dt):
+    """Prepare the next frame, of dt s: gust, regressors, drift and model noise at this instant.
 
     bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
-    if air.output.moving:
-        gusts.fill_gust_effect(air, design, x, y, u)
-    if tests.has_tolerances:
+    if gust.output.is_turbulent:
+        gusts.fill_gust_effect(gust, design, x, y, u)
+    if test_config.has_regressors:
         for block in blocks:
             block.regressor[:] = 0.0
-        add_regressors(tests.share, noise, blocks, bound.declared_errors, design, measured, u)
-    fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt)
-    if bound.error_map.n_boxes > 0:
-        update_pace(noise, blocks, bound.error_map, u)
-    if air.output.moving:
-        gusts.begin_gust_sums(air, y[AIRSPEED], tests.share * dt)
+        add_regressors(
+            test_config.frame_share_per_instant,
+            noise_model,
+            blocks,
+            bound.declared_errors,
+            design,
+            measured,
+            u,
+        )
+    fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measured, dt)
+    if bound.model_error_map.n_boxes > 0:
+        update_uncertainty_change(noise_model, blocks, bound.model_error_map, u)
+    if gust.output.is_turbulent:
+        gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
 
 @kernel
-def update_pace(noise, blocks, error_map, u):
-    """Fill the pace of every block for the next frame: the model's mapped error changes with the surfaces."""
-    moved = 0.0
+def update_uncertainty_change(noise_model, blocks, error_map, u):
+    """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
+    surfaces."""
+    travel_share_moved = 0.0
     for s in range(u.size):
-        travel = max(error_map.travel_high[s] - error_map.travel_low[s], LEAST_TRAVEL_RAD)
-        moved = max(moved, abs(u[s] - error_map.before[s]) / travel)
-        error_map.before[s] = u[s]
+        travel = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
+        travel_share_moved = max(
+            travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel
+        )
+        error_map.surface_positions_before[s] = u[s]
     for block in blocks:
-        block.pace = min(noise.pace + PACE_PER_TRAVEL * moved, PACE_PER_TRAVEL * REVERSAL_TRAVEL_SHARE)
+        block.uncertainty_change_per_frame = min(
+            noise_model.base_uncertainty_change_per_frame
+            + UNCERTAINTY_CHANGE_PER_TRAVEL * travel_share_moved,
+            UNCERTAINTY_CHANGE_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
+        )
 
 
 @kernel
-def accumulate_test_substep(tests, noise, blocks, air, bound, design, measured, u, dt):
+def add_instant_to_tests(test_config, noise_model, blocks, gust, bound, design, measured, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
-    if air.output.moving:
-        gusts.accumulate_gust_substep(air, design, measured.x, measured.y, u, measured.attitude, dt)
-    if tests.has_tolerances:
-        add_regressors(tests.share, noise, blocks, bound.declared_errors, design, measured, u)
+    if gust.output.is_turbulent:
+        gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
+    if test_config.has_regressors:
+        add_regressors(
+            test_config.frame_share_per_instant,
+            noise_model,
+            blocks,
+            bound.declared_errors,
+            design,
+            measured,
+            u,
+        )
 
 
 @kernel
-def add_regressors(share, noise, blocks, declared_errors, design, measured, u):
-    """Add this instant, a `share` of the frame, to the regressors of all unknown constants."""
+def add_regressors(frame_share, noise_model, blocks, declared_errors, design, measured, u):
+    """Add this instant, a `frame_share` of the frame, to the regressors of all unknown constants."""
     y = measured.y
     evaluate(design.moments, measured.x, y)
-    add_coefficient_regressors(share, noise.terms, blocks, design, y, u)
-    if noise.read:
-        noise_model.add_reading_regressors(share, noise, blocks, declared_errors, design, y, u)
+    add_coefficient_regressors(frame_share, noise_model.coefficient_regressor, blocks, design, y, u)
+    if noise_model.has_reading_errors:
+        add_reading_regressors(frame_share, noise_model, blocks, declared_errors, design, y, u)
 
 
 @kernel
-def fill_drift_and_jitter(noise, blocks, air, bound, design, measured, dt):
-    """Fill drift intensity and jitter of each block: for the bounded uncertainty and the unmeasured gust."""
-    bounded, V = noise.bounded, measured.y[AIRSPEED]
-    bounded[:] = 0.0
-    add_published_bound(measured.x, design, bound.inertia, bound.constant, bound.earth_rate, bounded)
-    mapped = bound.error_map.n_boxes > 0
+def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measured, dt):
+    """Fill drift intensity and model noise of each block: for the bounded uncertainty and the unmeasured
+    gust."""
+    uncertainty_bound, V = noise_model.uncertainty_bound, measured.y[AIRSPEED]
+    uncertainty_bound[:] = 0.0
+    add_published_bound(
+        measured.x,
+        design,
+        bound.inertia_coupling,
+        bound.constant_bound,
+        bound.earth_rate_rad_s,
+        uncertainty_bound,
+    )
+    has_error_map = bound.model_error_map.n_boxes > 0
     for i in range(3):
-        bounded[i] += noise.deflection[i]
-        if mapped:
-            bounded[i] += min(bound.error_map.now[i], UNKNOWN_IN_FILTERS_RAD_S2)
-        if bound.error_map.anywhere:
-            noise.further_error[i] = further_map_error(bound.error_map, bound.error_map.n_levels - 1, i)
+        uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
+        if has_error_map:
+            uncertainty_bound[i] += min(bound.model_error_map.error_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2)
+        if bound.model_error_map.one_surface_anywhere:
+            noise_model.surface_anywhere_additional_bound[i] = additional_map_error(
+                bound.model_error_map, bound.model_error_map.n_levels - 1, i
+            )
     for b, block in enumerate(blocks):
-        for i, axis in enumerate(block.axis[: block.n]):
-            for j in range(block.n):
-                block.drift[i, j] = 0.0
-                if air.output.moving:
-                    moved = gusts.unmeasured_gust_drift(
-                        air, V, axis, block.axis[j], b == likelihood.LATERAL_RETURNING
+        for i, axis in enumerate(block.axis[: block.n_axes]):
+            for j in range(block.n_axes):
+                block.drift_intensity[i, j] = 0.0
+                if gust.output.is_turbulent:
+                    gust_drift = gusts.unmeasured_gust_drift_intensity(
+                        gust, V, axis, block.axis[j], b == likelihood.MEAN_REVERTING_LATERAL_BLOCK
                     )
-                    block.drift[i, j] = block.drift_scale * moved
-            size = max(bounded[axis], likelihood.LEAST_UNCERTAINTY_RAD_S2)
-            walk = noise.walk_intensity * size * size
-            block.drift[i, i] += walk
-            block.no_gust_filter.drift[i, i] = walk
-            block.jitter[i] = block.no_gust_filter.jitter[i] = noise.jitter[axis]
-        block.keep = np.exp(-dt * V / block.return_length) if block.return_length > 0.0 else 1.0
+                    block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift
+            drift_bound = max(uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+            walk_intensity = noise_model.relative_walk_intensity * drift_bound * drift_bound
+            block.drift_intensity[i, i] += walk_intensity
+            block.no_gust_filter.drift_intensity[i, i] = walk_intensity
+            block.model_noise_variance[i] = block.no_gust_filter.model_noise_variance[i] = (
+                noise_model.input_noise_variance[axis]
+            )
+        block.drift_decay_factor = (
+            np.exp(-dt * V / block.correlation_length) if block.correlation_length > 0.0 else 1.0
+        )
 
 
 @kernel
-def add_coefficient_regressors(share, terms, blocks, design, y, u):
-    """Add this instant, a `share` of the frame, to the regressors (n, 2) rad/s2 of the coefficients."""
+def add_coefficient_regressors(frame_share, coefficient_regressor, blocks, design, y, u):
+    """Add this instant, a `frame_share` of the frame, to the regressors (n, 2) rad/s2 of the coefficients."""
     table = design.moments
-    regressors(table, table.power, u, terms)
-    force = share * y[QDYN] * design.S
-    lateral, longitudinal = force * design.b, force * design.c
-    pitch = blocks[likelihood.PITCH_BLOCK]
-    first = table.free_from[1]
-    for j in range(table.surface_to[1] - first):
-        pitch.regressor[j, 0] += design.Qm * longitudinal * terms[first + j]
-    for rolling in blocks[LATERAL:]:
-        n_roll, first = table.surface_to[0], table.free_from[2]
-        for j in range(n_roll):
-            Cl = lateral * terms[j]
-            rolling.regressor[j, 0] += design.Pl * Cl
-            rolling.regressor[j, 1] += design.Rl * Cl
-        for j in range(table.surface_to[2] - first):
-            Cn = lateral * terms[first + j]
-            rolling.regressor[n_roll + j, 0] += design.Pn * Cn
-            rolling.regressor[n_roll + j, 1] += design.Rn * Cn
+    regressors(table, table.power, u, coefficient_regressor)
+    dynamic_force = frame_share * y[QDYN] * design.S
+    lateral_moment_scale, pitching_moment_scale = dynamic_force * design.b, dynamic_force * design.c
+    pitch_block = blocks[likelihood.PITCH_BLOCK]
+    first_term = table.free_from[1]
+    for j in range(table.surface_to[1] - first_term):
+        pitch_block.regressor[j, 0] += (
+            design.Qm * pitching_moment_scale * coefficient_regressor[first_term + j]
+        )
+    for lateral_block in blocks[LATERAL_BLOCK:]:
+        n_roll_terms, first_term = table.surface_to[0], table.free_from[2]
+        for j in range(n_roll_terms):
+            Cl = lateral_moment_scale * coefficient_regressor[j]
+            lateral_block.regressor[j, 0] += design.Pl * Cl
+            lateral_block.regressor[j, 1] += design.Rl * Cl
+        for j in range(table.surface_to[2] - first_term):
+            Cn = lateral_moment_scale * coefficient_regressor[first_term + j]
+            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * Cn
+            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * Cn

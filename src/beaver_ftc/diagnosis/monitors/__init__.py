@@ -1,11 +1,81 @@
-"""Monitors of what is not a control surface: sensors by their redundancy, engines by their symmetry."""
+"""Monitors of what is not a control surface: sensors by their redundancy, engines by their symmetry.
+
+The monitor of the engines is in this file. Engines under one lever that thrust unlike yaw the aircraft. The
+moments of engines that are effectors are signals, which the innovation does not contain. They are compared
+with the thrust. With all levers alike, a healthy aircraft has
+
+    |Cn - a CT| <= bound + MAX_CENTRE_OF_MASS_OFFSET_M / b |CT|,    a = -sum share right / b
+
+CT, Cn: coefficients of thrust and of its yawing moment; b m: span; right m: place of an engine. bound:
+measured where the terms were derived, box by box of the map of the model's error (propellers yaw aslant); the
+second term is for fuel that burns from one side first. Beyond the limit an engine has failed: no surface can
+do that. An engine in the middle does not show, nor do engines that fail alike.
+"""
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.model import DPT
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.monitors.engine_symmetry import THRUST, YAWING, mean_arm
-    from beaver_ftc.diagnosis.monitors.redundancy import N_COMPUTED, RPM
+    from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING, N_COMPUTED_TESTS, RPM_TEST
 else:
     __getattr__, __dir__ = lazily(__name__)
+
+
+THRUST_SIGNAL, YAWING_MOMENT_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
+MAX_CENTRE_OF_MASS_OFFSET_M = 0.05
+
+# n_engines: engines, 0 where they are not monitored. thrust_index, yawing_moment_index: places of the signals
+# in y. mean_arm: a. thrust_offset_tolerance: of the bound, per CT.
+ENGINE_CONFIG_RECORD = record(
+    n_engines=int, thrust_index=int, yawing_moment_index=int, mean_arm=float, thrust_offset_tolerance=float
+)
+ENGINE_MEMORY_RECORD = record(disabled=int)  # a law has moved an engine apart: the levers are no longer alike
+ENGINE_OUTPUT_RECORD = record(failed=int)  # an engine has failed
+ENGINE_MONITOR_RECORD = record(
+    config=ENGINE_CONFIG_RECORD, memory=ENGINE_MEMORY_RECORD, output=ENGINE_OUTPUT_RECORD
+)
+
+
+def mean_thrust_arm(aircraft: Aircraft) -> float:
+    """a: the yawing moment of the thrust with all levers alike, per CT."""
+    return -sum(of.share * of.right_m for of in aircraft.effectors.values()) / aircraft.geometry.span_m
+
+
+def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
+    """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
+    known, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    if known is None or not known.knows_engines or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals):
+        return
+    config["n_engines"], config["mean_arm"] = len(aircraft.effectors), mean_thrust_arm(aircraft)
+    config["thrust_index"], config["yawing_moment_index"] = (
+        DPT + signals.index(name) for name in (THRUST_SIGNAL, YAWING_MOMENT_SIGNAL)
+    )
+    config["thrust_offset_tolerance"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
+
+
+@kernel
+def disable_if_differential_thrust(engines, levers):
+    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in addition
+    to the common one."""
+    for e in range(engines.config.n_engines):
+        if levers[e] != 0.0:
+            engines.memory.disabled = 1
+
+
+@kernel
+def detect_engine_failure(engines, bound, y):
+    """Whether an engine has failed, by these signals y or before; bound: on |Cn - a CT| here."""
+    config = engines.config
+    if config.n_engines > 0 and not engines.memory.disabled:
+        thrust = y[config.thrust_index]
+        if abs(
+            y[config.yawing_moment_index] - config.mean_arm * thrust
+        ) > bound + config.thrust_offset_tolerance * abs(thrust):
+            engines.output.failed = 1
+    return engines.output.failed == 1

@@ -1,34 +1,57 @@
-"""Errors that sensors had when the monitor began, and their largest effect on its tests.
+"""Errors that sensors have had since the monitor began: bounds on them, and on their effect on its tests.
 
 A reading that was off by a constant from the first sample on has jumped in no test of its own: it shows only
-through the kinematics of the other sensors, in tests that belong to those. For each reading from which others
-are predicted, on the hypothesis that it alone is broken,
+through the kinematics of the other sensors, in tests that belong to those. There is one hypothesis for each
+reading from which others are predicted (alpha, beta, airspeed, phi, theta): that this sensor alone is broken.
+The error x of the sensor is counted as
 
-    error_bound           bound on its error: at first as far as an aircraft flies, later
-                          error_bound <= (|residual| + bound) / coupling, for each filter of a coupled test
-    change_bound          bound on its change since: what its own test shows, plus that test's bound
-    unit_effect           what a unit of its error adds to each test's residual in one sample, at most
-    filtered_unit_effect  the same through the filters
+    alpha, beta, phi, theta    x = 2 sin((reading - truth) / 2): by so much the angle turns a unit vector
+    airspeed                   x = reading / truth - 1
 
-A test beyond bound + (error_bound + change_bound) filtered_unit_effect refutes the hypothesis: a residual is
-the sum of the effect of sound sensors, at most bound, and of the effect of the error, at most the rest. So
-the broken sensor is never excluded by the effect of its first error, of any size. Where
-sensor_monitor.py excludes a sensor by what its error would do from now on, bound + error_bound
-filtered_unit_effect replaces the bound.
+The record of the hypotheses (INITIAL_ERRORS_RECORD) holds for each hypothesis, with h the time between two
+samples, s; test t; and filter pole m
 
-The error of an angle is counted as 2 sin(error / 2), by which it turns a vector of length one; that of the
-airspeed as reading / truth - 1. With s the acceleration, gravity included, and errors that are differences of
-these sines,
+    effect_per_unit_error           W_t: bound on |effect on residual t in one sample| / |x|
+    filtered_effect_per_unit_error  W_tm: the same through the filter, W_tm <- decay_m W_tm + W_t
+    error_bound                     b: bound on |x|. At the first sample it is as large as an aircraft can fly
+                                    (error_bound_at_start). Then, at each sample,
+                                      b <- min(b + (1 - decay_slow) d, error_bound_at_start)
+                                    and for each test, or pair of tests, that couples with the error
+                                      b <- min(b, (r + B + 2 d W_tm) / (MIN_REMAINING_COUPLING_SHARE C))
+    error_change_bound              d: bound on the change of x within the memory of the slowest filter,
+                                    d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
+                                    of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
 
-    attitude     an error of phi adds the difference of (q, r) turned by it; of theta, that of psi' turned
-    gravity      of the length of g cos theta, or of g, turned by it; in SPEED, ALPHA_FLOW and BETA_FLOW
-    SPEED        s . v / V
-    ALPHA_FLOW   q - tan beta (p cos alpha + r sin alpha) + (s_z cos alpha - s_x sin alpha) / V cos beta
-    BETA_FLOW    p sin alpha - r cos alpha + (s_y cos beta - (s_x cos alpha + s_z sin alpha) sin beta) / V
-    DENSITY      log V: an error x scales its change by 1 + x
-    CLIMB        V (cos beta (cos alpha sin theta - sin alpha cos phi cos theta) - sin beta sin phi cos theta)
+r: |filtered residual|; B: bound on it for sound sensors; C: filtered coupling, a lower bound on the effect of
+a unit of x. Of several tests r + B + 2 d W_tm is the root of the sum of squares. For the airspeed it counts
+1 + b times in the tests of flow; in that of the density 2 (1 + b) / V times r + B of SPEED is added to it. A
+test refutes a hypothesis with
 
-Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis at every sample. Neither
+    r > B + (b + d) W_tm
+    r > (1 + b + d) B + (b + d) W_tm     for the airspeed, in SPEED and the tests after it
+
+since a residual is the sum of the effect of sound sensors, at most B, and of the effect of the error. So an
+error from the start, of any size, never excludes the broken sensor. Where sensor_monitor.py excludes a sensor
+by the effect that its error would have from now on, the limit is B + b W_tm with b as of the alarm.
+
+What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
+in body axes; p, q, r rad/s):
+
+    attitude     with phi off, (q, r) is turned about the body's first axis; with theta off, the vertical
+                 unit vector, about which the aircraft turns at psi'
+    gravity      with phi off, its part g cos(theta) across the body's first axis is turned; with theta off,
+                 all of it; both in a, and so in SPEED, ALPHA_FLOW and BETA_FLOW
+    SPEED        V' = a . v / V
+    ALPHA_FLOW   alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
+                          + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+    BETA_FLOW    beta' = p sin(alpha) - r cos(alpha)
+                         + (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
+    DENSITY      log(density) = log(2 qdyn) - 2 log V: log V changes by (1 + x) times what its reading shows,
+                 if the error of the airspeed is a constant in m/s
+    CLIMB        altitude' = V (cos(beta) (cos(alpha) sin(theta) - sin(alpha) cos(phi) cos(theta))
+                                - sin(beta) sin(phi) cos(theta))
+
+Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 """
 
@@ -37,361 +60,544 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
-    AIRSPEED_ERROR,
+    AIRSPEED_HYPOTHESIS,
     ALPHA,
-    ALPHA_ERROR,
-    ALPHA_FLOW,
-    ANGLE,
+    ALPHA_FLOW_TEST,
+    ALPHA_HYPOTHESIS,
+    ANGLE_TEST,
     BETA,
-    BETA_ERROR,
-    BETA_FLOW,
-    CLIMB,
-    DENSITY,
-    N_INITIAL,
-    PHI_ERROR,
+    BETA_FLOW_TEST,
+    BETA_HYPOTHESIS,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    MAX_PITCH_RAD,
+    MIN_AIRSPEED_MPS,
+    MIN_DYNAMIC_PRESSURE_PA,
+    N_INITIAL_ERROR_HYPOTHESES,
+    PHI_HYPOTHESIS,
     QDYN,
-    RPM,
-    SPEED,
-    STEEPEST_RAD,
+    RPM_TEST,
+    SPEED_TEST,
     THETA,
-    THETA_ERROR,
-    TURN,
-    steepest_pitch_angle,
+    THETA_HYPOTHESIS,
+    TURN_TEST,
+    max_pitch_angle,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
-MAX_FLOW_ANGLE_RAD = 0.7  # no aircraft whose attitude and flow are followed flies at more, to either side
-MAX_READING_RATIO = 10.0  # what is read may be so many times the truth, or a part of it
-DENSITY_TOLERANCE = 0.25  # share by which the air is thicker or thinner than the standard has it at a height
-COUPLING_SHARE = (
-    0.8  # share of a coupling that is left when speed and flow have changed within a filter's memory
-)
-SLOWEST_POLE = 2  # of monitor.POLES_PER_S
+MAX_FLOW_ANGLE_RAD = 0.7  # an aircraft whose attitude and flow are tested flies at less, to either side
+MAX_READING_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
+MAX_ANGLE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
+MAX_DENSITY_DEVIATION = 0.25  # of the density from the standard atmosphere at a height, as a share of it
+MIN_DENSITY_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
+# Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
+MIN_REMAINING_COUPLING_SHARE = 0.8
+SLOWEST_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Couplings that are followed with their sign
-Q_TURNS, R_TURNS, G_DOWN, G_ASIDE, G_AHEAD, CLIMBS, ROLLS, YAWS, ALPHA_COUPLING_ERROR, BETA_COUPLING_ERROR = (
-    range(10)
-)
-PULLS, PUSHES, FASTER, HEADS = range(10, 14)
+# Places in `coupling`: effects of a unit of an error that are followed with their sign, per sample. Two of
+# them, at right angles, make the effect of phi on the attitude, and on the velocity. The reading that is off
+# comes first; VANE: of alpha and of beta.
+(
+    PHI_PITCH_RATE_COUPLING,  # h q
+    PHI_YAW_RATE_COUPLING,  # h r
+    PHI_GRAVITY_DOWN_COUPLING,  # h g cos(theta) cos(phi)
+    PHI_GRAVITY_SIDE_COUPLING,  # h g cos(theta) sin(phi)
+    THETA_GRAVITY_COUPLING,  # h g cos(largest mean of reading and truth)
+    ALPHA_CLIMB_COUPLING,  # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
+    VANE_ROLL_RATE_COUPLING,  # h (p cos(alpha) + r sin(alpha))
+    VANE_YAW_RATE_COUPLING,  # h (p sin(alpha) - r cos(alpha))
+    ALPHA_FORCE_UNCERTAINTY,  # of the coupling of alpha with BETA_FLOW: bound on the part of the force
+    BETA_FORCE_UNCERTAINTY,  # of the coupling of beta with ALPHA_FLOW: the same
+    AIRSPEED_NORMAL_FORCE_COUPLING,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+    AIRSPEED_SIDE_FORCE_COUPLING,  # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
+    AIRSPEED_DENSITY_COUPLING,  # 2 (log V - log V before)
+    THETA_HEADING_RATE_COUPLING,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
+) = range(14)
 
 
 @kernel
-def angle_of_chord(size):
-    """The angle whose 2 sin(angle / 2) this is, rad."""
-    return 2.0 * np.arcsin(min(0.5 * size, 1.0))
+def angle_of_chord(chord):
+    """The angle, rad, whose 2 sin(angle / 2) is `chord`; half a turn for a longer one than 2."""
+    return 2.0 * np.arcsin(min(0.5 * chord, 1.0))
 
 
 @kernel
 def chord_of_angle(angle):
-    """2 sin(angle / 2), of no more than half a turn."""
+    """2 sin(|angle| / 2) of an angle, rad; of more than half a turn as of half a turn."""
     return 2.0 * np.sin(0.5 * min(abs(angle), np.pi))
 
 
 @kernel
-def standard_density(altitude):
-    """Of the standard troposphere, kg/m3."""
-    return 1.225 * max(1.0 - 2.25577e-5 * altitude, 0.05) ** 4.2559
+def standard_air_density(altitude):
+    """Return the density of the standard troposphere, kg/m3; altitude m."""
+    temperature_ratio = max(1.0 - 2.25577e-5 * altitude, MIN_DENSITY_TEMPERATURE_RATIO)
+    return 1.225 * temperature_ratio**4.2559
 
 
 @kernel
-def begin_initial_errors(initial, signal):
-    """At the first sample of the readings (N_SENSORS,) each may be off as far as an aircraft may fly."""
-    initial.initial_bound[ALPHA_ERROR] = chord_of_angle(abs(signal[ALPHA]) + MAX_FLOW_ANGLE_RAD)
-    initial.initial_bound[BETA_ERROR] = chord_of_angle(abs(signal[BETA]) + MAX_FLOW_ANGLE_RAD)
-    # the airspeed that the dynamic pressure and the height leave
-    V = max(signal[AIRSPEED], 1.0)
-    true = np.sqrt(2.0 * max(signal[QDYN], 1.0) / standard_density(signal[ALTITUDE]))
-    faster, slower = V / true * np.sqrt(1.0 + DENSITY_TOLERANCE), V / true * np.sqrt(1.0 - DENSITY_TOLERANCE)
-    initial.initial_bound[AIRSPEED_ERROR] = min(max(faster - 1.0, 1.0 - slower), MAX_READING_RATIO - 1.0)
-    initial.initial_bound[PHI_ERROR] = initial.initial_bound[THETA_ERROR] = 2.0
-    initial.error_bound[:] = initial.initial_bound
-
-
-@kernel
-def test_of_error(i):
-    """The test that shows at once by how much the error of hypothesis i has changed."""
-    return (ALPHA_FLOW, BETA_FLOW, SPEED, ANGLE, ANGLE + 1)[i]
-
-
-@kernel
-def bound_changes(step, initial):
-    """By how much each may have moved: within the slowest filter's memory, and what that has forgotten."""
-    for i in range(N_INITIAL):
-        changed = (
-            largest_error_part(step, test_of_error(i), SLOWEST_POLE)
-            + initial.error_bound[i] * initial.filtered_unit_effect[i, test_of_error(i), SLOWEST_POLE]
-        )
-        if i == AIRSPEED_ERROR:
-            changed *= (1.0 + initial.error_bound[i]) / max(step.memory.previous[AIRSPEED], 1.0)
-        initial.change_bound[i] = min(changed, initial.initial_bound[i])
-        grown = initial.error_bound[i] + (1.0 - step.config.decay[SLOWEST_POLE]) * initial.change_bound[i]
-        initial.error_bound[i] = min(grown, initial.initial_bound[i])
-
-
-@kernel
-def fill_reach(step, initial, signal):
-    """Fill `unit_effect` (N_INITIAL, RPM): what a unit of each error adds to a residual in this sample, at
-    most; and `coupling`: what it adds, with its sign. Both at the sample
-    before, from which this one is predicted."""
-    then, h = step.memory.previous, step.config.h
-    p, q, r = then[0], then[1], then[2]
-    V, phi, theta = max(then[AIRSPEED], 1.0), then[PHI], then[THETA]
-    to, c = initial.unit_effect, initial.coupling
-    to[:] = 0.0
-    # the attitude, by turning; of the second order in h what turns meanwhile
-    tilt = 1.0 / np.cos(min(abs(theta), STEEPEST_RAD))
-    tilt_true = 1.0 / np.cos(min(abs(theta) + angle_of_chord(initial.error_bound[THETA_ERROR]), STEEPEST_RAD))
-    meanwhile = (h * (abs(p) + abs(q) + abs(r))) ** 2
-    across, heading = h * np.hypot(q, r), h * abs(q * np.sin(phi) + r * np.cos(phi)) * tilt_true
-    for i in range(3):
-        to[PHI_ERROR, TURN + i] = meanwhile + (across if i > 0 else 0.0)
-        to[THETA_ERROR, TURN + i] = meanwhile + heading
-        to[PHI_ERROR, ANGLE + i] = tilt * (across + tilt * meanwhile)
-        to[THETA_ERROR, ANGLE + i] = tilt * ((heading if i != 1 else 0.0) + tilt_true * meanwhile)
-    c[Q_TURNS], c[R_TURNS], c[HEADS] = h * q, h * r, h * (q * np.sin(phi) + r * np.cos(phi))
-    fill_flow_reach(step, initial, V, p, q, r)
-    speeds_up = np.log(max(signal[AIRSPEED], 1.0) / V)
-    to[AIRSPEED_ERROR, DENSITY], c[FASTER] = 2.0 * abs(speeds_up), 2.0 * speeds_up
-
-
-@kernel
-def fill_flow_reach(step, initial, V, p, q, r):
-    """The same of flow and climb, at V m/s and rates p, q, r rad/s."""
-    then, h, s, g = step.memory.previous, step.config.h, step.memory.acceleration, step.config.gravity
-    to, c = initial.unit_effect, initial.coupling
-    sa, ca, sb, cb = np.sin(then[ALPHA]), np.cos(then[ALPHA]), np.sin(then[BETA]), np.cos(then[BETA])
-    sp, cp, st, ct = np.sin(then[PHI]), np.cos(then[PHI]), np.sin(then[THETA]), np.cos(then[THETA])
-    slip, wide = abs(then[BETA]), abs(then[BETA]) + angle_of_chord(initial.error_bound[BETA_ERROR])
-    aslant, aslant_true = 1.0 / np.cos(min(slip, STEEPEST_RAD)), 1.0 / np.cos(min(wide, STEEPEST_RAD))
-    normal, pull = s[2] * ca - s[0] * sa, max(step.memory.size, np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2))
-    aside = s[1] * cb - (s[0] * ca + s[2] * sa) * sb
-    roll, yaw = p * ca + r * sa, p * sa - r * ca
-    coarse = h * (1.0 + h * (pull / V + abs(p) + abs(q) + abs(r)))
-    rates, climbed = np.hypot(p, r), step.memory.predicted[ALTITUDE] - then[ALTITUDE]
-    to[ALPHA_ERROR, SPEED] = to[BETA_ERROR, SPEED] = coarse * pull
-    to[ALPHA_ERROR, ALPHA_FLOW] = coarse * aslant * (pull / V + rates * abs(sb))
-    to[ALPHA_ERROR, BETA_FLOW] = coarse * (rates + pull * abs(sb) / V)
-    to[BETA_ERROR, ALPHA_FLOW] = coarse * aslant * aslant_true * (abs(roll) + pull / V)
-    to[BETA_ERROR, BETA_FLOW] = coarse * pull / V
-    to[AIRSPEED_ERROR, ALPHA_FLOW] = to[AIRSPEED_ERROR, BETA_FLOW] = coarse * aslant * pull / V
-    to[PHI_ERROR, SPEED] = coarse * g * ct * np.hypot(sb, sa * cb)
-    to[PHI_ERROR, ALPHA_FLOW] = to[PHI_ERROR, BETA_FLOW] = coarse * g * ct * aslant / V
-    to[THETA_ERROR, SPEED], to[THETA_ERROR, ALPHA_FLOW] = coarse * g, coarse * aslant * g / V
-    to[THETA_ERROR, BETA_FLOW] = coarse * g * (abs(sp) + abs(sb)) / V
-    flat = np.hypot(st, cp * ct)
-    to[ALPHA_ERROR, CLIMB] = h * V * cb * flat
-    to[BETA_ERROR, CLIMB] = h * V * np.hypot(ca * st - sa * cp * ct, sp * ct)
-    to[AIRSPEED_ERROR, CLIMB] = abs(climbed) / (
-        1.0 - min(initial.error_bound[AIRSPEED_ERROR], 1.0 - 1.0 / MAX_READING_RATIO)
+def set_error_bounds_at_start(initial_errors, signal):
+    """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
+    at_start = initial_errors.error_bound_at_start
+    at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(signal[ALPHA]) + MAX_FLOW_ANGLE_RAD)
+    at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(signal[BETA]) + MAX_FLOW_ANGLE_RAD)
+    V = max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
+    expected_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
+        2.0 * max(signal[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(signal[ALTITUDE])
     )
-    to[PHI_ERROR, CLIMB] = h * V * ct * np.hypot(sb, sa * cb)
-    to[THETA_ERROR, CLIMB] = h * V
-    c[G_DOWN], c[G_ASIDE] = h * g * ct * cp, h * g * ct * sp
-    nose = abs(then[THETA])  # the difference of two pitch angles acts across their mean
-    c[G_AHEAD] = (
+    max_ratio, min_ratio = (  # of reading and truth, in the thickest and in the thinnest air
+        V / expected_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION),
+        V / expected_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION),
+    )
+    at_start[AIRSPEED_HYPOTHESIS] = min(max(max_ratio - 1.0, 1.0 - min_ratio), MAX_READING_RATIO - 1.0)
+    at_start[PHI_HYPOTHESIS] = at_start[THETA_HYPOTHESIS] = MAX_ANGLE_ERROR
+    initial_errors.error_bound[:] = at_start
+
+
+@kernel
+def test_showing_error_change(hypothesis):
+    """The test whose residual is, at once, the change of the error of a hypothesis."""
+    return (ALPHA_FLOW_TEST, BETA_FLOW_TEST, SPEED_TEST, ANGLE_TEST, ANGLE_TEST + 1)[hypothesis]
+
+
+@kernel
+def update_error_change_bounds(redundancy, initial_errors):
+    """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
+    part of it that this filter forgets in a sample."""
+    forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE]
+    for i in range(N_INITIAL_ERROR_HYPOTHESES):
+        test_index, at_start = test_showing_error_change(i), initial_errors.error_bound_at_start[i]
+        change = (
+            max_error_effect(redundancy, test_index, SLOWEST_POLE)
+            + initial_errors.error_bound[i]
+            * initial_errors.filtered_effect_per_unit_error[i, test_index, SLOWEST_POLE]
+        )
+        if i == AIRSPEED_HYPOTHESIS:  # from m/s to a share of the truth, which is at least V / (1 + b)
+            change *= (1.0 + initial_errors.error_bound[i]) / max(
+                redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS
+            )
+        initial_errors.error_change_bound[i] = min(change, at_start)
+        widened = initial_errors.error_bound[i] + forgotten_share * initial_errors.error_change_bound[i]
+        initial_errors.error_bound[i] = min(widened, at_start)
+
+
+@kernel
+def fill_effects_per_unit_error(redundancy, initial_errors, signal):
+    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and `coupling` (N_COUPLINGS,).
+
+    Both are taken at the sample before, from which this sample, signal (N_SENSORS,), is predicted.
+    """
+    reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
+    p, q, r = reading[0], reading[1], reading[2]
+    V, phi, theta = max(reading[AIRSPEED], MIN_AIRSPEED_MPS), reading[PHI], reading[THETA]
+    effect, coupling = initial_errors.effect_per_unit_error, initial_errors.coupling
+    effect[:] = 0.0
+    # 1 / cos(theta) by its reading, and the largest one if theta is off
+    secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
+    true_secant = 1.0 / np.cos(
+        min(abs(theta) + angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]), MAX_PITCH_RAD)
+    )
+    second_order = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
+    # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
+    pitch_yaw_turn = h * np.hypot(q, r)
+    heading_turn = h * abs(q * np.sin(phi) + r * np.cos(phi)) * true_secant
+    for i in range(3):
+        # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
+        # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
+        effect[PHI_HYPOTHESIS, TURN_TEST + i] = second_order + (pitch_yaw_turn if i > 0 else 0.0)
+        effect[THETA_HYPOTHESIS, TURN_TEST + i] = second_order + heading_turn
+        # Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by e:
+        # phi' = p + m tan(theta), psi' = m / cos(theta), with m = q sin(phi) + r cos(phi). The tangents, or
+        # secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
+        # theta' = q cos(phi) - r sin(phi) there is no theta.
+        effect[PHI_HYPOTHESIS, ANGLE_TEST + i] = secant * (pitch_yaw_turn + secant * second_order)
+        effect[THETA_HYPOTHESIS, ANGLE_TEST + i] = secant * (
+            (heading_turn if i != 1 else 0.0) + true_secant * second_order
+        )
+    (
+        coupling[PHI_PITCH_RATE_COUPLING],
+        coupling[PHI_YAW_RATE_COUPLING],
+        coupling[THETA_HEADING_RATE_COUPLING],
+    ) = (
+        h * q,
+        h * r,
+        h * (q * np.sin(phi) + r * np.cos(phi)),
+    )
+    fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
+    # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
+    # times twice that.
+    log_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_change)
+    coupling[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_change
+
+
+@kernel
+def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
+    """Fill `effect_per_unit_error` and `coupling` for the tests of speed, flow and climb, and by gravity.
+
+    V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
+    for the second order in h. x: the error of the row's hypothesis.
+    """
+    memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
+    reading, a = memory.previous_reading, memory.body_acceleration
+    effect, coupling = initial_errors.effect_per_unit_error, initial_errors.coupling
+    sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
+    sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
+    sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
+    sin_theta, cos_theta = np.sin(reading[THETA]), np.cos(reading[THETA])
+    # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
+    sideslip = abs(reading[BETA])
+    max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
+    secant = 1.0 / np.cos(min(sideslip, MAX_PITCH_RAD))
+    true_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
+    normal = a[2] * cos_alpha - a[0] * sin_alpha
+    side = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
+    size = max(memory.acceleration_magnitude, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
+    # rad/s: rates about the flow's projection on the plane of symmetry, and across it
+    roll, yaw = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
+    step = h * (1.0 + h * (size / V + abs(p) + abs(q) + abs(r)))
+    roll_yaw_rate, predicted_climb = np.hypot(p, r), memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
+    # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
+    effect[ALPHA_HYPOTHESIS, SPEED_TEST] = effect[BETA_HYPOTHESIS, SPEED_TEST] = step * size
+    # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
+    effect[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * (size / V + roll_yaw_rate * abs(sin_beta))
+    # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
+    effect[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = step * (roll_yaw_rate + size * abs(sin_beta) / V)
+    # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
+    effect[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * true_secant * (abs(roll) + size / V)
+    # beta' with beta off: a turned by beta
+    effect[BETA_HYPOTHESIS, BETA_FLOW_TEST] = step * size / V
+    # alpha', beta' with V off: a / truth = (1 + x) a / reading
+    effect[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = effect[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
+        step * secant * size / V
+    )
+    # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
+    # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
+    effect[PHI_HYPOTHESIS, SPEED_TEST] = step * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    effect[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = effect[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
+        step * g * cos_theta * secant / V
+    )
+    # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
+    # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
+    effect[THETA_HYPOTHESIS, SPEED_TEST] = step * g
+    effect[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * g / V
+    effect[THETA_HYPOTHESIS, BETA_FLOW_TEST] = step * g * (abs(sin_phi) + abs(sin_beta)) / V
+    # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
+    # (sin(theta), -cos(phi) cos(theta))
+    vertical_size = np.hypot(sin_theta, cos_phi * cos_theta)
+    effect[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_size
+    # with beta off: (cos(beta), -sin(beta)) turned, times V
+    effect[BETA_HYPOTHESIS, CLIMB_TEST] = (
+        h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
+    )
+    # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
+    effect[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb) / (
+        1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_READING_RATIO)
+    )
+    # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
+    effect[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    # with theta off: the vertical is turned, against v
+    effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
+    # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
+    # is turned by the error
+    coupling[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
+    coupling[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
+    # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
+    # half the error away from the reading, and at most (reading + a right angle) / 2
+    pitch = abs(reading[THETA])
+    coupling[THETA_GRAVITY_COUPLING] = (
         h
         * g
         * np.cos(
-            min(nose + 0.5 * angle_of_chord(initial.error_bound[THETA_ERROR]), 0.5 * nose + 0.25 * np.pi)
+            min(
+                pitch + 0.5 * angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]),
+                0.5 * pitch + 0.25 * np.pi,
+            )
         )
     )
-    steep = abs(np.arctan2(st, cp * ct) - then[ALPHA]) + 0.5 * angle_of_chord(
-        initial.error_bound[ALPHA_ERROR]
+    # alpha: altitude' = V cos(beta) vertical_size sin(gamma - alpha) + ..., where tan(gamma) =
+    # tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma - alpha)
+    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
+        0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    c[CLIMBS] = h * V * cb * flat * np.cos(min(steep, 0.5 * np.pi))
-    c[ROLLS], c[YAWS] = h * roll, h * yaw
-    c[ALPHA_COUPLING_ERROR] = h * abs(sb) * pull / V
-    c[BETA_COUPLING_ERROR] = h * np.sin(min(wide, 0.5 * np.pi)) * aslant * aslant_true * abs(normal) / V
-    c[PULLS], c[PUSHES] = h * normal * aslant / V, h * aside / V
+    coupling[ALPHA_CLIMB_COUPLING] = (
+        h * V * cos_beta * vertical_size * np.cos(min(max_mean_angle, 0.5 * np.pi))
+    )
+    # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
+    # x cos(e / 2) roll over both cosines. The part of the force, of either sign, is an uncertainty of both
+    coupling[VANE_ROLL_RATE_COUPLING], coupling[VANE_YAW_RATE_COUPLING] = h * roll, h * yaw
+    coupling[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * size / V
+    coupling[BETA_FORCE_UNCERTAINTY] = (
+        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * secant * true_secant * abs(normal) / V
+    )
+    # V: a across the flow, over the airspeed
+    coupling[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal * secant / V
+    coupling[AIRSPEED_SIDE_FORCE_COUPLING] = h * side / V
 
 
 @kernel
-def filter_reach(step, initial):
-    """Pass reach and coupling through the filters."""
-    for i in range(N_INITIAL):
-        for t in range(RPM):
-            for m in range(step.config.decay.size):
-                initial.filtered_unit_effect[i, t, m] = (
-                    step.config.decay[m] * initial.filtered_unit_effect[i, t, m] + initial.unit_effect[i, t]
+def filter_effects_and_couplings(redundancy, initial_errors):
+    """Pass effects per unit error and couplings through the filters of the tests."""
+    decay = redundancy.config.filter_decay
+    for i in range(N_INITIAL_ERROR_HYPOTHESES):
+        for t in range(RPM_TEST):
+            for m in range(decay.size):
+                initial_errors.filtered_effect_per_unit_error[i, t, m] = (
+                    decay[m] * initial_errors.filtered_effect_per_unit_error[i, t, m]
+                    + initial_errors.effect_per_unit_error[i, t]
                 )
-    for j in range(initial.coupling.size):
-        for m in range(step.config.decay.size):
-            initial.filtered_coupling[j, m] = (
-                step.config.decay[m] * initial.filtered_coupling[j, m] + initial.coupling[j]
+    for j in range(initial_errors.coupling.size):
+        for m in range(decay.size):
+            initial_errors.filtered_coupling[j, m] = (
+                decay[m] * initial_errors.filtered_coupling[j, m] + initial_errors.coupling[j]
             )
 
 
 @kernel
-def largest_error_part(step, t, m):
-    """What an error may have added to test t through filter m, at most."""
-    return abs(step.test[t].filtered[m]) + step.test[t].bound[m]
+def max_error_effect(redundancy, test_index, pole_index):
+    """Bound the effect of any error on a test through a filter: r + B, in the unit of the residual."""
+    test = redundancy.test[test_index]
+    return abs(test.filtered_residual[pole_index]) + test.filtered_bound[pole_index]
 
 
 @kernel
-def current_error_part(step, initial, i, t, m):
-    """What the error that hypothesis i has now has added to test t through filter m, at most: what is there,
-    and what the error was less or more by while the filter summed it."""
+def max_current_error_effect(redundancy, initial_errors, hypothesis, test_index, pole_index):
+    """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
+    through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
     return (
-        largest_error_part(step, t, m) + 2.0 * initial.change_bound[i] * initial.filtered_unit_effect[i, t, m]
+        max_error_effect(redundancy, test_index, pole_index)
+        + 2.0
+        * initial_errors.error_change_bound[hypothesis]
+        * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
     )
 
 
 @kernel
-def tighten_error_bound(initial, i, error_part, coupling):
-    """An error that adds at least `coupling` a unit has added no more than `error_part`."""
-    if coupling > 0.0:
-        initial.error_bound[i] = min(initial.error_bound[i], error_part / (COUPLING_SHARE * coupling))
+def tighten_error_bound(initial_errors, hypothesis, max_effect, min_coupling):
+    """Lower the bound on an error whose effect is at most max_effect, and at least min_coupling a unit."""
+    if min_coupling > 0.0:
+        initial_errors.error_bound[hypothesis] = min(
+            initial_errors.error_bound[hypothesis],
+            max_effect / (MIN_REMAINING_COUPLING_SHARE * min_coupling),
+        )
 
 
 @kernel
-def velocity_error_part(step, initial, i, m):
-    """The same of the velocity, m/s, in any direction."""
-    V = max(step.memory.previous[AIRSPEED], 1.0)
-    flow = np.hypot(
-        current_error_part(step, initial, i, ALPHA_FLOW, m),
-        current_error_part(step, initial, i, BETA_FLOW, m),
+def max_velocity_error_effect(redundancy, initial_errors, hypothesis, pole_index):
+    """The bound of `max_current_error_effect` on the velocity, m/s, in any direction."""
+    V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    flow_angle = np.hypot(
+        max_current_error_effect(redundancy, initial_errors, hypothesis, ALPHA_FLOW_TEST, pole_index),
+        max_current_error_effect(redundancy, initial_errors, hypothesis, BETA_FLOW_TEST, pole_index),
     )
-    return np.hypot(current_error_part(step, initial, i, SPEED, m), V * flow)
-
-
-@kernel
-def turn_error_part(step, initial, i, m):
-    """The same of the turning about the axes other than the body's first."""
     return np.hypot(
-        current_error_part(step, initial, i, TURN + 1, m), current_error_part(step, initial, i, TURN + 2, m)
+        max_current_error_effect(redundancy, initial_errors, hypothesis, SPEED_TEST, pole_index),
+        V * flow_angle,
     )
 
 
 @kernel
-def tighten_errors(step, initial):
-    """Bring down how far each may be off."""
-    for m in range(step.config.decay.size):
-        c = initial.filtered_coupling[:, m]
+def max_turn_error_effect(redundancy, initial_errors, hypothesis, pole_index):
+    """The bound of `max_current_error_effect` on the rotation about the body's second and third axes, rad."""
+    return np.hypot(
+        max_current_error_effect(redundancy, initial_errors, hypothesis, TURN_TEST + 1, pole_index),
+        max_current_error_effect(redundancy, initial_errors, hypothesis, TURN_TEST + 2, pole_index),
+    )
+
+
+@kernel
+def tighten_all_error_bounds(redundancy, initial_errors):
+    """Lower the bound on each error to what the tests allow, filter by filter."""
+    for m in range(redundancy.config.filter_decay.size):
+        coupling = initial_errors.filtered_coupling[:, m]
         tighten_error_bound(
-            initial, PHI_ERROR, turn_error_part(step, initial, PHI_ERROR, m), np.hypot(c[Q_TURNS], c[R_TURNS])
+            initial_errors,
+            PHI_HYPOTHESIS,
+            max_turn_error_effect(redundancy, initial_errors, PHI_HYPOTHESIS, m),
+            np.hypot(coupling[PHI_PITCH_RATE_COUPLING], coupling[PHI_YAW_RATE_COUPLING]),
         )
         tighten_error_bound(
-            initial,
-            PHI_ERROR,
-            velocity_error_part(step, initial, PHI_ERROR, m),
-            np.hypot(c[G_DOWN], c[G_ASIDE]),
+            initial_errors,
+            PHI_HYPOTHESIS,
+            max_velocity_error_effect(redundancy, initial_errors, PHI_HYPOTHESIS, m),
+            np.hypot(coupling[PHI_GRAVITY_DOWN_COUPLING], coupling[PHI_GRAVITY_SIDE_COUPLING]),
         )
         tighten_error_bound(
-            initial, THETA_ERROR, velocity_error_part(step, initial, THETA_ERROR, m), c[G_AHEAD]
+            initial_errors,
+            THETA_HYPOTHESIS,
+            max_velocity_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, m),
+            coupling[THETA_GRAVITY_COUPLING],
         )
-        about = np.hypot(
-            current_error_part(step, initial, THETA_ERROR, TURN, m),
-            turn_error_part(step, initial, THETA_ERROR, m),
+        rotation = np.hypot(
+            max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, TURN_TEST, m),
+            max_turn_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, m),
         )
-        tighten_error_bound(initial, THETA_ERROR, about, abs(c[HEADS]))
-        tighten_vanes(step, initial, m)
-        tighten_speed(step, initial, m)
+        tighten_error_bound(
+            initial_errors, THETA_HYPOTHESIS, rotation, abs(coupling[THETA_HEADING_RATE_COUPLING])
+        )
+        tighten_vane_error_bounds(redundancy, initial_errors, m)
+        tighten_airspeed_error_bound(redundancy, initial_errors, m)
 
 
 @kernel
-def tighten_vanes(step, initial, m):
-    """The same of incidence and sideslip."""
-    c, half = initial.filtered_coupling[:, m], 0.5 * angle_of_chord(initial.error_bound[ALPHA_ERROR])
-    rolled = np.cos(half) * abs(c[ROLLS]) - np.sin(half) * abs(c[YAWS]) - c[ALPHA_COUPLING_ERROR]
-    tighten_error_bound(
-        initial, ALPHA_ERROR, current_error_part(step, initial, ALPHA_ERROR, CLIMB, m), c[CLIMBS]
+def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
+    """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
+    coupling = initial_errors.filtered_coupling[:, pole_index]
+    half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
+    min_coupling = (
+        np.cos(half_error) * abs(coupling[VANE_ROLL_RATE_COUPLING])
+        - np.sin(half_error) * abs(coupling[VANE_YAW_RATE_COUPLING])
+        - coupling[ALPHA_FORCE_UNCERTAINTY]
     )
     tighten_error_bound(
-        initial, ALPHA_ERROR, current_error_part(step, initial, ALPHA_ERROR, BETA_FLOW, m), rolled
-    )
-    rolled = (
-        np.cos(0.5 * angle_of_chord(initial.error_bound[BETA_ERROR])) * abs(c[ROLLS]) - c[BETA_COUPLING_ERROR]
-    )
-    tighten_error_bound(
-        initial, BETA_ERROR, current_error_part(step, initial, BETA_ERROR, ALPHA_FLOW, m), rolled
-    )
-
-
-@kernel
-def tighten_speed(step, initial, m):
-    """The same of the airspeed. Bounds of the flow are for one that is right; the density shows its changes,
-    and so does its own test: a scale error is in both alike."""
-    c, slower = initial.filtered_coupling[:, m], 1.0 + initial.error_bound[AIRSPEED_ERROR]
-    tighten_error_bound(
-        initial,
-        AIRSPEED_ERROR,
-        slower * current_error_part(step, initial, AIRSPEED_ERROR, ALPHA_FLOW, m),
-        abs(c[PULLS]),
+        initial_errors,
+        ALPHA_HYPOTHESIS,
+        max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
+        coupling[ALPHA_CLIMB_COUPLING],
     )
     tighten_error_bound(
-        initial,
-        AIRSPEED_ERROR,
-        slower * current_error_part(step, initial, AIRSPEED_ERROR, BETA_FLOW, m),
-        abs(c[PUSHES]),
+        initial_errors,
+        ALPHA_HYPOTHESIS,
+        max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, BETA_FLOW_TEST, pole_index),
+        min_coupling,
     )
-    changes = 2.0 * slower * largest_error_part(step, SPEED, m) / max(step.memory.previous[AIRSPEED], 1.0)
+    min_coupling = (
+        np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
+        * abs(coupling[VANE_ROLL_RATE_COUPLING])
+        - coupling[BETA_FORCE_UNCERTAINTY]
+    )
     tighten_error_bound(
-        initial,
-        AIRSPEED_ERROR,
-        current_error_part(step, initial, AIRSPEED_ERROR, DENSITY, m) + changes,
-        abs(c[FASTER]),
+        initial_errors,
+        BETA_HYPOTHESIS,
+        max_current_error_effect(redundancy, initial_errors, BETA_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index),
+        min_coupling,
     )
 
 
 @kernel
-def update_initial_errors(step, initial, signal):
-    """Update all errors for the sample whose readings (N_SENSORS,) have just been tested."""
-    if steepest_pitch_angle(step, signal) > STEEPEST_RAD:  # turning is not tested
-        initial.filtered_coupling[:] = 0.0
+def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
+    """Lower the bound on the error of the airspeed to what flow and density allow.
+
+    The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
+    larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
+    """
+    coupling = initial_errors.filtered_coupling[:, pole_index]
+    max_ratio = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]  # of reading and truth
+    tighten_error_bound(
+        initial_errors,
+        AIRSPEED_HYPOTHESIS,
+        max_ratio
+        * max_current_error_effect(
+            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
+        ),
+        abs(coupling[AIRSPEED_NORMAL_FORCE_COUPLING]),
+    )
+    tighten_error_bound(
+        initial_errors,
+        AIRSPEED_HYPOTHESIS,
+        max_ratio
+        * max_current_error_effect(
+            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
+        ),
+        abs(coupling[AIRSPEED_SIDE_FORCE_COUPLING]),
+    )
+    change_effect = (
+        2.0
+        * max_ratio
+        * max_error_effect(redundancy, SPEED_TEST, pole_index)
+        / max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    )
+    tighten_error_bound(
+        initial_errors,
+        AIRSPEED_HYPOTHESIS,
+        max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
+        + change_effect,
+        abs(coupling[AIRSPEED_DENSITY_COUPLING]),
+    )
+
+
+@kernel
+def update_initial_error_bounds(redundancy, initial_errors, signal):
+    """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
+    if max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD:  # the tests of the attitude restart
+        initial_errors.filtered_coupling[:] = 0.0
         return
-    bound_changes(step, initial)
-    fill_reach(step, initial, signal)
-    filter_reach(step, initial)
-    tighten_errors(step, initial)
+    update_error_change_bounds(redundancy, initial_errors)
+    fill_effects_per_unit_error(redundancy, initial_errors, signal)
+    filter_effects_and_couplings(redundancy, initial_errors)
+    tighten_all_error_bounds(redundancy, initial_errors)
 
 
 @kernel
-def exceeds_initial_error_bound(step, initial, i, t):
-    """Whether test t is further beyond its bound than a first error of hypothesis i could make it."""
-    test, error_bound = step.test[t], initial.error_bound[i] + initial.change_bound[i]
-    if t >= RPM:
-        return test.share > 1.0
-    room = 1.0 + (error_bound if i == AIRSPEED_ERROR and t >= SPEED else 0.0)
-    for m in range(step.config.decay.size):
-        if abs(test.filtered[m]) > room * test.bound[m] + error_bound * initial.filtered_unit_effect[i, t, m]:
+def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis, test_index):
+    """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
+    pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
+    test = redundancy.test[test_index]
+    error_bound = initial_errors.error_bound[hypothesis] + initial_errors.error_change_bound[hypothesis]
+    if test_index >= RPM_TEST:
+        return test.residual_bound_ratio > 1.0
+    bound_factor = 1.0 + (
+        error_bound if hypothesis == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST else 0.0
+    )
+    for m in range(redundancy.config.filter_decay.size):
+        effect = error_bound * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, m]
+        if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + effect:
             return True
     return False
 
 
 @kernel
-def hold_errors_at_alarm(initial):
-    """Keep how far each was off before the alarm: what shows afterwards may be another's."""
-    initial.bound_at_alarm[:] = initial.error_bound
+def keep_error_bounds_at_alarm(initial_errors):
+    """Keep the bounds of the moment of the alarm: later residuals may be the effect of another error."""
+    initial_errors.sensor_error_bound_at_alarm[:] = initial_errors.error_bound
 
 
 @kernel
-def held_error_part(initial, i, t, m):
-    """What the error that hypothesis i had at the alarm adds to test t through filter m, at most."""
-    return initial.bound_at_alarm[i] * initial.filtered_unit_effect[i, t, m]
+def max_error_effect_at_alarm(initial_errors, hypothesis, test_index, pole_index):
+    """Bound the effect on a test, through a filter, of an error as large as that of a hypothesis could be at
+    the alarm: b W_tm, in the unit of the residual."""
+    return (
+        initial_errors.sensor_error_bound_at_alarm[hypothesis]
+        * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
+    )
 
 
 @kernel
-def record_refuted(step, initial, exceeded):
-    """Since the alarm: record the tests, of those `exceeded`, that a first error does not explain."""
-    for i in range(N_INITIAL):
-        for t in range(exceeded.size):
-            if exceeded[t] and not initial.refuted[i, t] and exceeds_initial_error_bound(step, initial, i, t):
-                initial.refuted[i, t] = 1
+def record_refuted_hypotheses(redundancy, initial_errors, exceeded_tests):
+    """Record by which of the exceeded_tests (N_TESTS,), since the alarm, each hypothesis is refuted."""
+    refuted = initial_errors.is_refuted_by_test
+    for i in range(N_INITIAL_ERROR_HYPOTHESES):
+        for t in range(exceeded_tests.size):
+            if (
+                exceeded_tests[t]
+                and not refuted[i, t]
+                and exceeds_bound_with_initial_error(redundancy, initial_errors, i, t)
+            ):
+                refuted[i, t] = 1
 
 
 @kernel
-def test_moves_with_error(i, t):
-    """Whether test t moves at once when the error of hypothesis i does."""
-    if i in (PHI_ERROR, THETA_ERROR):
-        return t < ANGLE or t == test_of_error(i)
-    return t == test_of_error(i) or (i == AIRSPEED_ERROR and t == DENSITY)
+def test_reacts_to_error_change(hypothesis, test_index):
+    """Whether a test reacts at once to a change of the error of a hypothesis."""
+    if hypothesis in (PHI_HYPOTHESIS, THETA_HYPOTHESIS):
+        return test_index < ANGLE_TEST or test_index == test_showing_error_change(hypothesis)
+    return test_index == test_showing_error_change(hypothesis) or (
+        hypothesis == AIRSPEED_HYPOTHESIS and test_index == DENSITY_TEST
+    )
 
 
 @kernel
-def initial_error_explains(initial, i, lead):
-    """Whether what has shown since the alarm, led by test `lead`, may be the first error of hypothesis i, and
-    one that moves. Where its moves show in `lead`, those are for sensor_monitor.py: here it has not moved."""
-    for t in range(initial.refuted.shape[1]):
-        if initial.refuted[i, t] and (test_moves_with_error(i, lead) or not test_moves_with_error(i, t)):
+def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test):
+    """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
+    all tests exceeded since the alarm.
+
+    If the test that raised the alarm reacts at once to such a change, sensor_monitor.py judges changes: here
+    the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
+    """
+    for t in range(initial_errors.is_refuted_by_test.shape[1]):
+        if initial_errors.is_refuted_by_test[hypothesis, t] and (
+            test_reacts_to_error_change(hypothesis, alarm_test)
+            or not test_reacts_to_error_change(hypothesis, t)
+        ):
             return False
     return True

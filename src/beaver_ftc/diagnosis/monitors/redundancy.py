@@ -23,10 +23,10 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.air import LEAST_HEIGHT_M, Dryden
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, gust_effect
-from beaver_ftc.diagnosis.detection.filters import bound_step, noise_step
+from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
+from beaver_ftc.design.model import DesignFunctions
+from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_effect
+from beaver_ftc.diagnosis.detection.filters import advance_gyro_error_bound, advance_residual_bound
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -42,7 +42,17 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, MANIFOLD_PRESSURE = (
+(
+    TURN_TEST,
+    ANGLE_TEST,
+    SPEED_TEST,
+    ALPHA_FLOW_TEST,
+    BETA_FLOW_TEST,
+    DENSITY_TEST,
+    CLIMB_TEST,
+    RPM_TEST,
+    MANIFOLD_PRESSURE_TEST,
+) = (
     0,
     3,
     6,
@@ -53,116 +63,144 @@ TURN, ANGLE, SPEED, ALPHA_FLOW, BETA_FLOW, DENSITY, CLIMB, RPM, MANIFOLD_PRESSUR
     11,
     12,
 )
-N_COMPUTED = 13  # tests with an equation; then those of sensors that should equal another reading
-EQUAL = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
-N_TESTS = N_COMPUTED + len(EQUAL)
+N_COMPUTED_TESTS = 13  # tests with an equation; then those of sensors that should equal another reading
+DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
+N_TESTS = N_COMPUTED_TESTS + len(DUPLICATE_SENSORS)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
-TESTS = {
-    "roll": TURN, "pitch": TURN + 1, "yaw": TURN + 2,
-    "bank angle": ANGLE, "pitch angle": ANGLE + 1, "heading": ANGLE + 2,
-    "speed": SPEED, "incidence": ALPHA_FLOW, "sideslip": BETA_FLOW, "density": DENSITY, "climb": CLIMB,
-    "engine speed": RPM, "manifold pressure": MANIFOLD_PRESSURE,
+TEST_NUMBERS = {
+    "roll": TURN_TEST, "pitch": TURN_TEST + 1, "yaw": TURN_TEST + 2,
+    "bank angle": ANGLE_TEST, "pitch angle": ANGLE_TEST + 1, "heading": ANGLE_TEST + 2,
+    "speed": SPEED_TEST, "incidence": ALPHA_FLOW_TEST, "sideslip": BETA_FLOW_TEST, "density": DENSITY_TEST,
+    "climb": CLIMB_TEST, "engine speed": RPM_TEST, "manifold pressure": MANIFOLD_PRESSURE_TEST,
 }  # fmt: skip
-# Of each sensor that should equal another reading: its place, that of the reading, the test in which the
-# reading's own errors appear, and by how much the quantities may differ, SI.
-EQUAL_SENSOR = np.array([i for i, _ in EQUAL], np.int64)
-EQUAL_READING = np.array([SENSORS.index(to.reading) for _, to in EQUAL], np.int64)
-EQUAL_READING_TEST = np.array([TESTS[ROWS[SENSORS.index(to.reading)].test] for _, to in EQUAL], np.int64)
-EQUAL_TOLERANCE = np.array([to.within for _, to in EQUAL], float)
-POLES_PER_S = (1e6, 10.0, 1.0)
-N_POLES = len(POLES_PER_S)
+# Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
+# the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
+# difference of the two quantities, SI.
+DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSORS], np.int64)
+DUPLICATED_READING_INDEX = np.array([SENSORS.index(to.reading) for _, to in DUPLICATE_SENSORS], np.int64)
+DUPLICATED_READING_TEST = np.array(
+    [TEST_NUMBERS[ROWS[SENSORS.index(to.reading)].test] for _, to in DUPLICATE_SENSORS], np.int64
+)
+DUPLICATE_TOLERANCE = np.array([to.within for _, to in DUPLICATE_SENSORS], float)
+FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
+N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
-MAX_FORCE_JUMP_M_S2 = 8.0  # by which no specific force changes from one sample to the next
-UNDECIDED, YES, NO = 0, 1, 2
-MAX_SPEED_RATIO = 1.4  # than in trim a flight may become
-ATTITUDE_CORRECTION_PER_S = 3.0  # a rate that it replaces, where the attitude's own noise is declared
-NEVER_FROZEN = 1_000_000_000  # JSBSim frames: of a reading that resolves less than it scatters
-NAMING_LIMIT_S = 1.0  # for the instrument to be found; then the fault is outside what can be named
+MIN_FAULTY_FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
+GYRO_ERROR_UNDECIDED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED = 0, 1, 2  # of `gyro_error_verdict`
+MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
+ATTITUDE_CORRECTION_PER_S = 3.0  # at which the attitude corrects a replaced rate, if its noise is declared
+FROZEN_SAMPLES_WITHOUT_ROUNDING = 3  # samples of the sensor: so many are never identical without resolution
+FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
+NEVER_FROZEN_SAMPLES = (
+    1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
+)
+ISOLATION_TIME_LIMIT_S = 1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
-# Hypotheses of initial_errors.py: the sensors that may be broken when the monitor begins
-ALPHA_ERROR, BETA_ERROR, AIRSPEED_ERROR, PHI_ERROR, THETA_ERROR = range(5)
-N_INITIAL, N_COUPLINGS = 5, 14
+# Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
+ALPHA_HYPOTHESIS, BETA_HYPOTHESIS, AIRSPEED_HYPOTHESIS, PHI_HYPOTHESIS, THETA_HYPOTHESIS = range(5)
+N_INITIAL_ERROR_HYPOTHESES, N_COUPLINGS = 5, 14
 
-TEST = record(
-    residual=float, rate=float, noise=float, noise_before=float,  # of the elapsed step
-    air=float, bound=N_POLES,  # share of `gust_change_bound` in it; the whole bound
-    filtered=N_POLES, bound_rate=N_POLES, bound_noise=N_POLES, share=float,
+# One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
+# sample, the first for each second of it. gust_gain: effect on the residual of 1 m/s that a gust changes by.
+# filtered_bound: on filtered_residual; filtered_rate_bound, filtered_sample_bound: its parts.
+# residual_bound_ratio: largest |filtered_residual| / filtered_bound over the poles.
+TEST_RECORD = record(
+    residual=float, bound_per_s=float, bound_per_sample=float, previous_bound_per_sample=float,
+    gust_gain=float, filtered_bound=N_POLES,
+    filtered_residual=N_POLES, filtered_rate_bound=N_POLES, filtered_sample_bound=N_POLES,
+    residual_bound_ratio=float,
 )  # fmt: skip
 
-STEP = record(
+REDUNDANCY_RECORD = record(
     config=record(
-        h=float, decay=N_POLES, gravity=float,
-        # of the declared turbulence: its speed at most, m/s, and what passes each filter of a gust's changes
-        # up to an airspeed m/s
-        max_gust_speed=float, gust_change_bound=N_POLES, max_airspeed=float,
-        low=float,  # height below which a gust changes faster than those of 2000 ft, m
-        max_vertical_wind=float,  # vertical wind at most, m/s
-        # declared: the whole error of a reading, and what of it changes; drift of the attitude
-        offset=N_SENSORS, slope=N_SENSORS, steady=N_SENSORS, drift=float,
+        sample_time_s=float, filter_decay=N_POLES, gravity_m_s2=float,
+        # Declared turbulence: bound on a gust's speed; bound on its changes through each filter, which holds
+        # up to max_airspeed_mps, and above low_altitude_limit_m: below it a gust changes faster
+        max_gust_speed_mps=float, gust_change_bound_mps=N_POLES, max_airspeed_mps=float,
+        low_altitude_limit_m=float, max_vertical_wind_mps=float,
+        # Declared errors of a reading z, SI: |error| <= error_offset + error_slope |z|, of which
+        # constant_error does not change
+        error_offset=N_SENSORS, error_slope=N_SENSORS, constant_error=N_SENSORS, attitude_drift_rad_s=float,
     ),
     memory=record(
-        error=N_SENSORS, changing=N_SENSORS,  # how far a reading can be off, and by how much that changes
-        # drift so far, rad; the errors at the sample before, and at the one before that
-        attitude_drift=float, previous_error=N_SENSORS, earlier_error=N_SENSORS,
-        # the sample before: readings, attitude as a quaternion, velocity, acceleration there and before that
-        previous=N_SENSORS, previous_attitude=4, velocity=3, acceleration=3, previous_acceleration=3,
-        # m/s2: size of the acceleration of the elapsed step, and of those before it; of acceleration_then
-        size=float, earlier_sizes=2, previous_size=float,
-        unknown=float,  # of the acceleration of the first step, for want of the instant before
-        predicted=N_SENSORS, scratch=4, now=4,
-        command=2,  # engine speed rpm, manifold pressure inHg
+        # bounds on the error of each reading in this sample, and on the part of it that changes
+        reading_error_bound=N_SENSORS, reading_error_change_bound=N_SENSORS,
+        attitude_drift_bound_rad=float, previous_error_bound=N_SENSORS, error_bound_two_samples_ago=N_SENSORS,
+        # the sample before: readings; attitude; velocity m/s and acceleration m/s2, gravity included, in body
+        # axes; and the acceleration of the sample before that. predict_readings advances the last two vectors
+        previous_reading=N_SENSORS, previous_quaternion=4, body_velocity=3, body_acceleration=3,
+        previous_body_acceleration=3,
+        # m/s2: in the elapsed step, in the two steps before it; of previous_body_acceleration
+        acceleration_magnitude=float, earlier_acceleration_magnitudes=2,
+        previous_acceleration_magnitude=float,
+        first_acceleration_error_bound=float,  # m/s2, in the first step only: no sample precedes it
+        predicted_reading=N_SENSORS, scratch=4, predicted_quaternion=4,
+        engine_command=2,  # engine speed rpm, manifold pressure inHg
     ),
-    test=(TEST, N_TESTS),
+    test=(TEST_RECORD, N_TESTS),
 )  # fmt: skip
 
-INITIAL_ERRORS = record(
-    # of each hypothesis, bounds on its error: at the first sample, now, at the alarm; on its change
-    initial_bound=N_INITIAL, error_bound=N_INITIAL, bound_at_alarm=N_INITIAL, change_bound=N_INITIAL,
-    # largest effect of a unit of the error on a test: in this sample, through the filters; with its sign
-    unit_effect=(N_INITIAL, RPM), filtered_unit_effect=(N_INITIAL, RPM, N_POLES),
-    coupling=N_COUPLINGS, filtered_coupling=(N_COUPLINGS, N_POLES),
-    refuted=(int, N_INITIAL, N_TESTS),  # since the alarm, and by which test
+INITIAL_ERRORS_RECORD = record(
+    # of each hypothesis, bounds on the sensor's error: at the first sample, now, at the alarm; and on the
+    # change of the error since. Units: see initial_errors.py
+    error_bound_at_start=N_INITIAL_ERROR_HYPOTHESES, error_bound=N_INITIAL_ERROR_HYPOTHESES,
+    sensor_error_bound_at_alarm=N_INITIAL_ERROR_HYPOTHESES, error_change_bound=N_INITIAL_ERROR_HYPOTHESES,
+    # bound on the effect of a unit of the error on a residual: in one sample, and through the filters
+    effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
+    filtered_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
+    coupling=N_COUPLINGS, filtered_coupling=(N_COUPLINGS, N_POLES),  # effects of a unit with their sign
+    is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 
-MONITOR_CONFIG = record(
-    enabled=int, instants=int, engine=int, trim=N_SENSORS,
+MONITOR_CONFIG_RECORD = record(
+    enabled=int, substeps=int, has_engine_sensors=int, trim_reading=N_SENSORS,
     attitude_correction_share=float,  # share of its error that a replaced rate corrects in one sample
-    noisy_attitude=int,  # the attitude is noisy: a surface is named only once no gyro can be the cause
-    longest_identical=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
-    damping=(3, 3),
+    attitude_is_noisy=int,  # then a surface is isolated only once no gyro can be the cause
+    min_frozen_samples=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
+    rate_damping_per_s=(3, 3),  # D: body rates decay with rate' = -D rate
 )  # fmt: skip
 
-MONITOR_MEMORY = record(
-    begun=int, started_at_s=float, substep=int, exceeded=(int, N_TESTS),
-    # what tells a gyro from the attitude, by axis
-    gyro_error=3, previous_gyro_error=3,  # as each frame began, rad/s
-    spike=3, previous_spike=3, earlier_spike=3, W=3, W_bound=3, previous_W_bound=3, before=3,
-    # no gyro can be what the rates show: what attitude and W make of that, and how far one gyro goes
-    agreed=(int, max(len(EQUAL), 1)),  # whether a sensor has equalled the reading that it should
-    gyros_excluded=int, rate_difference=(3, N_POLES), rate_difference_bound=(3, N_POLES),
-    rates_confirm=(int, 3), rate_replaced=(int, 3),
-    # accelerometers or flow sensor: number of identical samples; readings two samples ago; sensors cleared
-    identical=(int, N_SENSORS), earlier=N_SENSORS, cleared=(int, N_SENSORS),
-    # largest jump of an accelerometer of late. Since the alarm: samples, residuals of speed, incidence and
-    # sideslip, how much of them is sound, how much is of a first error; least and most of the readings; the
-    # climb that such an incidence makes up; the velocity made up, body axes
-    largest_jump=float, n_summed=int, residual_sum=3, bound_sum=3, first=3, least=3, most=3,
-    climb_error=N_POLES, spurious_velocity=3,
+MONITOR_MEMORY_RECORD = record(
+    start_stage=int, started_at_s=float, substep=int, exceeded_tests=(int, N_TESTS),
+    # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
+    # largest size in the other samples of this frame, of the one before, of the one before that
+    apparent_gyro_error=3, previous_apparent_gyro_error=3,
+    substep_gyro_error_peak=3, previous_substep_gyro_error_peak=3, earlier_substep_gyro_error_peak=3,
+    # W of sensor_monitor.py, rad/s, by axis: the gyro's error if the dynamics are right; and its bound
+    gyro_error_estimate=3, gyro_error_estimate_bound=3, previous_gyro_error_estimate_bound=3,
+    previous_gyro_error_estimate=3,
+    has_agreed=(int, max(len(DUPLICATE_SENSORS), 1)),  # a sensor with the reading that it should equal
+    # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
+    # beyond it no gyro can be broken
+    gyros_excluded=int, gyro_error_difference=(3, N_POLES), gyro_error_difference_bound=(3, N_POLES),
+    gyro_error_verdict=(int, 3), is_rate_replaced=(int, 3),
+    n_identical_samples=(int, N_SENSORS), reading_two_samples_ago=N_SENSORS, is_cleared=(int, N_SENSORS),
+    max_accelerometer_jump=float,  # m/s2, which fades
+    # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
+    # sound sensors, of the part of an initial error; range of the readings
+    n_summed_samples=int, residual_sum=3, bound_sum=3, initial_error_sum=3, min_flow_reading=3,
+    max_flow_reading=3,
+    filtered_climb_error_m=N_POLES,  # of an incidence with the error that its residuals show
+    spurious_velocity=3,  # m/s, body axes: what the residuals add up to
 )  # fmt: skip
 
-MONITOR_OUTPUT = record(
+MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
-    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
-    surface_was_isolated=int,  # a surface had been named in the moment before the alarm
-    lead=int,  # the test that has raised the alarm
-    largest_test=int, share=float,  # of this frame: the test nearest its bound, and how near
-    suspect=(int, N_SENSORS), named=int, named_at_s=float, replaced=(int, N_SENSORS),
+    keeps_isolated_surface=int,  # a surface was found long before, with sound sensors: it stays found
+    surface_was_isolated=int,  # a surface had been isolated just before the alarm
+    alarm_test=int,  # index of the test that has raised the alarm
+    worst_test=int, worst_test_ratio=float,  # test with the largest residual_bound_ratio of this frame
+    is_suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_replaced=(int, N_SENSORS),
 )  # fmt: skip
 
-SENSOR_MONITOR = record(
-    config=MONITOR_CONFIG, memory=MONITOR_MEMORY, output=MONITOR_OUTPUT, step=STEP, initial=INITIAL_ERRORS
+SENSOR_MONITOR_RECORD = record(
+    config=MONITOR_CONFIG_RECORD,
+    memory=MONITOR_MEMORY_RECORD,
+    output=MONITOR_OUTPUT_RECORD,
+    redundancy=REDUNDANCY_RECORD,
+    initial_errors=INITIAL_ERRORS_RECORD,
 )
 
 
@@ -174,172 +212,216 @@ def configure_monitor(
     A monitor that is not `enabled` has found nothing, and its record holds no more than that.
     """
     output, config = monitor["output"], monitor["config"]
-    output["named"], output["alarmed_at_s"], output["named_at_s"] = NO_SENSOR, -1.0, -1.0
+    output["isolated_sensor"], output["alarmed_at_s"], output["isolated_at_s"] = NO_SENSOR, -1.0, -1.0
     config["enabled"] = enabled
     if not enabled:
         return
     declared, initial = Declared.of(scenario), cast("Any", scenario.initial)  # whose keys the aircraft names
-    config["instants"], config["engine"] = scenario.substeps, scenario.airframe.has_engine_instruments
-    config["trim"][3:7] = y[:4]
-    config["damping"] = gust_effect(DesignFunctions(np.array([design])), y)
+    config["substeps"], config["has_engine_sensors"] = (
+        scenario.substeps,
+        scenario.airframe.has_engine_instruments,
+    )
+    config["trim_reading"][3:7] = y[:4]
+    config["rate_damping_per_s"] = air_rotation_effect(DesignFunctions(np.array([design])), y)
     monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
-    if config["engine"]:
-        monitor["step"]["memory"]["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
-    configure_step(monitor["step"]["config"], declared, scenario)
-    configure_readings(monitor, declared, monitor["step"]["config"]["h"])
+    if config["has_engine_sensors"]:
+        monitor["redundancy"]["memory"]["engine_command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_redundancy_tests(monitor["redundancy"]["config"], declared, scenario)
+    configure_declared_errors(monitor, declared, monitor["redundancy"]["config"]["sample_time_s"])
 
 
-def configure_step(step: np.void, declared: Declared, scenario: Scenario) -> None:
-    """Fill what the equations of motion and the gusts are stepped with, a JSBSim frame a step."""
-    initial, h = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
-    step["h"], step["decay"] = h, [exp(-pole * h) for pole in POLES_PER_S]
-    step["gravity"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    step["max_gust_speed"], step["gust_change_bound"] = gust_bounds(declared.air, initial.airspeed_mps, h)
-    step["max_airspeed"] = MAX_SPEED_RATIO * initial.airspeed_mps
-    step["low"], step["max_vertical_wind"] = declared.air.low_m, declared.vertical_wind_mps
+def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Scenario) -> None:
+    """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
+    initial, sample_time_s = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
+    config["sample_time_s"] = sample_time_s
+    config["filter_decay"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
+    config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_bounds(
+        declared.air, initial.airspeed_mps, sample_time_s
+    )
+    config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
+    config["low_altitude_limit_m"] = declared.air.low_m
+    config["max_vertical_wind_mps"] = declared.vertical_wind_mps
 
 
-def configure_readings(monitor: np.void, declared: Declared, h: float) -> None:
-    """Fill the declared errors of the readings; h: seconds of a JSBSim frame."""
-    step, config, errors = monitor["step"]["config"], monitor["config"], declared.sensors
+def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_s: float) -> None:
+    """Fill the declared errors of the readings; a sample is a JSBSim frame."""
+    bounds, config, errors = monitor["redundancy"]["config"], monitor["config"], declared.sensors
     for i, name in enumerate(SENSORS):
         error = errors[name]
-        step["offset"][i], step["slope"][i], step["steady"][i] = error.worst, error.slope, error.steady
-        config["longest_identical"][i] = longest_identical(error.noise, error.resolution) * frames_apart(i, h)
+        bounds["error_offset"][i], bounds["error_slope"][i], bounds["constant_error"][i] = (
+            error.worst,
+            error.slope,
+            error.steady,
+        )
+        config["min_frozen_samples"][i] = min_frozen_samples(error.noise, error.resolution) * frames_apart(
+            i, sample_time_s
+        )
         drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
-        step["drift"] = max(step["drift"], abs(drift_rad_s))
+        bounds["attitude_drift_rad_s"] = max(bounds["attitude_drift_rad_s"], abs(drift_rad_s))
     attitude = slice(PHI, PHI + 3)
-    config["noisy_attitude"] = np.any(step["offset"][attitude] > step["steady"][attitude])
+    config["attitude_is_noisy"] = np.any(
+        bounds["error_offset"][attitude] > bounds["constant_error"][attitude]
+    )
     config["attitude_correction_share"] = (
-        min(1.0, h * ATTITUDE_CORRECTION_PER_S) if config["noisy_attitude"] else 1.0
+        min(1.0, sample_time_s * ATTITUDE_CORRECTION_PER_S) if config["attitude_is_noisy"] else 1.0
     )
 
 
-def longest_identical(noise: float, quantum: float) -> int:
-    """For how many samples no sound sensor, of this noise and resolution, gives the very same reading."""
-    if quantum == 0.0:
-        return 3
-    return 50 if noise > quantum / 4.0 else NEVER_FROZEN
+def min_frozen_samples(noise_std: float, resolution: float) -> int:
+    """Number of identical samples that a sound sensor of this noise and resolution does not give."""
+    if resolution == 0.0:
+        return FROZEN_SAMPLES_WITHOUT_ROUNDING
+    return FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else NEVER_FROZEN_SAMPLES
 
 
-def gust_bounds(air: Dryden, airspeed_mps: float, h: float) -> tuple[float, np.ndarray]:
-    """Bounds on the speed of gusts, m/s, and on what passes each filter of their changes in h s.
+def gust_bounds(air: Dryden, airspeed_mps: float, sample_time_s: float) -> tuple[float, np.ndarray]:
+    """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
 
     The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
-    keeps 1 / 2 lam of it.
+    keeps 1 / 2 lam of its intensity.
     """
-    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, MAX_SPEED_RATIO)
-    kept_s = [h / (1.0 - exp(-2.0 * pole * h)) for pole in POLES_PER_S]
+    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM)
+    kept_s = [sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S]
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 
 
 def sensor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
-    """The verdict's parts as of t_s, where an instrument is found broken; None where none is."""
-    if not monitor["output"]["alarmed"] or monitor["output"]["keeps_surface"]:
+    """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
+    output = monitor["output"]
+    if not output["alarmed"] or output["keeps_isolated_surface"]:
         return None
-    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
-    said["detection_time_s"], said["isolation_time_s"] = float(monitor["output"]["alarmed_at_s"]), None
-    if monitor["output"]["named"] >= 0:
-        said["isolated"] = sensor_words(SENSORS[int(monitor["output"]["named"])])
-        said["isolation_time_s"] = float(monitor["output"]["named_at_s"])
-    elif t_s > said["detection_time_s"] + NAMING_LIMIT_S:
-        said["isolated"] = said["isolation_type"] = "unanticipated"
-        said["isolation_time_s"] = said["detection_time_s"] + NAMING_LIMIT_S
+    finding: dict[str, Any] = {
+        "isolated": None, "isolation_type": None, "estimate": None, "candidates": (),
+        "detection_time_s": float(output["alarmed_at_s"]), "isolation_time_s": None,
+    }  # fmt: skip
+    if output["isolated_sensor"] >= 0:
+        finding["isolated"] = sensor_words(SENSORS[int(output["isolated_sensor"])])
+        finding["isolation_time_s"] = float(output["isolated_at_s"])
+    elif t_s > finding["detection_time_s"] + ISOLATION_TIME_LIMIT_S:
+        finding["isolated"] = finding["isolation_type"] = "unanticipated"
+        finding["isolation_time_s"] = finding["detection_time_s"] + ISOLATION_TIME_LIMIT_S
     else:
-        left = zip(SENSORS, monitor["output"]["suspect"], strict=True)
-        said["candidates"] = tuple(sensor_words(name) for name, possible in left if possible)
-    return said
+        suspects = zip(SENSORS, output["is_suspect"], strict=True)
+        finding["candidates"] = tuple(sensor_words(name) for name, suspected in suspects if suspected)
+    return finding
 
 
-EARTH_TURN_RAD_S = 4e-5  # Earth rate is in the rates; the level turns with the flight over the round Earth
-EARTH_ACCELERATION_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
-DENSITY_SCALE_HEIGHT_M = (
-    6300.0  # over which the density falls by no more than a factor e: in the stratosphere
-)
-STEEPEST_RAD = 1.3  # beyond it, roll and heading cannot be distinguished
+# The rates contain the Earth's, and the level turns as the aircraft flies over the round Earth.
+EARTH_RATE_BOUND_RAD_S = 4e-5
+EARTH_ACCELERATION_BOUND_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
+DENSITY_SCALE_HEIGHT_M = 6300.0  # over which the density falls by a factor e at most: in the stratosphere
+MAX_PITCH_RAD = 1.3  # beyond it, roll and heading cannot be distinguished: the attitude tests restart
+MIN_AIRSPEED_MPS = 1.0  # at least so much where an airspeed divides
+MIN_DYNAMIC_PRESSURE_PA = 1.0  # the same of the dynamic pressure
+MIN_QDYN_PER_AIRSPEED_SQUARED = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
+MIN_PREDICTED_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
+MIN_LOG_BASE_SHARE = 0.01  # of a reading that its constant error leaves, at least, under a logarithm
+READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
+COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
+# JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
+INTEGRATION_WEIGHT, PREVIOUS_INTEGRATION_WEIGHT = 1.5, 0.5
+# It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
+# from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
+POSITION_INTEGRATION_ERROR = 4.0 / 3.0
 
 
 @kernel
 def fill_quaternion(phi, theta, psi, out):
-    """Fill out (4,): the rotation from body to level axes, scalar first."""
-    a, b, c = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
-    d, e, f = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
-    out[0] = a * b * c + d * e * f
-    out[1] = d * b * c - a * e * f
-    out[2] = a * e * c + d * b * f
-    out[3] = a * b * f - d * e * c
+    """Fill out (4,): the rotation from body to level axes, scalar first; Euler angles rad."""
+    cos_phi, cos_theta, cos_psi = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
+    sin_phi, sin_theta, sin_psi = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
+    out[0] = cos_phi * cos_theta * cos_psi + sin_phi * sin_theta * sin_psi
+    out[1] = sin_phi * cos_theta * cos_psi - cos_phi * sin_theta * sin_psi
+    out[2] = cos_phi * sin_theta * cos_psi + sin_phi * cos_theta * sin_psi
+    out[3] = cos_phi * cos_theta * sin_psi - sin_phi * sin_theta * cos_psi
 
 
 @kernel
-def advance_quaternion(q, x, h, out):
-    """Fill out (4,) with q after h s at the rates x (3,) rad/s, one step of Euler's, to unit length."""
-    p, r, s = 0.5 * h * x[0], 0.5 * h * x[1], 0.5 * h * x[2]
-    length = np.sqrt(1.0 + p * p + r * r + s * s)
-    out[0] = (q[0] - q[1] * p - q[2] * r - q[3] * s) / length
-    out[1] = (q[1] + q[0] * p + q[2] * s - q[3] * r) / length
-    out[2] = (q[2] + q[0] * r + q[3] * p - q[1] * s) / length
-    out[3] = (q[3] + q[0] * s + q[1] * r - q[2] * p) / length
+def advance_quaternion(quaternion, rates, duration_s, out):
+    """Fill out (4,): the unit quaternion (4,) after duration_s at body rates (3,) rad/s, one Euler step."""
+    x, y, z = 0.5 * duration_s * rates[0], 0.5 * duration_s * rates[1], 0.5 * duration_s * rates[2]
+    q, length = quaternion, np.sqrt(1.0 + x * x + y * y + z * z)
+    out[0] = (q[0] - q[1] * x - q[2] * y - q[3] * z) / length
+    out[1] = (q[1] + q[0] * x + q[2] * z - q[3] * y) / length
+    out[2] = (q[2] + q[0] * y + q[3] * x - q[1] * z) / length
+    out[3] = (q[3] + q[0] * z + q[1] * y - q[2] * x) / length
 
 
 @kernel
-def angle_between(one, other, axis):
-    """Component (1, 2, 3) along a body axis of the small rotation from one attitude to the other, rad."""
-    a, b, c = axis, axis % 3 + 1, (axis + 1) % 3 + 1
-    along = one[0] * other[a] - one[a] * other[0] - one[b] * other[c] + one[c] * other[b]
-    same = one[0] * other[0] + one[1] * other[1] + one[2] * other[2] + one[3] * other[3]
-    return 2.0 * along if same >= 0.0 else -2.0 * along
+def small_rotation_angle(from_quaternion, to_quaternion, component):
+    """Component (1, 2, 3) in body axes of the small rotation from one attitude (4,) to the other, rad."""
+    one, other, a, b, c = (
+        from_quaternion,
+        to_quaternion,
+        component,
+        component % 3 + 1,
+        (component + 1) % 3 + 1,
+    )
+    half_angle = one[0] * other[a] - one[a] * other[0] - one[b] * other[c] + one[c] * other[b]
+    scalar = one[0] * other[0] + one[1] * other[1] + one[2] * other[2] + one[3] * other[3]
+    return 2.0 * half_angle if scalar >= 0.0 else -2.0 * half_angle
 
 
 @kernel
-def axis_turn_per_angle(step, axis, i):
-    """By how much a body axis turns for what angle i changes by."""
-    bank, tilt = step.memory.previous[PHI], step.memory.previous[THETA]
+def body_turn_per_euler_angle(redundancy, axis, angle):
+    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (angle 0, 1, 2), rad/rad."""
+    phi, theta = redundancy.memory.previous_reading[PHI], redundancy.memory.previous_reading[THETA]
     if axis == 0:
-        return (1.0, 0.0, -np.sin(tilt))[i]
+        return (1.0, 0.0, -np.sin(theta))[angle]
     if axis == 1:
-        return (0.0, np.cos(bank), np.sin(bank) * np.cos(tilt))[i]
-    return (0.0, -np.sin(bank), np.cos(bank) * np.cos(tilt))[i]
+        return (0.0, np.cos(phi), np.sin(phi) * np.cos(theta))[angle]
+    return (0.0, -np.sin(phi), np.cos(phi) * np.cos(theta))[angle]
 
 
 @kernel
-def rotate_to_new_axes(x, h, vector, out):
-    """Fill out (3,): a vector (3,) that stays put, in body axes that turned at x (3,) rad/s for h s."""
-    size = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
-    angle = 2.0 * np.arctan(0.5 * h * size)
-    sine = np.sin(angle) / size if size > 0.0 else 0.0
-    rest = (1.0 - np.cos(angle)) / size**2 if size > 0.0 else 0.0
-    along = x[0] * vector[0] + x[1] * vector[1] + x[2] * vector[2]
+def rotate_to_turned_axes(rates, duration_s, vector, out):
+    """Fill out (3,): the components of a constant vector (3,) in body axes that have turned at rates (3,)
+    rad/s for duration_s."""
+    rate = np.sqrt(rates[0] ** 2 + rates[1] ** 2 + rates[2] ** 2)
+    angle = 2.0 * np.arctan(0.5 * duration_s * rate)
+    sine_per_rate = np.sin(angle) / rate if rate > 0.0 else 0.0
+    versine_per_rate_squared = (1.0 - np.cos(angle)) / rate**2 if rate > 0.0 else 0.0
+    dot = rates[0] * vector[0] + rates[1] * vector[1] + rates[2] * vector[2]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        across = x[j] * vector[k] - x[k] * vector[j]
-        out[i] = vector[i] - sine * across + rest * (x[i] * along - size**2 * vector[i])
+        cross = rates[j] * vector[k] - rates[k] * vector[j]
+        out[i] = (
+            vector[i]
+            - sine_per_rate * cross
+            + versine_per_rate_squared * (rates[i] * dot - rate**2 * vector[i])
+        )
 
 
 @kernel
-def fill_reading_errors(step, signal):
-    """Fill error and changing (N_SENSORS,): how far each reading can be off, and by how much that changes."""
+def fill_reading_error_bounds(redundancy, signal):
+    """Fill the bounds on the error of each reading in signal (N_SENSORS,), and on the part that changes."""
+    config, memory = redundancy.config, redundancy.memory
     for i in range(N_SENSORS):
         size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
-        whole = (step.config.offset[i] + step.config.slope[i] * size) / (1.0 - step.config.slope[i])
-        step.memory.error[i] = whole
-        step.memory.changing[i] = whole - step.config.steady[i] + 1e-10 * abs(signal[i])
+        whole = (config.error_offset[i] + config.error_slope[i] * size) / (1.0 - config.error_slope[i])
+        memory.reading_error_bound[i] = whole
+        memory.reading_error_change_bound[i] = (
+            whole - config.constant_error[i] + READING_ROUNDING * abs(signal[i])
+        )
     for i in range(PHI, PHI + 3):
-        step.memory.error[i] += step.memory.attitude_drift
+        memory.reading_error_bound[i] += memory.attitude_drift_bound_rad
 
 
 @kernel
-def store_sample(step, signal, force):
-    """Store this sample for the next one; signal (N_SENSORS,) SI, force (3,) m/s2."""
-    step.memory.previous[:], step.memory.earlier_error[:] = signal, step.memory.previous_error
-    step.memory.previous_error[:] = step.memory.error
-    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.previous_attitude)
+def store_sample(redundancy, signal, specific_force):
+    """Store this sample for the next one; signal (N_SENSORS,) SI, specific_force (3,) m/s2."""
+    memory, gravity = redundancy.memory, redundancy.config.gravity_m_s2
+    memory.previous_reading[:], memory.error_bound_two_samples_ago[:] = signal, memory.previous_error_bound
+    memory.previous_error_bound[:] = memory.reading_error_bound
+    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], memory.previous_quaternion)
     alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
-    step.memory.velocity[0] = V * np.cos(alpha) * np.cos(beta)
-    step.memory.velocity[1], step.memory.velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    tilt, bank = signal[THETA], signal[PHI]
-    step.memory.acceleration[0] = force[0] - step.config.gravity * np.sin(tilt)
-    step.memory.acceleration[1] = force[1] + step.config.gravity * np.cos(tilt) * np.sin(bank)
-    step.memory.acceleration[2] = force[2] + step.config.gravity * np.cos(tilt) * np.cos(bank)
+    memory.body_velocity[0] = V * np.cos(alpha) * np.cos(beta)
+    memory.body_velocity[1], memory.body_velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
+    theta, phi = signal[THETA], signal[PHI]
+    memory.body_acceleration[0] = specific_force[0] - gravity * np.sin(theta)
+    memory.body_acceleration[1] = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
+    memory.body_acceleration[2] = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
 
 
 @kernel
@@ -349,278 +431,402 @@ def vector_length(vector):
 
 
 @kernel
-def predict_readings(step):
-    """Fill predicted (N_SENSORS,): attitude, flow and altitude now, from the sample before."""
-    rates, h, out, moved = (
-        step.memory.previous[:3],
-        step.config.h,
-        step.memory.predicted,
-        step.memory.scratch[:3],
+def predict_readings(redundancy):
+    """Fill predicted_reading (N_SENSORS,): attitude, flow and altitude now, from the sample before.
+
+    Afterwards body_velocity is the predicted one, and previous_body_acceleration that of the sample before in
+    the present body axes.
+    """
+    memory, h = redundancy.memory, redundancy.config.sample_time_s
+    rates, predicted, moved = memory.previous_reading[:3], memory.predicted_reading, memory.scratch[:3]
+    advance_quaternion(memory.previous_quaternion, rates, h, memory.predicted_quaternion)
+    q0, q1, q2, q3 = (
+        memory.predicted_quaternion[0],
+        memory.predicted_quaternion[1],
+        memory.predicted_quaternion[2],
+        memory.predicted_quaternion[3],
     )
-    advance_quaternion(step.memory.previous_attitude, rates, h, step.memory.now)
-    a, b, c, d = step.memory.now[0], step.memory.now[1], step.memory.now[2], step.memory.now[3]
-    out[PHI] = np.arctan2(2.0 * (a * b + c * d), 1.0 - 2.0 * (b * b + c * c))
-    out[THETA] = np.arcsin(min(max(2.0 * (a * c - b * d), -1.0), 1.0))
-    out[PSI] = np.arctan2(2.0 * (a * d + b * c), 1.0 - 2.0 * (c * c + d * d))
-    tilt, bank, v = step.memory.previous[THETA], step.memory.previous[PHI], step.memory.velocity
-    up = v[0] * np.sin(tilt) - v[1] * np.sin(bank) * np.cos(tilt) - v[2] * np.cos(bank) * np.cos(tilt)
-    out[ALTITUDE] = step.memory.previous[ALTITUDE] + h * up
-    step.memory.earlier_sizes[1], step.memory.earlier_sizes[0] = (
-        step.memory.earlier_sizes[0],
-        step.memory.size,
+    predicted[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
+    predicted[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
+    predicted[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
+    theta, phi, v = memory.previous_reading[THETA], memory.previous_reading[PHI], memory.body_velocity
+    climb_rate = (
+        v[0] * np.sin(theta) - v[1] * np.sin(phi) * np.cos(theta) - v[2] * np.cos(phi) * np.cos(theta)
     )
-    step.memory.previous_size = vector_length(step.memory.previous_acceleration)
+    predicted[ALTITUDE] = memory.previous_reading[ALTITUDE] + h * climb_rate
+    memory.earlier_acceleration_magnitudes[1], memory.earlier_acceleration_magnitudes[0] = (
+        memory.earlier_acceleration_magnitudes[0],
+        memory.acceleration_magnitude,
+    )
+    memory.previous_acceleration_magnitude = vector_length(memory.previous_body_acceleration)
     for i in range(3):
-        moved[i] = 1.5 * step.memory.acceleration[i] - 0.5 * step.memory.previous_acceleration[i]
-    step.memory.size = vector_length(moved)
+        moved[i] = (
+            INTEGRATION_WEIGHT * memory.body_acceleration[i]
+            - PREVIOUS_INTEGRATION_WEIGHT * memory.previous_body_acceleration[i]
+        )
+    memory.acceleration_magnitude = vector_length(moved)
     for i in range(3):
         moved[i] = v[i] + h * moved[i]
-    rotate_to_new_axes(rates, h, moved, v)
-    rotate_to_new_axes(rates, h, step.memory.acceleration, step.memory.previous_acceleration)
+    rotate_to_turned_axes(rates, h, moved, v)
+    rotate_to_turned_axes(rates, h, memory.body_acceleration, memory.previous_body_acceleration)
     speed = vector_length(v)
-    out[AIRSPEED] = speed
-    out[ALPHA], out[BETA] = np.arctan2(v[2], v[0]), np.arcsin(v[1] / max(speed, 1e-3))
+    predicted[AIRSPEED] = speed
+    predicted[ALPHA] = np.arctan2(v[2], v[0])
+    predicted[BETA] = np.arcsin(v[1] / max(speed, MIN_PREDICTED_SPEED_MPS))
 
 
 @kernel
-def fill_residuals(step, signal):
-    """Fill the residual of each test with what the readings (N_SENSORS,) are beyond what was predicted."""
-    test, predicted = step.test, step.memory.predicted
-    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], step.memory.scratch)
+def fill_residuals(redundancy, signal):
+    """Fill the residual of each test: readings (N_SENSORS,) minus their prediction."""
+    test, memory, predicted = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
+    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], memory.scratch)
     for i in range(3):
-        test[TURN + i].residual = angle_between(step.memory.now, step.memory.scratch, i + 1)
-        test[ANGLE + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
-    test[SPEED].residual = signal[AIRSPEED] - predicted[AIRSPEED]
-    test[ALPHA_FLOW].residual = signal[ALPHA] - predicted[ALPHA]
-    test[BETA_FLOW].residual = signal[BETA] - predicted[BETA]
-    dense, dense_then = (
+        test[TURN_TEST + i].residual = small_rotation_angle(
+            memory.predicted_quaternion, memory.scratch, i + 1
+        )
+        test[ANGLE_TEST + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
+    test[SPEED_TEST].residual = signal[AIRSPEED] - predicted[AIRSPEED]
+    test[ALPHA_FLOW_TEST].residual = signal[ALPHA] - predicted[ALPHA]
+    test[BETA_FLOW_TEST].residual = signal[BETA] - predicted[BETA]
+    half_density, previous_half_density = (
         signal[QDYN] / signal[AIRSPEED] ** 2,
-        step.memory.previous[QDYN] / step.memory.previous[AIRSPEED] ** 2,
+        memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2,
     )
-    test[DENSITY].residual = np.log(max(dense, 1e-9) / max(dense_then, 1e-9))
-    test[CLIMB].residual = signal[ALTITUDE] - predicted[ALTITUDE]
+    test[DENSITY_TEST].residual = np.log(
+        max(half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
+        / max(previous_half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
+    )
+    test[CLIMB_TEST].residual = signal[ALTITUDE] - predicted[ALTITUDE]
 
 
 @kernel
-def steepest_pitch_angle(step, signal):
-    """How far from level the nose can have been since the sample before, rad."""
+def max_pitch_angle(redundancy, signal):
+    """Bound |theta| in this sample and the one before, rad, by readings and their errors."""
+    memory = redundancy.memory
     return max(
-        abs(signal[THETA]) + step.memory.error[THETA],
-        abs(step.memory.previous[THETA]) + step.memory.previous_error[THETA],
+        abs(signal[THETA]) + memory.reading_error_bound[THETA],
+        abs(memory.previous_reading[THETA]) + memory.previous_error_bound[THETA],
     )
 
 
 @kernel
-def two_step_error(step, i):
-    """How far off 3/2 a - 1/2 a_then can be by what reading i is off at the two instants: a constant counts
-    once."""
-    return 1.5 * step.memory.previous_error[i] + 0.5 * step.memory.earlier_error[i] - step.config.steady[i]
+def extrapolated_error_bound(redundancy, i):
+    """Bound the error of 3/2 a - 1/2 a_before by the errors of reading i in the two samples. A constant error
+    counts once."""
+    return (
+        INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[i]
+        + PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[i]
+        - redundancy.config.constant_error[i]
+    )
 
 
 @kernel
-def acceleration_error(step, turning, rates):
-    """How far off the acceleration of the elapsed step can be, m/s2: by accelerometers, by gravity sought
-    where the attitude has it, by turning the one before back. turning; rates: of gyros, errors; rad/s."""
-    tilt, g = two_step_error(step, PHI) + two_step_error(step, THETA), step.config.gravity
-    felt, steady = 0.0, g * (step.config.steady[PHI] + step.config.steady[THETA])
+def acceleration_error_bound(redundancy, turn_rate, gyro_error):
+    """Bound the error of the acceleration of the elapsed step, m/s2.
+
+    Its parts: errors of the accelerometers; gravity in the direction that the attitude gives it; turning the
+    previous acceleration into the present axes. turn_rate, gyro_error: see bound_residuals, rad/s.
+    """
+    config, memory = redundancy.config, redundancy.memory
+    tilt_error = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
+    gravity = config.gravity_m_s2
+    force_error_squared = 0.0
+    constant = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
     for i in range(AX, AX + 3):
-        felt += two_step_error(step, i) ** 2
-        steady += step.config.steady[i]
-    back = step.config.h * (turning * steady + 0.5 * rates * step.memory.previous_size)
-    return EARTH_ACCELERATION_M_S2 + step.memory.unknown + g * tilt + np.sqrt(felt) + back
+        force_error_squared += extrapolated_error_bound(redundancy, i) ** 2
+        constant += config.constant_error[i]
+    turning_error = config.sample_time_s * (
+        turn_rate * constant
+        + PREVIOUS_INTEGRATION_WEIGHT * gyro_error * memory.previous_acceleration_magnitude
+    )
+    return (
+        EARTH_ACCELERATION_BOUND_M_S2
+        + memory.first_acceleration_error_bound
+        + gravity * tilt_error
+        + np.sqrt(force_error_squared)
+        + turning_error
+    )
 
 
 @kernel
-def bound_attitude_tests(step, signal, turning, rates):
-    """The same as `bound_residuals`, of attitude.
+def bound_attitude_tests(redundancy, signal, turn_rate, gyro_error):
+    """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
-    test, E, n = step.test, step.memory.previous_error, step.memory.changing
-    level = 1.0 / np.cos(min(steepest_pitch_angle(step, signal), STEEPEST_RAD))
-    tilt, around = E[PHI] + E[THETA] + E[PSI], step.config.h * turning
-    tipped = abs(signal[PHI] - step.memory.previous[PHI]) + abs(signal[THETA] - step.memory.previous[THETA])
-    momentary = E[THETA] - step.config.steady[THETA] + E[PSI] - step.config.steady[PSI] + n[THETA] + n[PSI]
+    test, config, memory = redundancy.test, redundancy.config, redundancy.memory
+    previous_error, error_change = memory.previous_error_bound, memory.reading_error_change_bound
+    secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, signal), MAX_PITCH_RAD))
+    attitude_error = previous_error[PHI] + previous_error[THETA] + previous_error[PSI]
+    turn = config.sample_time_s * turn_rate
+    tilt_change = abs(signal[PHI] - memory.previous_reading[PHI]) + abs(
+        signal[THETA] - memory.previous_reading[THETA]
+    )
+    momentary_error = (
+        previous_error[THETA]
+        - config.constant_error[THETA]
+        + previous_error[PSI]
+        - config.constant_error[PSI]
+        + error_change[THETA]
+        + error_change[PSI]
+    )
     for i in range(3):
-        by_attitude = turning * (tilt + level * E[THETA]) + tipped * momentary / step.config.h
-        test[TURN + i].rate = (
-            EARTH_TURN_RAD_S + 2.0 * step.config.drift + E[P + i] + around * rates + by_attitude
+        by_attitude = (
+            turn_rate * (attitude_error + secant * previous_error[THETA])
+            + tilt_change * momentary_error / config.sample_time_s
         )
-        by_attitude = 2.0 * level * turning * (E[PHI] + E[THETA])
-        off = EARTH_TURN_RAD_S + (1.0 + level * around) * rates + by_attitude
-        test[ANGLE + i].rate, test[ANGLE + i].noise = level * off + step.config.drift, n[PHI + i]
-    tilted, banked = abs(np.sin(signal[THETA])) + n[THETA], abs(np.sin(signal[PHI])) + n[PHI]
-    test[TURN].noise = n[PHI] + tilted * n[PSI]
-    test[TURN + 1].noise = n[THETA] + banked * n[PSI]
-    test[TURN + 2].noise = n[PSI] + banked * n[THETA]
+        test[TURN_TEST + i].bound_per_s = (
+            EARTH_RATE_BOUND_RAD_S
+            + 2.0 * config.attitude_drift_rad_s
+            + previous_error[P + i]
+            + turn * gyro_error
+            + by_attitude
+        )
+        by_attitude = 2.0 * secant * turn_rate * (previous_error[PHI] + previous_error[THETA])
+        rate_error = EARTH_RATE_BOUND_RAD_S + (1.0 + secant * turn) * gyro_error + by_attitude
+        test[ANGLE_TEST + i].bound_per_s, test[ANGLE_TEST + i].bound_per_sample = (
+            secant * rate_error + config.attitude_drift_rad_s,
+            error_change[PHI + i],
+        )
+    sine_theta = abs(np.sin(signal[THETA])) + error_change[THETA]
+    sine_phi = abs(np.sin(signal[PHI])) + error_change[PHI]
+    test[TURN_TEST].bound_per_sample = error_change[PHI] + sine_theta * error_change[PSI]
+    test[TURN_TEST + 1].bound_per_sample = error_change[THETA] + sine_phi * error_change[PSI]
+    test[TURN_TEST + 2].bound_per_sample = error_change[PSI] + sine_phi * error_change[THETA]
 
 
 @kernel
-def lowest_sample_height(step, signal):
-    """The least height of the two samples, m, within the altimeter's error."""
-    now, then = (
-        signal[ALTITUDE] - step.memory.error[ALTITUDE],
-        step.memory.previous[ALTITUDE] - step.memory.previous_error[ALTITUDE],
+def min_sample_height(redundancy, signal):
+    """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
+    memory = redundancy.memory
+    height, previous_height = (
+        signal[ALTITUDE] - memory.reading_error_bound[ALTITUDE],
+        memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE],
     )
-    return max(min(now, then), LEAST_HEIGHT_M)
+    return max(min(height, previous_height), LEAST_HEIGHT_M)
 
 
 @kernel
-def bound_flow_tests(step, signal, turning, rates):
-    """The same, of flow and climb: slopes of their kinematics with each reading, where they are greatest."""
-    test, e, E, n = step.test, step.memory.error, step.memory.previous_error, step.memory.changing
-    slow = max(min(signal[AIRSPEED] - e[AIRSPEED], step.memory.previous[AIRSPEED] - E[AIRSPEED]), 1.0)
-    slip = max(abs(signal[BETA]) + e[BETA], abs(step.memory.previous[BETA]) + E[BETA])
-    aslant, vanes = 1.0 / np.cos(min(slip, STEEPEST_RAD)), E[ALPHA] + E[BETA]
-    off = acceleration_error(step, turning, rates)
-    pull, coarse = step.memory.size + off, 1.0 + step.config.h * (2.0 * step.memory.size / slow + turning)
-    gusty = np.sqrt(
-        max(signal[AIRSPEED] / step.config.max_airspeed, 1.0)
-        * max(step.config.low / lowest_sample_height(step, signal), 1.0)
+def bound_flow_tests(redundancy, signal, turn_rate, gyro_error):
+    """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
+    kinematics with respect to each reading, times the bound on the reading's error."""
+    test, config, memory = redundancy.test, redundancy.config, redundancy.memory
+    error, previous_error = memory.reading_error_bound, memory.previous_error_bound
+    error_change, previous_reading = memory.reading_error_change_bound, memory.previous_reading
+    min_airspeed = max(
+        min(signal[AIRSPEED] - error[AIRSPEED], previous_reading[AIRSPEED] - previous_error[AIRSPEED]),
+        MIN_AIRSPEED_MPS,
     )
-    flow = aslant**2 * ((off + pull * (vanes + E[AIRSPEED] / slow)) / slow + turning * vanes) + aslant * rates
-    test[SPEED].air, test[SPEED].noise = gusty, n[AIRSPEED]
-    test[SPEED].rate = off + coarse * pull * vanes + step.config.h * (pull / slow) ** 2 * E[AIRSPEED]
-    for c, vane in ((ALPHA_FLOW, ALPHA), (BETA_FLOW, BETA)):
-        test[c].air, test[c].noise, test[c].rate = gusty * aslant / slow, n[vane], coarse * flow
-    tilt, hardest = E[PHI] + E[THETA], max(pull, step.memory.earlier_sizes[0], step.memory.earlier_sizes[1])
-    climb = (step.memory.previous[AIRSPEED] + E[AIRSPEED]) * (tilt + vanes) + E[AIRSPEED]
-    test[CLIMB].rate = (
-        step.config.max_vertical_wind
-        + step.config.max_gust_speed
-        + climb
-        + 4.0 / 3.0 * step.config.h * hardest
+    max_sideslip = max(abs(signal[BETA]) + error[BETA], abs(previous_reading[BETA]) + previous_error[BETA])
+    secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    vane_error = previous_error[ALPHA] + previous_error[BETA]
+    acceleration_error = acceleration_error_bound(redundancy, turn_rate, gyro_error)
+    max_acceleration = memory.acceleration_magnitude + acceleration_error
+    second_order = 1.0 + config.sample_time_s * (
+        2.0 * memory.acceleration_magnitude / min_airspeed + turn_rate
     )
-    test[CLIMB].noise = n[ALTITUDE]
-
-
-@kernel
-def log_change_error(step, signal, i):
-    """How far the logarithm of a quantity can seem to move, the reading of which is off by a constant."""
-    least = max(min(signal[i], step.memory.previous[i]), 1.0)
-    moved = step.config.steady[i] * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(step.memory.previous[i], 1.0))
-    return moved / max(1.0 - step.config.steady[i] / least, 0.01)
-
-
-@kernel
-def bound_density_test(step, signal):
-    """The same, of the logarithm of the density."""
-    test, e, n = step.test[DENSITY], step.memory.error, step.memory.changing
-    fastest = (
-        step.memory.previous[AIRSPEED]
-        + step.memory.previous_error[AIRSPEED]
-        + step.config.max_vertical_wind
-        + step.config.max_gust_speed
+    gust_factor = np.sqrt(
+        max(signal[AIRSPEED] / config.max_airspeed_mps, 1.0)
+        * max(config.low_altitude_limit_m / min_sample_height(redundancy, signal), 1.0)
     )
-    seems = log_change_error(step, signal, QDYN) + 2.0 * log_change_error(step, signal, AIRSPEED)
-    test.rate = fastest / DENSITY_SCALE_HEIGHT_M + seems / step.config.h
-    test.noise = n[QDYN] / max(signal[QDYN] - e[QDYN], 1.0)
-    test.noise += 2.0 * n[AIRSPEED] / max(signal[AIRSPEED] - e[AIRSPEED], 1.0)
+    flow_rate_error = (
+        secant**2
+        * (
+            (acceleration_error + max_acceleration * (vane_error + previous_error[AIRSPEED] / min_airspeed))
+            / min_airspeed
+            + turn_rate * vane_error
+        )
+        + secant * gyro_error
+    )
+    test[SPEED_TEST].gust_gain, test[SPEED_TEST].bound_per_sample = gust_factor, error_change[AIRSPEED]
+    test[SPEED_TEST].bound_per_s = (
+        acceleration_error
+        + second_order * max_acceleration * vane_error
+        + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error[AIRSPEED]
+    )
+    for c, vane in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
+        test[c].gust_gain, test[c].bound_per_sample, test[c].bound_per_s = (
+            gust_factor * secant / min_airspeed,
+            error_change[vane],
+            second_order * flow_rate_error,
+        )
+    tilt_error, largest_acceleration = (
+        previous_error[PHI] + previous_error[THETA],
+        max(
+            max_acceleration,
+            memory.earlier_acceleration_magnitudes[0],
+            memory.earlier_acceleration_magnitudes[1],
+        ),
+    )
+    climb_rate_error = (previous_reading[AIRSPEED] + previous_error[AIRSPEED]) * (
+        tilt_error + vane_error
+    ) + previous_error[AIRSPEED]
+    test[CLIMB_TEST].bound_per_s = (
+        config.max_vertical_wind_mps
+        + config.max_gust_speed_mps
+        + climb_rate_error
+        + POSITION_INTEGRATION_ERROR * config.sample_time_s * largest_acceleration
+    )
+    test[CLIMB_TEST].bound_per_sample = error_change[ALTITUDE]
 
 
 @kernel
-def bound_residuals(step, signal):
-    """Fill what sound instruments with the declared errors may add to each residual: per second, at all.
+def log_change_error_bound(redundancy, signal, i):
+    """Bound the apparent change of the logarithm of reading i, qdyn or airspeed, by its constant error."""
+    constant, previous = redundancy.config.constant_error[i], redundancy.memory.previous_reading[i]
+    smallest = max(min(signal[i], previous), 1.0)
+    change = constant * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(previous, 1.0))
+    return change / max(1.0 - constant / smallest, MIN_LOG_BASE_SHARE)
 
-    The prediction is off by the errors of the readings from which it was made (E, of the sample before),
-    what it is held against by those of now.
+
+@kernel
+def bound_density_test(redundancy, signal):
+    """Fill the bounds of `bound_residuals` for the logarithm of the density."""
+    test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
+    error, error_change = memory.reading_error_bound, memory.reading_error_change_bound
+    max_climb_rate = (
+        memory.previous_reading[AIRSPEED]
+        + memory.previous_error_bound[AIRSPEED]
+        + config.max_vertical_wind_mps
+        + config.max_gust_speed_mps
+    )
+    apparent_change = log_change_error_bound(redundancy, signal, QDYN) + 2.0 * log_change_error_bound(
+        redundancy, signal, AIRSPEED
+    )
+    test.bound_per_s = max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_change / config.sample_time_s
+    test.bound_per_sample = error_change[QDYN] / max(signal[QDYN] - error[QDYN], MIN_DYNAMIC_PRESSURE_PA)
+    test.bound_per_sample += (
+        2.0 * error_change[AIRSPEED] / max(signal[AIRSPEED] - error[AIRSPEED], MIN_AIRSPEED_MPS)
+    )
+
+
+@kernel
+def bound_residuals(redundancy, signal):
+    """Fill bound_per_s and bound_per_sample of each test: the largest effect of sound sensors with the
+    declared errors.
+
+    The errors of the previous sample act through the prediction, those of this sample, signal (N_SENSORS,),
+    through the reading that is compared with it. gyro_error: sum of the bounds of the three gyros;
+    turn_rate: bound on |p| + |q| + |r|; rad/s.
     """
-    E = step.memory.previous_error
-    rates = E[P] + E[Q] + E[R]
-    turning = (
-        abs(step.memory.previous[P]) + abs(step.memory.previous[Q]) + abs(step.memory.previous[R]) + rates
-    )
-    bound_attitude_tests(step, signal, turning, rates)
-    bound_flow_tests(step, signal, turning, rates)
-    bound_density_test(step, signal)
+    error, reading = redundancy.memory.previous_error_bound, redundancy.memory.previous_reading
+    gyro_error = error[P] + error[Q] + error[R]
+    turn_rate = abs(reading[P]) + abs(reading[Q]) + abs(reading[R]) + gyro_error
+    bound_attitude_tests(redundancy, signal, turn_rate, gyro_error)
+    bound_flow_tests(redundancy, signal, turn_rate, gyro_error)
+    bound_density_test(redundancy, signal)
 
 
 @kernel
-def filter_test(step, test):
-    """Pass one residual through its filters; note the largest share of a bound."""
-    test.share = 0.0
-    for m, a in enumerate(step.config.decay):
-        test.filtered[m] = a * test.filtered[m] + test.residual
-        test.bound_rate[m] = bound_step(test.bound_rate[m], test.rate, a, step.config.h)
-        test.bound_noise[m] = noise_step(test.bound_noise[m], test.noise_before, a)
-        noise = test.bound_noise[m] + test.noise
-        test.bound[m] = test.bound_rate[m] + noise + test.air * step.config.gust_change_bound[m]
-        test.share = max(test.share, abs(test.filtered[m]) / test.bound[m])
-    test.noise_before = test.noise
+def filter_residual(redundancy, test):
+    """Pass one test's residual through its filters, and find its largest ratio to the bound."""
+    config = redundancy.config
+    test.residual_bound_ratio = 0.0
+    for m, decay in enumerate(config.filter_decay):
+        test.filtered_residual[m] = decay * test.filtered_residual[m] + test.residual
+        test.filtered_rate_bound[m] = advance_residual_bound(
+            test.filtered_rate_bound[m], test.bound_per_s, decay, config.sample_time_s
+        )
+        test.filtered_sample_bound[m] = advance_gyro_error_bound(
+            test.filtered_sample_bound[m], test.previous_bound_per_sample, decay
+        )
+        sample_bound = test.filtered_sample_bound[m] + test.bound_per_sample
+        test.filtered_bound[m] = (
+            test.filtered_rate_bound[m] + sample_bound + test.gust_gain * config.gust_change_bound_mps[m]
+        )
+        test.residual_bound_ratio = max(
+            test.residual_bound_ratio, abs(test.filtered_residual[m]) / test.filtered_bound[m]
+        )
+    test.previous_bound_per_sample = test.bound_per_sample
 
 
 @kernel
-def start_test(test):
-    """Begin a test with this sample: its filters are empty, and all of the noise may still appear."""
-    test.share = test.residual = 0.0
-    test.filtered[:], test.bound_rate[:], test.bound_noise[:] = 0.0, 0.0, test.noise
-    test.noise_before = test.noise
+def restart_test(test):
+    """Restart a test with this sample: its filters are empty, and the whole bound per sample is still due."""
+    test.residual_bound_ratio = test.residual = 0.0
+    test.filtered_residual[:], test.filtered_rate_bound[:] = 0.0, 0.0
+    test.filtered_sample_bound[:] = test.bound_per_sample
+    test.previous_bound_per_sample = test.bound_per_sample
 
 
 @kernel
-def test_engine(step, signal):
-    """The engine's instruments against what was commanded: no filter, an error is there or not."""
-    step.test[RPM].residual = signal[ENGINE_SPEED] - step.memory.command[0]
-    step.test[RPM + 1].residual = signal[MANIFOLD] - step.memory.command[1]
-    for which in range(2):
-        size = step.memory.error[ENGINE_SPEED + which] + 1e-6
-        step.test[RPM + which].share = abs(step.test[RPM + which].residual) / size
+def compare_engine_sensors(redundancy, signal):
+    """Compare the engine's readings with the command. There is no filter: each sample is judged alone."""
+    memory = redundancy.memory
+    redundancy.test[RPM_TEST].residual = signal[ENGINE_SPEED] - memory.engine_command[0]
+    redundancy.test[RPM_TEST + 1].residual = signal[MANIFOLD] - memory.engine_command[1]
+    for i in range(2):
+        bound = memory.reading_error_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
+        redundancy.test[RPM_TEST + i].residual_bound_ratio = (
+            abs(redundancy.test[RPM_TEST + i].residual) / bound
+        )
 
 
 @kernel
-def test_equal_sensors(step, signal, fresh):
-    """Compare each sensor that should equal a reading with that reading, when it gives a new sample, `fresh`:
-    beyond what the errors of both and the two quantities may differ by, one of the two is broken."""
-    for k in range(EQUAL_SENSOR.size):
-        i, reading, test = EQUAL_SENSOR[k], EQUAL_READING[k], step.test[N_COMPUTED + k]
-        test.share = 0.0
-        if fresh[i - N_IN_EQUATIONS]:
-            test.residual = signal[i] - signal[reading]
+def compare_duplicate_sensors(redundancy, signal, fresh):
+    """Compare each sensor that should equal another reading with that reading, in the samples in which it is
+    `fresh` (sampled sensors,). If they differ by more than the errors of both and the tolerance of the two
+    quantities, one of the two is broken."""
+    memory = redundancy.memory
+    for k in range(DUPLICATE_SENSOR_INDEX.size):
+        sensor, reading = DUPLICATE_SENSOR_INDEX[k], DUPLICATED_READING_INDEX[k]
+        test = redundancy.test[N_COMPUTED_TESTS + k]
+        test.residual_bound_ratio = 0.0
+        if fresh[sensor - N_IN_EQUATIONS]:
+            test.residual = signal[sensor] - signal[reading]
             if PHI <= reading <= PSI:
                 test.residual = wrapped(test.residual)
-            test.bound[0] = EQUAL_TOLERANCE[k] + step.memory.error[i] + step.memory.error[reading] + 1e-6
-            test.share = abs(test.residual) / test.bound[0]
+            test.filtered_bound[0] = (
+                DUPLICATE_TOLERANCE[k]
+                + memory.reading_error_bound[sensor]
+                + memory.reading_error_bound[reading]
+                + COMPARISON_ROUNDING
+            )
+            test.residual_bound_ratio = abs(test.residual) / test.filtered_bound[0]
 
 
 @kernel
-def begin_tests(step, signal, force):
-    """Begin with the first sample: the readings before it are not known."""
-    fill_reading_errors(step, signal)
-    store_sample(step, signal, force)
-    step.memory.earlier_error[:], step.memory.previous_acceleration[:] = (
-        step.memory.previous_error,
-        step.memory.acceleration,
+def start_redundancy_tests(redundancy, signal, specific_force):
+    """Start with the first sample, before which no reading is known: signal (N_SENSORS,), specific_force (3,)
+    m/s2."""
+    memory = redundancy.memory
+    fill_reading_error_bounds(redundancy, signal)
+    store_sample(redundancy, signal, specific_force)
+    memory.error_bound_two_samples_ago[:], memory.previous_body_acceleration[:] = (
+        memory.previous_error_bound,
+        memory.body_acceleration,
     )
-    step.memory.size = step.memory.earlier_sizes[0] = (
-        vector_length(step.memory.acceleration) + MAX_FORCE_JUMP_M_S2
+    memory.acceleration_magnitude = memory.earlier_acceleration_magnitudes[0] = (
+        vector_length(memory.body_acceleration) + MIN_FAULTY_FORCE_JUMP_M_S2
     )
-    step.memory.unknown = 0.5 * MAX_FORCE_JUMP_M_S2
-    bound_residuals(step, signal)
-    for c in range(RPM):
-        start_test(step.test[c])
+    memory.first_acceleration_error_bound = PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
+    bound_residuals(redundancy, signal)
+    for c in range(RPM_TEST):
+        restart_test(redundancy.test[c])
 
 
 @kernel
-def run_tests(step, signal, engine):
-    """Compare this sample of the readings (N_SENSORS,) with the one before; engine: it has instruments."""
-    step.memory.attitude_drift += step.config.h * step.config.drift
-    fill_reading_errors(step, signal)
-    predict_readings(step)
-    fill_residuals(step, signal)
-    bound_residuals(step, signal)
-    step.memory.unknown = 0.0
-    steep = steepest_pitch_angle(step, signal) > STEEPEST_RAD
-    for c in range(RPM):
-        if steep and c < SPEED:
-            start_test(step.test[c])
+def run_redundancy_tests(redundancy, signal, has_engine_sensors):
+    """Compare this sample of the readings (N_SENSORS,) with the one before."""
+    config, memory = redundancy.config, redundancy.memory
+    memory.attitude_drift_bound_rad += config.sample_time_s * config.attitude_drift_rad_s
+    fill_reading_error_bounds(redundancy, signal)
+    predict_readings(redundancy)
+    fill_residuals(redundancy, signal)
+    bound_residuals(redundancy, signal)
+    memory.first_acceleration_error_bound = 0.0
+    too_steep = max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD
+    for c in range(RPM_TEST):
+        if too_steep and c < SPEED_TEST:
+            restart_test(redundancy.test[c])
         else:
-            filter_test(step, step.test[c])
-    if engine:
-        test_engine(step, signal)
+            filter_residual(redundancy, redundancy.test[c])
+    if has_engine_sensors:
+        compare_engine_sensors(redundancy, signal)
 
 
 @kernel
-def set_drift(step, t):
+def set_attitude_drift_bound(redundancy, t):
     """Fill the bound on the attitude's drift by t s, which begins with the flight."""
-    step.memory.attitude_drift = step.config.drift * t
+    redundancy.memory.attitude_drift_bound_rad = redundancy.config.attitude_drift_rad_s * t

@@ -1,13 +1,38 @@
 """The sensor monitor: finds the broken sensor by the redundancy of all sensors (redundancy.py).
 
-It assumes that one sensor fails at a time. The test with the largest share of its bound says of which kind
-the sensor is; the tests within their bounds exclude others. A gyro and the attitude move the same tests. The
-dynamics of the rates separate them: a jump of a gyro is an acceleration that no model explains, a jump of the
-attitude is none. With D the damping of the axis, the filter W' = -D W + innovation follows a gyro's error e
-exactly, and stays within its bound for an error of the attitude.
+It assumes that one sensor fails at a time. The test with the largest ratio of residual to bound raises the
+alarm, and says which sensors are suspects. A suspect is excluded if its error would exceed another test too,
+and that test is within its bound.
 
-After the alarm no surface is isolated. A named sensor is replaced by an estimate from the others
-(`substitute_of`), for the diagnosis and for the laws, until the end of the flight.
+    test of the alarm      suspects                     excluded by
+    turning, angles        gyro of an axis, one angle   the dynamics of the rates (below); other axes, angles
+    speed                  airspeed, accelerometers     the rules of clearing (below)
+    incidence, sideslip    vane, accelerometers, gyros  the same; for vane and gyros the tests of turning
+    density                airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
+                                                        other test
+    climb                  altitude                     any other test
+    engine                 the sensor of the test
+    equal                  the sensor, the reading      that reading's own test
+                           that it should equal
+    any                    alpha, beta, airspeed, phi,  the tests that an error from the start does not
+                           theta                        explain (initial_errors.py)
+
+    outcome                sensor        surfaces
+    a reading is missing   isolated      none is isolated
+    one suspect            isolated      none is isolated
+    several, or none       not isolated  none is isolated; after ISOLATION_TIME_LIMIT_S the verdict is
+                                         "unanticipated"
+    alarm long after that  isolated or   the conclusion about surfaces stays (MIN_SURFACE_ALARM_LEAD_S)
+    of the surfaces        not, as above
+
+An isolated sensor is replaced by an estimate from the others (`estimate_reading`), for the diagnosis and for
+the laws, until the end of the flight. Accelerometers are not replaced: the diagnosis uses none that may be
+broken (`measured.inertial`).
+
+*Gyro or attitude?* Both move the same tests. The dynamics of the rates separate them: a jump of a gyro is an
+acceleration that no model explains, a jump of the attitude is none. With D the damping of the rates (3, 3),
+1/s, the filter W' = -D W + innovation follows a gyro's error exactly, and stays within its bound for an error
+of the attitude (`judge_gyro_errors`).
 
 *Accelerometers or flow sensor?* A test of the flow (airspeed, incidence, sideslip) compares a flow sensor
 with the accelerometers, so an error of either moves it. An accelerometer's error e integrates into a velocity
@@ -20,47 +45,61 @@ error e t; an error of a flow sensor is a step, which its own reading contains. 
     or incidence, of that error would exceed the test of the density, or of the climb; if an accelerometer is
     frozen
 
-The direction of the spurious velocity says which accelerometer is broken. If neither is cleared, no sensor is
-named. The diagnosis uses no accelerometer that may be broken: `measured.inertial`.
+The direction of the spurious velocity, which the residuals add up to, says which accelerometer is broken.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection.filters import bank_alarm_axis, bound_step
-from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
-from beaver_ftc.diagnosis.monitors.initial_errors import held_error_part
+from beaver_ftc.diagnosis.detection.filters import advance_residual_bound, bank_alarm_axis
+from beaver_ftc.diagnosis.monitors.initial_errors import (
+    initial_error_explains_alarm,
+    keep_error_bounds_at_alarm,
+    max_error_effect_at_alarm,
+    record_refuted_hypotheses,
+    set_error_bounds_at_start,
+    update_initial_error_bounds,
+)
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
-    AIRSPEED_ERROR,
+    AIRSPEED_HYPOTHESIS,
     ALPHA,
-    ALPHA_ERROR,
-    ALPHA_FLOW,
-    ANGLE,
+    ALPHA_FLOW_TEST,
+    ALPHA_HYPOTHESIS,
+    ANGLE_TEST,
     BETA,
-    BETA_ERROR,
-    BETA_FLOW,
-    CLIMB,
-    DENSITY,
-    EQUAL_READING,
-    EQUAL_READING_TEST,
-    EQUAL_SENSOR,
-    MANIFOLD_PRESSURE,
-    MAX_FORCE_JUMP_M_S2,
-    N_COMPUTED,
-    N_INITIAL,
+    BETA_FLOW_TEST,
+    BETA_HYPOTHESIS,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    DUPLICATE_SENSOR_INDEX,
+    DUPLICATED_READING_INDEX,
+    DUPLICATED_READING_TEST,
+    FILTER_POLES_PER_S,
+    GYRO_ERROR_CONFIRMED,
+    GYRO_ERROR_REFUTED,
+    GYRO_ERROR_UNDECIDED,
+    INTEGRATION_WEIGHT,
+    MANIFOLD_PRESSURE_TEST,
+    MIN_AIRSPEED_MPS,
+    MIN_FAULTY_FORCE_JUMP_M_S2,
+    N_COMPUTED_TESTS,
+    N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
-    NEVER_FROZEN,
-    NO,
+    NEVER_FROZEN_SAMPLES,
     NO_SENSOR,
-    PHI_ERROR,
+    PHI_HYPOTHESIS,
     QDYN,
-    RPM,
-    SPEED,
+    RPM_TEST,
+    SPEED_TEST,
     THETA,
-    TURN,
-    UNDECIDED,
-    YES,
+    TURN_TEST,
+    body_turn_per_euler_angle,
+    compare_duplicate_sensors,
+    run_redundancy_tests,
+    set_attitude_drift_bound,
+    start_redundancy_tests,
+    store_sample,
 )
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
@@ -70,293 +109,364 @@ from beaver_ftc.plant.instruments import (
     N_SENSORS,
     PHI,
     note_slipstream,
+    set_inertial,
     share_out,
 )
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
+# Accelerometers or flow sensor
 JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
 JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
-GROWTH_FACTOR = 30.0  # residual sum over the range of the reading: a scale error within 3 % of -1 gives that
-CLEAR_EXCESS = 3.0  # times the bound of a test that is not exceeded
-_ROUNDING_S = 1e-9
+MIN_READING_JUMP_SHARE = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
+MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
+# An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
+MIN_CLEARING_BOUND_RATIO = 3.0
+MIN_SHARE_OF_LARGEST_COMPONENT = 0.5  # of the spurious velocity, along the axis of a suspected accelerometer
+TIME_ROUNDING_S = 1e-9
 
 
 @kernel
-def flow_sensor_of(test):
+def flow_sensor_of_test(test_index):
     """The flow sensor that a test compares with the accelerometers."""
-    if test == SPEED:
+    if test_index == SPEED_TEST:
         return AIRSPEED
-    return ALPHA if test == ALPHA_FLOW else BETA
+    return ALPHA if test_index == ALPHA_FLOW_TEST else BETA
 
 
 @kernel
-def hypothesis_of(test):
-    """The hypothesis that this sensor was broken when the monitor began (initial_errors.py)."""
-    if test == SPEED:
-        return AIRSPEED_ERROR
-    return ALPHA_ERROR if test == ALPHA_FLOW else BETA_ERROR
+def initial_error_hypothesis_of_test(test_index):
+    """The hypothesis that the flow sensor of a test was broken when the monitor began (initial_errors.py)."""
+    if test_index == SPEED_TEST:
+        return AIRSPEED_HYPOTHESIS
+    return ALPHA_HYPOTHESIS if test_index == ALPHA_FLOW_TEST else BETA_HYPOTHESIS
 
 
 @kernel
-def is_flow_test(test):
+def is_flow_test(test_index):
     """Whether accelerometers take part in a test."""
-    return SPEED <= test <= BETA_FLOW
+    return SPEED_TEST <= test_index <= BETA_FLOW_TEST
 
 
 @kernel
 def count_identical_samples(monitor, signal):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
-    of an accelerometer from one sample to the next, m/s2, which fades within CALMED_S."""
-    memory, before = monitor.memory, monitor.step.memory.previous
-    memory.largest_jump *= 1.0 - monitor.step.config.h / JUMP_MEMORY_S
+    of an accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S."""
+    memory, previous = monitor.memory, monitor.redundancy.memory.previous_reading
+    memory.max_accelerometer_jump *= 1.0 - monitor.redundancy.config.sample_time_s / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        memory.identical[i] = memory.identical[i] + 1 if signal[i] == before[i] else 0
+        memory.n_identical_samples[i] = memory.n_identical_samples[i] + 1 if signal[i] == previous[i] else 0
         if AX <= i < N_IN_EQUATIONS:
-            memory.largest_jump = max(memory.largest_jump, abs(signal[i] - before[i]))
+            memory.max_accelerometer_jump = max(memory.max_accelerometer_jump, abs(signal[i] - previous[i]))
 
 
 @kernel
-def is_frozen(monitor, i):
-    """Whether sensor i is frozen: no sound one gives the same reading for so many samples."""
-    return monitor.memory.identical[i] >= monitor.config.longest_identical[i]
+def is_frozen(monitor, sensor):
+    """Whether a sensor is frozen: no sound one gives the same reading for so many samples."""
+    return monitor.memory.n_identical_samples[sensor] >= monitor.config.min_frozen_samples[sensor]
 
 
 @kernel
-def clear_by_sample(monitor, signal):
+def update_cleared_sensors(monitor, signal):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
-    if not is_flow_test(monitor.output.lead):
+    memory, alarm_test = monitor.memory, monitor.output.alarm_test
+    if not is_flow_test(alarm_test):
         return
-    since_alarm_s = monitor.memory.n_summed * monitor.step.config.h
-    if since_alarm_s < JUMP_WINDOW_S - _ROUNDING_S and reading_jumped(monitor, signal):
+    since_alarm_s = memory.n_summed_samples * monitor.redundancy.config.sample_time_s
+    if since_alarm_s < JUMP_WINDOW_S - TIME_ROUNDING_S and flow_reading_jumped(monitor, signal):
         clear_accelerometers(monitor)
-    sum_residuals(monitor, signal)
-    flow = flow_sensor_of(monitor.output.lead)
-    if is_frozen(monitor, flow) or (monitor.output.lead == SPEED and monitor.memory.exceeded[DENSITY]):
+    sum_flow_residuals(monitor, signal)
+    flow_sensor = flow_sensor_of_test(alarm_test)
+    if is_frozen(monitor, flow_sensor) or (alarm_test == SPEED_TEST and memory.exceeded_tests[DENSITY_TEST]):
         clear_accelerometers(monitor)
-    frozen = False
+    accelerometer_is_frozen = False
     for i in range(AX, N_IN_EQUATIONS):
-        frozen = frozen or is_frozen(monitor, i)
-    if frozen or residual_keeps_growing(monitor) or error_would_show_elsewhere(monitor, signal):
-        monitor.memory.cleared[flow] = 1
+        accelerometer_is_frozen = accelerometer_is_frozen or is_frozen(monitor, i)
+    if (
+        accelerometer_is_frozen
+        or residual_sum_exceeds_reading_range(monitor)
+        or error_would_exceed_other_test(monitor, signal)
+    ):
+        memory.is_cleared[flow_sensor] = 1
 
 
 @kernel
 def clear_accelerometers(monitor):
     """Clear all accelerometers."""
-    monitor.memory.cleared[AX:] = 1
+    monitor.memory.is_cleared[AX:] = 1
 
 
 @kernel
-def reading_jumped(monitor, signal):
+def flow_reading_jumped(monitor, signal):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
-    i, step = flow_sensor_of(monitor.output.lead), monitor.step
-    per_m_s = 1.0 if monitor.output.lead == SPEED else 1.0 / max(step.memory.previous[AIRSPEED], 1.0)
-    test, per_m_s2 = step.test[monitor.output.lead], step.config.h * per_m_s
-    second = signal[i] - 2.0 * step.memory.previous[i] + monitor.memory.earlier[i]
-    half, theirs = 0.5 * abs(test.residual), 1.5 * monitor.memory.largest_jump * per_m_s2
-    return 2.0 * half > test.bound[0] + MAX_FORCE_JUMP_M_S2 * per_m_s2 and abs(second) >= half > theirs
+    alarm_test, redundancy, memory = monitor.output.alarm_test, monitor.redundancy, monitor.memory
+    sensor, previous, test = (
+        flow_sensor_of_test(alarm_test),
+        redundancy.memory.previous_reading,
+        redundancy.test[alarm_test],
+    )
+    # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
+    residual_per_m_s = 1.0 if alarm_test == SPEED_TEST else 1.0 / max(previous[AIRSPEED], MIN_AIRSPEED_MPS)
+    residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
+    second_difference = signal[sensor] - 2.0 * previous[sensor] + memory.reading_two_samples_ago[sensor]
+    min_jump = MIN_READING_JUMP_SHARE * abs(test.residual)
+    accelerometer_effect = INTEGRATION_WEIGHT * memory.max_accelerometer_jump * residual_per_m_s2
+    return (
+        abs(test.residual) > test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
+        and abs(second_difference) >= min_jump > accelerometer_effect
+    )
 
 
 @kernel
-def sum_residuals(monitor, signal):
+def sum_flow_residuals(monitor, signal):
     """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
     that of an error that a reading has had from the start; and find the range of each reading."""
-    step = monitor.step
+    redundancy, memory, initial_errors = monitor.redundancy, monitor.memory, monitor.initial_errors
+    config = redundancy.config
     for j in range(3):
-        i, test = flow_sensor_of(SPEED + j), step.test[SPEED + j]
-        if monitor.memory.n_summed == 0:
-            monitor.memory.least[j] = monitor.memory.most[j] = signal[i]
-            monitor.memory.bound_sum[j] = 2.0 * test.noise + test.air * step.config.max_gust_speed
+        reading, test = signal[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
+        if memory.n_summed_samples == 0:
+            memory.min_flow_reading[j] = memory.max_flow_reading[j] = reading
+            memory.bound_sum[j] = (  # noise of the first and of the last sample
+                2.0 * test.bound_per_sample + test.gust_gain * config.max_gust_speed_mps
+            )
             continue
-        monitor.memory.residual_sum[j] += test.residual
-        of = hypothesis_of(SPEED + j)
-        monitor.memory.bound_sum[j] += step.config.h * test.rate
-        monitor.memory.first[j] += (
-            monitor.initial.bound_at_alarm[of] * monitor.initial.unit_effect[of, SPEED + j]
+        memory.residual_sum[j] += test.residual
+        hypothesis = initial_error_hypothesis_of_test(SPEED_TEST + j)
+        memory.bound_sum[j] += config.sample_time_s * test.bound_per_s
+        memory.initial_error_sum[j] += (
+            initial_errors.sensor_error_bound_at_alarm[hypothesis]
+            * initial_errors.effect_per_unit_error[hypothesis, SPEED_TEST + j]
         )
-        monitor.memory.least[j], monitor.memory.most[j] = (
-            min(monitor.memory.least[j], signal[i]),
-            max(monitor.memory.most[j], signal[i]),
+        memory.min_flow_reading[j], memory.max_flow_reading[j] = (
+            min(memory.min_flow_reading[j], reading),
+            max(memory.max_flow_reading[j], reading),
         )
-    excess = np.sign(monitor.memory.residual_sum[1]) * max(
-        abs(monitor.memory.residual_sum[1]) - monitor.memory.bound_sum[1] - monitor.memory.first[1], 0.0
+    alpha_error = np.sign(memory.residual_sum[1]) * max(
+        abs(memory.residual_sum[1]) - memory.bound_sum[1] - memory.initial_error_sum[1],
+        0.0,
     )
-    fallen = step.config.h * signal[AIRSPEED] * excess * np.cos(signal[PHI]) * np.cos(signal[PHI + 1])
-    for m in range(step.config.decay.size):
-        monitor.memory.climb_error[m] = step.config.decay[m] * monitor.memory.climb_error[m] + fallen
-    monitor.memory.n_summed += 1
+    climb_error = (
+        config.sample_time_s * signal[AIRSPEED] * alpha_error * np.cos(signal[PHI]) * np.cos(signal[THETA])
+    )
+    for m in range(config.filter_decay.size):
+        memory.filtered_climb_error_m[m] = (
+            config.filter_decay[m] * memory.filtered_climb_error_m[m] + climb_error
+        )
+    memory.n_summed_samples += 1
 
 
 @kernel
-def residual_keeps_growing(monitor):
+def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
-    j = monitor.output.lead - SPEED
-    moved = monitor.memory.most[j] - monitor.memory.least[j]
-    sound = monitor.memory.bound_sum[j] + monitor.memory.first[j]
-    return moved > 0.0 and abs(monitor.memory.residual_sum[j]) > GROWTH_FACTOR * moved + CLEAR_EXCESS * sound
+    memory, j = monitor.memory, monitor.output.alarm_test - SPEED_TEST
+    reading_range = memory.max_flow_reading[j] - memory.min_flow_reading[j]
+    explained = memory.bound_sum[j] + memory.initial_error_sum[j]
+    return (
+        reading_range > 0.0
+        and abs(memory.residual_sum[j])
+        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range + MIN_CLEARING_BOUND_RATIO * explained
+    )
 
 
 @kernel
-def error_would_show_elsewhere(monitor, signal):
+def error_would_exceed_other_test(monitor, signal):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
-    step = monitor.step
-    elsewhere = DENSITY if monitor.output.lead == SPEED else CLIMB
-    if monitor.output.lead == BETA_FLOW or monitor.memory.exceeded[elsewhere]:
+    redundancy, initial_errors = monitor.redundancy, monitor.initial_errors
+    alarm_test = monitor.output.alarm_test
+    other_test = DENSITY_TEST if alarm_test == SPEED_TEST else CLIMB_TEST
+    if alarm_test == BETA_FLOW_TEST or monitor.memory.exceeded_tests[other_test]:
         return False
-    of = hypothesis_of(monitor.output.lead)
-    for m in range(step.config.decay.size):
-        error, speed = abs(monitor.memory.climb_error[m]), step.test[SPEED]
-        if monitor.output.lead == SPEED:
-            error = 2.0 * (abs(speed.filtered[m]) - speed.bound[m]) / max(signal[AIRSPEED], 1.0)
-            error *= 1.0 - min(monitor.initial.bound_at_alarm[of], 1.0)
-        if error > CLEAR_EXCESS * (
-            step.test[elsewhere].bound[m] + held_error_part(monitor.initial, of, elsewhere, m)
+    hypothesis = initial_error_hypothesis_of_test(alarm_test)
+    for m in range(redundancy.config.filter_decay.size):
+        expected, speed = abs(monitor.memory.filtered_climb_error_m[m]), redundancy.test[SPEED_TEST]
+        if alarm_test == SPEED_TEST:  # log(density) changes by twice the relative change of the airspeed
+            expected = (
+                2.0
+                * (abs(speed.filtered_residual[m]) - speed.filtered_bound[m])
+                / max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
+            )
+            expected *= 1.0 - min(initial_errors.sensor_error_bound_at_alarm[hypothesis], 1.0)
+        if expected > MIN_CLEARING_BOUND_RATIO * (
+            redundancy.test[other_test].filtered_bound[m]
+            + max_error_effect_at_alarm(initial_errors, hypothesis, other_test, m)
         ):
             return True
     return False
 
 
 @kernel
-def suspect_accelerometers(monitor, shown):
-    """Suspect the accelerometers along whose axis most of the spurious velocity is; shown: a gyro explains
+def suspect_accelerometers(monitor, gyro_explains_it):
+    """Suspect the accelerometers along whose axis most of the spurious velocity is, unless a gyro explains
     it."""
-    step, who = monitor.step, monitor.output.suspect
-    alpha, beta, V = (
-        step.memory.previous[ALPHA],
-        step.memory.previous[BETA],
-        max(step.memory.previous[AIRSPEED], 1.0),
+    memory, is_suspect = monitor.memory, monitor.output.is_suspect
+    reading, residual_sum, bound_sum = (
+        monitor.redundancy.memory.previous_reading,
+        memory.residual_sum,
+        memory.bound_sum,
     )
-    faster, down, aside = (
-        monitor.memory.residual_sum[0],
-        V * np.cos(beta) * monitor.memory.residual_sum[1],
-        V * monitor.memory.residual_sum[2],
+    alpha, beta, V = reading[ALPHA], reading[BETA], max(reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
+    # symmetry
+    along_flow, down, side = (
+        residual_sum[0],
+        V * np.cos(beta) * residual_sum[1],
+        V * residual_sum[2],
     )
-    velocity, size, ahead = (
-        monitor.memory.spurious_velocity,
+    velocity, largest, ahead = (
+        memory.spurious_velocity,
         0.0,
-        np.cos(beta) * faster - np.sin(beta) * aside,
+        np.cos(beta) * along_flow - np.sin(beta) * side,
     )
     velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
-    velocity[1] = np.sin(beta) * faster + np.cos(beta) * aside
+    velocity[1] = np.sin(beta) * along_flow + np.cos(beta) * side
     velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
-    doubt = monitor.memory.bound_sum[0] + V * (monitor.memory.bound_sum[1] + monitor.memory.bound_sum[2])
-    frozen = -1
+    velocity_bound = bound_sum[0] + V * (bound_sum[1] + bound_sum[2])  # m/s, of sound sensors
+    frozen_sensor = NO_SENSOR
     for i in range(3):
-        size = max(size, abs(velocity[i]))
-        frozen = AX + i if is_frozen(monitor, AX + i) else frozen
+        largest = max(largest, abs(velocity[i]))
+        frozen_sensor = AX + i if is_frozen(monitor, AX + i) else frozen_sensor
     for i in range(AX, N_IN_EQUATIONS):
-        along = frozen == i or (frozen < 0 and abs(velocity[i - AX]) + doubt >= 0.5 * size)
-        who[i] = along and not shown and not monitor.memory.cleared[i]
+        explains = frozen_sensor == i or (
+            frozen_sensor < 0
+            and abs(velocity[i - AX]) + velocity_bound >= MIN_SHARE_OF_LARGEST_COMPONENT * largest
+        )
+        is_suspect[i] = explains and not gyro_explains_it and not memory.is_cleared[i]
 
 
 @kernel
-def discard_accelerometers(monitor, measured):
+def mark_accelerometers_unusable(monitor, measured):
     """Mark the accelerometers as unusable once one of them may be broken."""
     for i in range(AX, N_IN_EQUATIONS):
-        if monitor.output.replaced[i] or (monitor.output.alarmed and monitor.output.suspect[i]):
-            measured.inertial = 0
+        if monitor.output.is_replaced[i] or (monitor.output.alarmed and monitor.output.is_suspect[i]):
+            set_inertial(measured, 0)
 
 
-INVOLVED_SHARE = (
-    0.03  # share of the largest residual of its kind: less is the effect of an error on its neighbours
+# A smaller share of the largest of three residuals is the effect of its error on the two other axes or angles
+MIN_SHARE_OF_LARGEST_RESIDUAL = 0.03
+# start_stage: 1 after the first sample, 2 with the first whole frame, 3 from the next frame on: only then the
+# innovation contains the change of a gyro's error between two frames
+RATES_COMPARABLE_STAGE = 3
+MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
+INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
+VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
+FAST_POLE = 1  # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
+
+# Gyro or attitude (judge_gyro_errors)
+DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
+GYRO_ERROR_DAMPING_PER_S = (
+    10.0  # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 )
-MONITOR_RUNNING = 3  # `begun`: after the first sample 1, with the first whole frame 2, from the next one on 3
-KEPT_SURFACE_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
-SETTLED_S = 1.0  # after the monitor has begun: an earlier alarm of the surfaces may be a sensor's
-DAMPING_TOLERANCE = 0.2  # tolerance of the damping, away from trim
-GONE_SHARE = 0.003  # share of a jump of the attitude that may be left in the next frame
-QUICK_PER_S = 10.0  # the second of POLES_PER_S
-FORGETTING_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
-CROSS_DAMPING_PER_S = 10.0  # by which a gyro's own error moves the innovation
+JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
+MIN_FOLLOWED_SHARE = 0.7  # of a gyro's error, which W shows
+NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
+MIN_TRANSIENT_NOISE_RATIO = (
+    2.0  # of the size of a transient to the bound on noise: else noise may be all of it
+)
+MAX_REMAINING_TRANSIENT_SHARE = 0.003  # of a jump of the attitude within a frame, in the next frame
+RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
+
+# Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign
+HIDDEN_ERROR_PER_BOUND = 2.0
+# Margin on the bound of the flow's test, for the gyro that turns the flow by all of its error
+OWN_GYRO_BOUND_FACTOR = 2.0
 
 
 @kernel
-def monitor_sensors(monitor, belief, measured, conclusion, bank, bound, dt, t):
+def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
-    bank, bound: of the innovation of the elapsed frame, of dt s. conclusion: about the surfaces, so far.
+    bank: detection filters, with the innovation of the elapsed frame, of dt s; bound: on that innovation.
+    conclusion: about the surfaces, so far.
     """
-    step, signal = monitor.step, measured.signal
-    if not monitor.memory.begun:
+    redundancy, initial_errors, signal = monitor.redundancy, monitor.initial_errors, measured.signal
+    memory = monitor.memory
+    if not memory.start_stage:
         begin_monitor(monitor, measured, t)
         return
-    if monitor.memory.substep == 0:
-        update_rate_filter(monitor, bank.output.innovation, bound.eta_bar, dt)
-    redundancy.run_tests(step, signal, monitor.config.engine)
-    if N_TESTS > N_COMPUTED:
-        redundancy.test_equal_sensors(step, signal, measured.fresh)
-        record_agreement(monitor, measured.fresh)
-    initial_errors.update_initial_errors(step, monitor.initial, signal)
+    if memory.substep == 0:
+        update_gyro_error_estimate(monitor, bank.output.innovation, bound.eta_bar, dt)
+    run_redundancy_tests(redundancy, signal, monitor.config.has_engine_sensors)
+    if N_TESTS > N_COMPUTED_TESTS:
+        compare_duplicate_sensors(redundancy, signal, measured.fresh)
+        record_agreeing_duplicates(monitor, measured.fresh)
+    update_initial_error_bounds(redundancy, initial_errors, signal)
     count_identical_samples(monitor, signal)
-    if monitor.memory.substep == 0:
-        monitor.memory.previous_gyro_error[:], monitor.memory.earlier_spike[:] = (
-            monitor.memory.gyro_error,
-            monitor.memory.previous_spike,
+    if memory.substep == 0:
+        memory.previous_apparent_gyro_error[:], memory.earlier_substep_gyro_error_peak[:] = (
+            memory.apparent_gyro_error,
+            memory.previous_substep_gyro_error_peak,
         )
-        monitor.memory.previous_spike[:] = monitor.memory.spike
-        monitor.memory.spike[:] = 0.0
+        memory.previous_substep_gyro_error_peak[:] = memory.substep_gyro_error_peak
+        memory.substep_gyro_error_peak[:] = 0.0
     for i in range(3):
-        error = -step.test[TURN + i].residual / step.config.h
-        if monitor.memory.substep == 0:
-            monitor.memory.gyro_error[i] = error
+        gyro_error = -redundancy.test[TURN_TEST + i].residual / redundancy.config.sample_time_s
+        if memory.substep == 0:
+            memory.apparent_gyro_error[i] = gyro_error
         else:
-            monitor.memory.spike[i] = max(monitor.memory.spike[i], abs(error))
-    if monitor.memory.begun < MONITOR_RUNNING:
-        allow_for_first_errors(monitor)
-    if monitor.config.noisy_attitude:
+            memory.substep_gyro_error_peak[i] = max(memory.substep_gyro_error_peak[i], abs(gyro_error))
+    if memory.start_stage < RATES_COMPARABLE_STAGE:
+        widen_bound_by_initial_gyro_error(monitor)
+    if monitor.config.attitude_is_noisy:
         exclude_gyros(monitor)
-    decide_sensor(monitor, measured, conclusion, bank, bound, dt, t)
-    replace_readings(monitor, belief, measured)
-    discard_accelerometers(monitor, measured)
-    monitor.memory.earlier[:] = step.memory.previous
-    redundancy.store_sample(step, signal, measured.force)
-    monitor.memory.substep = (monitor.memory.substep + 1) % monitor.config.instants
+    isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t)
+    replace_isolated_readings(monitor, prediction, measured)
+    mark_accelerometers_unusable(monitor, measured)
+    memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
+    store_sample(redundancy, signal, measured.force)
+    memory.substep = (memory.substep + 1) % monitor.config.substeps
 
 
 @kernel
 def set_expected_manifold_pressure(monitor, manifold_pressure_inhg):
-    """Predict the engine's sensors from the command of the law in charge of the engine."""
-    monitor.step.memory.command[1] = manifold_pressure_inhg
+    """Predict the engine's manifold pressure from the command of the law in charge of the engine."""
+    monitor.redundancy.memory.engine_command[1] = manifold_pressure_inhg
 
 
 @kernel
 def begin_monitor(monitor, measured, t):
     """Take the first sample, at t s: there is none to compare it with."""
-    monitor.memory.begun, monitor.memory.started_at_s = 1, t
-    redundancy.set_drift(monitor.step, t)
-    redundancy.begin_tests(monitor.step, measured.signal, measured.force)
-    initial_errors.begin_initial_errors(monitor.initial, measured.signal)
-    monitor.memory.earlier[:] = monitor.step.memory.previous
-    monitor.memory.substep = (monitor.memory.substep + 1) % monitor.config.instants
+    memory, redundancy = monitor.memory, monitor.redundancy
+    memory.start_stage, memory.started_at_s = 1, t
+    set_attitude_drift_bound(redundancy, t)
+    start_redundancy_tests(redundancy, measured.signal, measured.force)
+    set_error_bounds_at_start(monitor.initial_errors, measured.signal)
+    memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
+    memory.substep = (memory.substep + 1) % monitor.config.substeps
 
 
 @kernel
-def allow_for_first_errors(monitor):
+def widen_bound_by_initial_gyro_error(monitor):
     """Widen the bound on W by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error."""
-    if monitor.memory.substep == 0:
-        monitor.memory.begun += 1
-    if monitor.memory.begun == MONITOR_RUNNING - 1 and monitor.memory.substep == 0:
+    memory = monitor.memory
+    if memory.substep == 0:
+        memory.start_stage += 1
+    if memory.start_stage == RATES_COMPARABLE_STAGE - 1 and memory.substep == 0:
         for i in range(3):
-            monitor.memory.W_bound[i] += abs(monitor.memory.gyro_error[i])
+            memory.gyro_error_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
 
 
 @kernel
-def update_rate_filter(monitor, innovation, eta_bar, dt):
-    """Bring W (3,) rad/s and its bound to the frame whose innovation is there."""
-    W, bound, D = monitor.memory.W, monitor.memory.W_bound, monitor.config.damping
-    monitor.memory.previous_W_bound[:] = bound
-    before = monitor.memory.before
-    before[:] = W
+def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
+    """Advance W (3,) rad/s and its bound by the frame of dt s with innovation and eta_bar (3,) rad/s2."""
+    memory, D = monitor.memory, monitor.config.rate_damping_per_s
+    W, bound, previous_W, previous_bound = (
+        memory.gyro_error_estimate,
+        memory.gyro_error_estimate_bound,
+        memory.previous_gyro_error_estimate,
+        memory.previous_gyro_error_estimate_bound,
+    )
+    previous_bound[:] = bound
+    previous_W[:] = W
     for i in range(3):
-        lost, spread = 0.0, 0.0
+        damping, bound_change = 0.0, 0.0
         for j in range(3):
-            lost += D[i, j] * before[j]
-            spread += (-D[i, j] if i == j else abs(D[i, j])) * monitor.memory.previous_W_bound[j]
-        W[i] += dt * (innovation[i] - lost)
-        bound[i] = max(monitor.memory.previous_W_bound[i] + dt * (eta_bar[i] + spread), 0.0)
+            damping += D[i, j] * previous_W[j]
+            bound_change += (-D[i, j] if i == j else abs(D[i, j])) * previous_bound[j]
+        W[i] += dt * (innovation[i] - damping)
+        bound[i] = max(previous_bound[i] + dt * (eta_bar[i] + bound_change), 0.0)
 
 
 @kernel
@@ -365,210 +475,254 @@ def exclude_gyros(monitor):
 
     Where the attitude is noisy, a surface is isolated only after that.
     """
-    step = monitor.step
+    memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
-        test, rate = (
-            step.test[TURN + i],
-            monitor.memory.W_bound[i] + DAMPING_TOLERANCE * abs(monitor.memory.W[i]),
+        test = monitor.redundancy.test[TURN_TEST + i]
+        W_error_bound = memory.gyro_error_estimate_bound[i] + DAMPING_TOLERANCE * abs(
+            memory.gyro_error_estimate[i]
         )
-        for m, a in enumerate(step.config.decay):
-            monitor.memory.rate_difference[i, m] = (
-                a * monitor.memory.rate_difference[i, m] + test.residual + step.config.h * monitor.memory.W[i]
+        for m, decay in enumerate(config.filter_decay):
+            memory.gyro_error_difference[i, m] = (
+                decay * memory.gyro_error_difference[i, m]
+                + test.residual
+                + config.sample_time_s * memory.gyro_error_estimate[i]
             )
-            monitor.memory.rate_difference_bound[i, m] = bound_step(
-                monitor.memory.rate_difference_bound[i, m], rate, a, step.config.h
+            memory.gyro_error_difference_bound[i, m] = advance_residual_bound(
+                memory.gyro_error_difference_bound[i, m], W_error_bound, decay, config.sample_time_s
             )
             if (
-                abs(monitor.memory.rate_difference[i, m])
-                > monitor.memory.rate_difference_bound[i, m] + test.bound[m]
+                abs(memory.gyro_error_difference[i, m])
+                > memory.gyro_error_difference_bound[i, m] + test.filtered_bound[m]
             ):
-                monitor.memory.gyros_excluded = 1
+                memory.gyros_excluded = 1
 
 
 @kernel
-def decide_sensor(monitor, measured, conclusion, bank, bound, dt, t):
-    """Raise the alarm, and name the sensor once it is the only suspect."""
-    find_largest_share(monitor)
-    if monitor.output.named != NO_SENSOR:
+def isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t):
+    """Raise the alarm, and isolate the sensor once it is the only suspect."""
+    output, memory = monitor.output, monitor.memory
+    find_worst_test(monitor)
+    if output.isolated_sensor != NO_SENSOR:
         return
     for i in range(N_SENSORS):
-        if measured.missing[i] and monitor.output.named == NO_SENSOR:
+        if measured.missing[i] and output.isolated_sensor == NO_SENSOR:
             raise_alarm(monitor, conclusion, t)
-            name_sensor(monitor, i, t)
-    if monitor.output.named != NO_SENSOR:
+            isolate_sensor(monitor, i, t)
+    if output.isolated_sensor != NO_SENSOR:
         return
-    if monitor.output.share > 1.0 and not monitor.output.alarmed:
+    if output.worst_test_ratio > 1.0 and not output.alarmed:
         raise_alarm(monitor, conclusion, t)
-        monitor.output.lead = monitor.output.largest_test
-        initial_errors.hold_errors_at_alarm(monitor.initial)
-    if monitor.output.alarmed:
-        if monitor.memory.substep == 0 and monitor.memory.begun == MONITOR_RUNNING:
-            compare_rates_with_dynamics(monitor, bank, bound, dt)
+        output.alarm_test = output.worst_test
+        keep_error_bounds_at_alarm(monitor.initial_errors)
+    if output.alarmed:
+        if memory.substep == 0 and memory.start_stage == RATES_COMPARABLE_STAGE:
+            judge_gyro_errors(monitor, bank, bound, dt)
         record_exceeded_tests(monitor)
-        clear_by_sample(monitor, measured.signal)
+        update_cleared_sensors(monitor, measured.signal)
         find_suspects(monitor)
-        left, last = 0, NO_SENSOR
+        n_suspects, last_suspect = 0, NO_SENSOR
         for i in range(N_SENSORS):
-            if monitor.output.suspect[i]:
-                left, last = left + 1, i
-        if left == 1:
-            name_sensor(monitor, last, t)
+            if output.is_suspect[i]:
+                n_suspects, last_suspect = n_suspects + 1, i
+        if n_suspects == 1:
+            isolate_sensor(monitor, last_suspect, t)
 
 
 @kernel
-def find_largest_share(monitor):
-    """Find the test with the largest share of its bound, of the samples of this frame."""
+def find_worst_test(monitor):
+    """Find the test with the largest ratio of residual to bound, of the samples of this frame."""
+    output = monitor.output
     if monitor.memory.substep == 0:
-        monitor.output.largest_test, monitor.output.share = 0, 0.0
+        output.worst_test, output.worst_test_ratio = 0, 0.0
     for c in range(N_TESTS):
-        if monitor.step.test[c].share > monitor.output.share:
-            monitor.output.largest_test, monitor.output.share = c, monitor.step.test[c].share
+        if monitor.redundancy.test[c].residual_bound_ratio > output.worst_test_ratio:
+            output.worst_test, output.worst_test_ratio = c, monitor.redundancy.test[c].residual_bound_ratio
 
 
 @kernel
 def raise_alarm(monitor, conclusion, t):
     """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
     and stays detected. Otherwise the conclusion about surfaces is void."""
-    if monitor.output.alarmed:
+    output = monitor.output
+    if output.alarmed:
         return
-    monitor.output.alarmed, monitor.output.alarmed_at_s = 1, t
-    if conclusion.detected and conclusion.detected_at_s < t - KEPT_SURFACE_S:
-        monitor.output.keeps_surface = 1
+    output.alarmed, output.alarmed_at_s = 1, t
+    if conclusion.detected and conclusion.detected_at_s < t - MIN_SURFACE_ALARM_LEAD_S:
+        output.keeps_isolated_surface = 1
         return
     if conclusion.detected:
-        monitor.output.alarmed_at_s = conclusion.detected_at_s  # the same fault, seen first in the rates
-    monitor.output.surface_was_isolated = conclusion.isolated >= 0
+        output.alarmed_at_s = conclusion.detected_at_s  # the same fault, which the rates have shown first
+    output.surface_was_isolated = conclusion.isolated_estimator >= 0
 
 
 @kernel
-def name_sensor(monitor, i, t):
-    """Name sensor i at t s."""
-    monitor.output.named, monitor.output.named_at_s = i, t
-    monitor.output.replaced[i] = 1
+def isolate_sensor(monitor, sensor, t):
+    """Isolate a sensor at t s."""
+    monitor.output.isolated_sensor, monitor.output.isolated_at_s = sensor, t
+    monitor.output.is_replaced[sensor] = 1
 
 
 @kernel
-def compare_rates_with_dynamics(monitor, bank, bound, dt):
-    """Decide, by axis, whether the rates' dynamics confirm the error that the attitude shows: YES or NO, once
-    it is certain.
+def judge_gyro_errors(monitor, bank, bound, dt):
+    """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
 
-    An error that appears inside a frame and is absent in all of the next is no gyro's: an error of a gyro
-    stays, and one that varies is not as small in every sample.
+        the innovation changes as by this jump of the gyro   the dynamics show an error   verdict
+        no                                                   yes or no                    refuted
+        yes                                                  yes                          confirmed
+        yes     no; the error is a transient, or so large that W would show it            refuted
+        yes     no; neither                                                               undecided
+
+    A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
+    a gyro stays, and one that varies is not as small in every sample.
     """
-    alarmed, innovation = bank_alarm_axis(bank), bank.output.innovation
+    memory, innovation = monitor.memory, bank.output.innovation
+    alarm_axis = bank_alarm_axis(bank)
     for i in range(3):
-        if monitor.memory.rates_confirm[i] != UNDECIDED:
+        if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
-        error, jump = (
-            monitor.memory.gyro_error[i],
-            (monitor.memory.gyro_error[i] - monitor.memory.previous_gyro_error[i]) / dt,
+        gyro_error, previous_gyro_error = (
+            memory.apparent_gyro_error[i],
+            memory.previous_apparent_gyro_error[i],
         )
-        own = CROSS_DAMPING_PER_S * max(abs(error), abs(monitor.memory.previous_gyro_error[i])) + 0.1 * abs(
-            jump
+        jump = (gyro_error - previous_gyro_error) / dt  # rad/s2
+        jump_tolerance = GYRO_ERROR_DAMPING_PER_S * max(
+            abs(gyro_error), abs(previous_gyro_error)
+        ) + JUMP_TOLERANCE * abs(jump)
+        noise_bound = (  # of gyro_error, rad/s, by the attitude's noise
+            NOISY_SAMPLES_IN_JUMP
+            * monitor.redundancy.test[TURN_TEST + i].bound_per_sample
+            / monitor.redundancy.config.sample_time_s
         )
-        blur = (
-            4.0 * monitor.step.test[TURN + i].noise / monitor.step.config.h
-        )  # of `error`, by the attitude's noise
-        most = bound.frame[i] + 1e-6
-        seen = (
-            abs(innovation[i]) > most
-            or alarmed >= 0
-            or abs(monitor.memory.W[i]) > monitor.memory.W_bound[i] + 1e-6
+        max_innovation = bound.frame_innovation_bound[i] + RATE_ROUNDING
+        dynamics_show_error = (
+            abs(innovation[i]) > max_innovation
+            or alarm_axis >= 0
+            or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
         )
-        spike, left = (
-            monitor.memory.earlier_spike[i],
-            max(abs(monitor.memory.previous_gyro_error[i]), monitor.memory.previous_spike[i], abs(error)),
+        transient, remaining = (
+            memory.earlier_substep_gyro_error_peak[i],
+            max(abs(previous_gyro_error), memory.previous_substep_gyro_error_peak[i], abs(gyro_error)),
         )
-        sudden = left < GONE_SHARE * spike and spike > 2.0 * blur
-        explained = abs(innovation[i] - jump) <= most + own + blur / dt
-        slow = 0.7 * abs(error) <= monitor.memory.W_bound[i] + abs(monitor.memory.W[i]) + blur
-        if not explained or (not seen and (sudden or not slow)):
-            monitor.memory.rates_confirm[i] = NO
-        elif seen:
-            monitor.memory.rates_confirm[i] = YES
+        is_transient = (
+            remaining < MAX_REMAINING_TRANSIENT_SHARE * transient
+            and transient > MIN_TRANSIENT_NOISE_RATIO * noise_bound
+        )
+        innovation_fits = abs(innovation[i] - jump) <= max_innovation + jump_tolerance + noise_bound / dt
+        W_fits = (
+            MIN_FOLLOWED_SHARE * abs(gyro_error)
+            <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + noise_bound
+        )
+        if not innovation_fits or (not dynamics_show_error and (is_transient or not W_fits)):
+            memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
+        elif dynamics_show_error:
+            memory.gyro_error_verdict[i] = GYRO_ERROR_CONFIRMED
 
 
 @kernel
-def is_involved(monitor, c, first):
-    """Whether test c, one of the three from `first` on, exceeds its bound by more than an error of its
-    neighbours explains."""
-    size = 0.0
+def exceeds_beyond_cross_coupling(monitor, test_index, first_of_three):
+    """Whether a test, one of the three from first_of_three on, exceeds its bound by more than an error on one
+    of the other two axes explains."""
+    largest = 0.0
     for i in range(3):
-        size = max(size, abs(monitor.step.test[first + i].filtered[0]))
-    test = monitor.step.test[c]
-    return test.share > 1.0 and abs(test.filtered[0]) > INVOLVED_SHARE * size
+        largest = max(largest, abs(monitor.redundancy.test[first_of_three + i].filtered_residual[0]))
+    test = monitor.redundancy.test[test_index]
+    return (
+        test.residual_bound_ratio > 1.0
+        and abs(test.filtered_residual[0]) > MIN_SHARE_OF_LARGEST_RESIDUAL * largest
+    )
 
 
 @kernel
 def record_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
+    redundancy, exceeded_tests = monitor.redundancy, monitor.memory.exceeded_tests
     for c in range(N_TESTS):
-        triple = TURN if c < ANGLE else ANGLE
-        beyond = is_involved(monitor, c, triple) if c < SPEED else monitor.step.test[c].share > 1.0
-        if beyond:
-            monitor.memory.exceeded[c] = 1
-    initial_errors.record_refuted(monitor.step, monitor.initial, monitor.memory.exceeded)
+        first_of_three = TURN_TEST if c < ANGLE_TEST else ANGLE_TEST
+        exceeded = (
+            exceeds_beyond_cross_coupling(monitor, c, first_of_three)
+            if c < SPEED_TEST
+            else redundancy.test[c].residual_bound_ratio > 1.0
+        )
+        if exceeded:
+            exceeded_tests[c] = 1
+    record_refuted_hypotheses(redundancy, monitor.initial_errors, exceeded_tests)
 
 
 @kernel
 def find_suspects(monitor):
-    """Fill suspect (N_SENSORS,): the sensors whose error explains all tests."""
-    who, lead, fired = monitor.output.suspect, monitor.output.lead, monitor.memory.exceeded
-    who[:] = 0
-    if lead >= N_COMPUTED:
-        suspect_unequal_sensors(monitor, lead - N_COMPUTED)
+    """Fill is_suspect (N_SENSORS,): the sensors whose error explains all tests."""
+    is_suspect, alarm_test = monitor.output.is_suspect, monitor.output.alarm_test
+    exceeded_tests = monitor.memory.exceeded_tests
+    is_suspect[:] = 0
+    if alarm_test >= N_COMPUTED_TESTS:
+        suspect_disagreeing_sensors(monitor, alarm_test - N_COMPUTED_TESTS)
         return
-    if lead < SPEED:
+    if alarm_test < SPEED_TEST:
         suspect_attitude(monitor)
-    if lead == SPEED:
+    if alarm_test == SPEED_TEST:
         suspect_accelerometers(monitor, False)
-        who[AIRSPEED] = not monitor.memory.cleared[AIRSPEED]
-    elif lead == DENSITY:
-        may_be_frozen = monitor.memory.identical[AIRSPEED] > 0  # then it need not show how it is wrong
-        who[AIRSPEED] = fired[SPEED] == 1 or not airspeed_error_would_show(monitor) or may_be_frozen
-    who[QDYN] = lead == DENSITY and is_only_exceeded(monitor, DENSITY)
-    suspect_vane(monitor, ALPHA, ALPHA_FLOW, 1)
-    suspect_vane(monitor, BETA, BETA_FLOW, 2)
-    who[ALTITUDE] = lead == CLIMB and is_only_exceeded(monitor, CLIMB)
-    who[ENGINE_SPEED], who[MANIFOLD] = lead == RPM, lead == MANIFOLD_PRESSURE
-    frozen = any_suspect_frozen(monitor)
-    for i in range(N_INITIAL):
-        if not frozen and initial_errors.initial_error_explains(monitor.initial, i, lead):
-            who[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
+        is_suspect[AIRSPEED] = not monitor.memory.is_cleared[AIRSPEED]
+    elif alarm_test == DENSITY_TEST:
+        may_be_frozen = (
+            monitor.memory.n_identical_samples[AIRSPEED] > 0
+        )  # its test need not show an error then
+        is_suspect[AIRSPEED] = (
+            exceeded_tests[SPEED_TEST] == 1
+            or not airspeed_error_would_exceed_own_test(monitor)
+            or may_be_frozen
+        )
+    is_suspect[QDYN] = alarm_test == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
+    suspect_vane(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
+    suspect_vane(monitor, BETA, BETA_FLOW_TEST, 2)
+    is_suspect[ALTITUDE] = alarm_test == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
+    is_suspect[ENGINE_SPEED] = alarm_test == RPM_TEST
+    is_suspect[MANIFOLD] = alarm_test == MANIFOLD_PRESSURE_TEST
+    suspect_is_frozen = any_suspect_frozen(monitor)
+    for i in range(N_INITIAL_ERROR_HYPOTHESES):
+        if not suspect_is_frozen and initial_error_explains_alarm(monitor.initial_errors, i, alarm_test):
+            is_suspect[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
 
 
 @kernel
-def record_agreement(monitor, fresh):
+def record_agreeing_duplicates(monitor, fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
-    for k in range(EQUAL_SENSOR.size):
-        equal = monitor.step.test[N_COMPUTED + k].share <= 1.0
-        if fresh[EQUAL_SENSOR[k] - N_IN_EQUATIONS] and equal and not monitor.output.alarmed:
-            monitor.memory.agreed[k] = 1
+    for k in range(DUPLICATE_SENSOR_INDEX.size):
+        agrees = monitor.redundancy.test[N_COMPUTED_TESTS + k].residual_bound_ratio <= 1.0
+        if fresh[DUPLICATE_SENSOR_INDEX[k] - N_IN_EQUATIONS] and agrees and not monitor.output.alarmed:
+            monitor.memory.has_agreed[k] = 1
 
 
 @kernel
-def suspect_unequal_sensors(monitor, k):
-    """Suspect a sensor, or the reading that it no longer equals: the reading if its own test shows an error,
-    the sensor if an error of the reading of this size would have shown there, both if neither is certain.
+def suspect_disagreeing_sensors(monitor, k):
+    """Suspect duplicate sensor k, or the reading that it no longer equals.
+
+    The reading is suspected if its own test shows an error, the sensor if an error of the reading of this
+    size would have exceeded that test, both if neither is certain.
 
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
-    step, reading, shows = monitor.step, EQUAL_READING[k], EQUAL_READING_TEST[k]
-    own, test = step.test[shows], step.test[N_COMPUTED + k]
-    least = abs(test.residual) - test.bound[0]  # of the error, if it is the reading's
-    hidden = least <= 2.0 * max(own.bound[0], step.memory.error[reading])
-    frozen = is_frozen(monitor, reading)
-    monitor.output.suspect[EQUAL_SENSOR[k]] = not monitor.memory.exceeded[shows]
-    monitor.output.suspect[reading] = (
-        monitor.memory.exceeded[shows] == 1 or hidden or frozen or not monitor.memory.agreed[k]
+    redundancy, memory = monitor.redundancy, monitor.memory
+    reading, test_of_reading = DUPLICATED_READING_INDEX[k], DUPLICATED_READING_TEST[k]
+    own_test, test = redundancy.test[test_of_reading], redundancy.test[N_COMPUTED_TESTS + k]
+    min_error = abs(test.residual) - test.filtered_bound[0]  # of the reading, if it is the broken one
+    may_be_hidden = min_error <= HIDDEN_ERROR_PER_BOUND * max(
+        own_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading]
+    )
+    reading_is_frozen = is_frozen(monitor, reading)
+    monitor.output.is_suspect[DUPLICATE_SENSOR_INDEX[k]] = not memory.exceeded_tests[test_of_reading]
+    monitor.output.is_suspect[reading] = (
+        memory.exceeded_tests[test_of_reading] == 1
+        or may_be_hidden
+        or reading_is_frozen
+        or not memory.has_agreed[k]
     )
 
 
 @kernel
-def is_only_exceeded(monitor, test):
+def is_only_exceeded_test(monitor, test_index):
     """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
-    for c in range(RPM):
-        if c != test and monitor.memory.exceeded[c]:
+    for c in range(RPM_TEST):
+        if c != test_index and monitor.memory.exceeded_tests[c]:
             return False
     return True
 
@@ -578,51 +732,63 @@ def any_suspect_frozen(monitor):
     """Whether a suspect is frozen, which an error of another sensor from the start does not explain. A sound
     sensor may read zero."""
     for i in range(N_SENSORS):
-        if monitor.output.suspect[i] and monitor.step.memory.previous[i] != 0.0 and is_frozen(monitor, i):
+        if (
+            monitor.output.is_suspect[i]
+            and monitor.redundancy.memory.previous_reading[i] != 0.0
+            and is_frozen(monitor, i)
+        ):
             return True
     return False
 
 
 @kernel
-def suspect_vane(monitor, vane, flow, gyro):
-    """Suspect a vane, an accelerometer, or the gyro that turns the flow, if its error need not show in the
-    attitude yet. No flow sensor moves the attitude's tests."""
-    if monitor.output.lead != flow:
+def suspect_vane(monitor, vane, flow_test, own_gyro):
+    """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude; all
+    of own_gyro's error turns the flow. No flow sensor moves the attitude's tests."""
+    if monitor.output.alarm_test != flow_test:
         return
-    exceeded = monitor.memory.exceeded
-    turns = exceeded[TURN] + exceeded[TURN + 1] + exceeded[TURN + 2]
-    suspect_accelerometers(monitor, turns > 0)
-    monitor.output.suspect[vane] = not (turns > 0 or monitor.memory.cleared[vane])
+    exceeded, is_suspect = monitor.memory.exceeded_tests, monitor.output.is_suspect
+    n_turn_tests = exceeded[TURN_TEST] + exceeded[TURN_TEST + 1] + exceeded[TURN_TEST + 2]
+    suspect_accelerometers(monitor, n_turn_tests > 0)
+    is_suspect[vane] = not (n_turn_tests > 0 or monitor.memory.is_cleared[vane])
     for i in range(3):
-        shown = turns == 1 and exceeded[TURN + i] == 1
-        monitor.output.suspect[i] = shown or (turns == 0 and gyro_may_be_hidden(monitor, flow, i, i == gyro))
-
-
-@kernel
-def gyro_may_be_hidden(monitor, flow, i, own):
-    """Whether an error of gyro i explains the test of the flow, and stays within the bound of the test of its
-    axis; own: all of its error turns the flow. Of another gyro's error a share does, by kinematics."""
-    step, alpha = monitor.step, monitor.step.memory.previous[ALPHA]
-    along = np.cos(alpha) if i == 0 else np.sin(alpha)
-    share = abs(np.tan(step.memory.previous[BETA]) * along) if flow == ALPHA_FLOW else abs(np.sin(alpha))
-    test, turn = step.test[flow], step.test[TURN + i]
-    for m in range(test.filtered.size):
-        room = 2.0 * test.bound[m] if own else test.bound[m]
-        if abs(test.filtered[m]) > 2.0 * (1.0 if own else share) * turn.bound[m] + room:
-            return False
-    return own or i == 0 or flow == ALPHA_FLOW  # the sideslip does not feel q
-
-
-@kernel
-def airspeed_error_would_show(monitor):
-    """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
-    density, speed = monitor.step.test[DENSITY], monitor.step.test[SPEED]
-    most = 1.0 + monitor.initial.bound_at_alarm[AIRSPEED_ERROR]
-    for m in range(density.filtered.size):
-        shown = abs(density.filtered[m]) - initial_errors.held_error_part(
-            monitor.initial, AIRSPEED_ERROR, DENSITY, m
+        is_shown = n_turn_tests == 1 and exceeded[TURN_TEST + i] == 1
+        is_suspect[i] = is_shown or (
+            n_turn_tests == 0 and gyro_error_may_be_hidden(monitor, flow_test, i, i == own_gyro)
         )
-        if 0.5 * monitor.step.memory.previous[AIRSPEED] * shown > 2.0 * most * speed.bound[m]:
+
+
+@kernel
+def gyro_error_may_be_hidden(monitor, flow_test, gyro, is_own):
+    """Whether an error of a gyro explains the test of the flow, and stays within the bound of the test of its
+    axis; is_own: all of its error turns the flow. Of another gyro's error a share does, by kinematics."""
+    redundancy, reading = monitor.redundancy, monitor.redundancy.memory.previous_reading
+    alpha = reading[ALPHA]
+    roll_share = np.cos(alpha) if gyro == 0 else np.sin(alpha)
+    share = abs(np.tan(reading[BETA]) * roll_share) if flow_test == ALPHA_FLOW_TEST else abs(np.sin(alpha))
+    test, turn = redundancy.test[flow_test], redundancy.test[TURN_TEST + gyro]
+    for m in range(test.filtered_residual.size):
+        flow_bound = OWN_GYRO_BOUND_FACTOR * test.filtered_bound[m] if is_own else test.filtered_bound[m]
+        hidden_turn = HIDDEN_ERROR_PER_BOUND * (1.0 if is_own else share) * turn.filtered_bound[m]
+        if abs(test.filtered_residual[m]) > hidden_turn + flow_bound:
+            return False
+    return is_own or gyro == 0 or flow_test == ALPHA_FLOW_TEST  # q does not act on the sideslip
+
+
+@kernel
+def airspeed_error_would_exceed_own_test(monitor):
+    """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
+    density, speed = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
+    max_ratio = (
+        1.0 + monitor.initial_errors.sensor_error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
+    )  # of reading and truth
+    for m in range(density.filtered_residual.size):
+        unexplained = abs(density.filtered_residual[m]) - max_error_effect_at_alarm(
+            monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m
+        )
+        # a relative change of the airspeed changes log(density) by twice as much
+        airspeed_error = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained
+        if airspeed_error > HIDDEN_ERROR_PER_BOUND * max_ratio * speed.filtered_bound[m]:
             return True
     return False
 
@@ -631,91 +797,105 @@ def airspeed_error_would_show(monitor):
 def suspect_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
-    fired, who = monitor.memory.exceeded, monitor.output.suspect
-    turns, frozen = 0, False
+    memory, is_suspect = monitor.memory, monitor.output.is_suspect
+    exceeded, verdict = memory.exceeded_tests, memory.gyro_error_verdict
+    n_turn_tests, angle_is_frozen = 0, False
     for i in range(3):
-        turns += fired[TURN + i]
-        frozen = frozen or is_frozen(monitor, PHI + i)
+        n_turn_tests += exceeded[TURN_TEST + i]
+        angle_is_frozen = angle_is_frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
-        alone = turns == 0 or (fired[TURN + i] == 1 and turns == 1)
-        who[i] = alone and monitor.memory.rates_confirm[i] != NO and not frozen
-        fits = angle_explains(monitor, i)
-        mine = no_other_angle_moved(monitor, i) and (fired[ANGLE + i] == 1 or fits)
-        moved = mine and monitor.memory.rates_confirm[axis_showing_angle(monitor, i)] != YES
-        still, longest = monitor.memory.identical[PHI + i], monitor.config.longest_identical[PHI + i]
-        may_be_frozen = 0 < still < longest < NEVER_FROZEN  # too early to say
-        who[PHI + i] = moved or (fits and may_be_frozen)
+        only_axis = n_turn_tests == 0 or (exceeded[TURN_TEST + i] == 1 and n_turn_tests == 1)
+        is_suspect[i] = only_axis and verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
+        explains_turning = angle_error_explains_turn_tests(monitor, i)
+        only_angle = no_other_angle_test_exceeded(monitor, i) and (
+            exceeded[ANGLE_TEST + i] == 1 or explains_turning
+        )
+        is_wrong = only_angle and verdict[axis_of_largest_turn_residual(monitor, i)] != GYRO_ERROR_CONFIRMED
+        n_identical, min_frozen = (
+            memory.n_identical_samples[PHI + i],
+            monitor.config.min_frozen_samples[PHI + i],
+        )
+        may_be_frozen = 0 < n_identical < min_frozen < NEVER_FROZEN_SAMPLES  # too early to say
+        is_suspect[PHI + i] = is_wrong or (explains_turning and may_be_frozen)
 
 
 @kernel
-def no_other_angle_moved(monitor, i):
-    """Whether no test of another angle shows an error that one of angle i from the start does not explain."""
+def no_other_angle_test_exceeded(monitor, angle):
+    """Whether no test of another angle (0, 1, 2: phi, theta, psi) shows an error that one of this angle from
+    the start does not explain."""
     for j in range(3):
-        shown = (
-            monitor.memory.exceeded[ANGLE + j]
-            if i == 2
-            else monitor.initial.refuted[PHI_ERROR + i, ANGLE + j]
+        exceeded = (
+            monitor.memory.exceeded_tests[ANGLE_TEST + j]
+            if angle == 2
+            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle, ANGLE_TEST + j]
         )
-        if j != i and shown:
+        if j != angle and exceeded:
             return False
     return True
 
 
 @kernel
-def angle_explains(monitor, i):
-    """Whether an error of angle i, as large as its own test can hide, explains the tests of the axes."""
-    step, angle = monitor.step, monitor.step.test[ANGLE + i]
-    unsure = step.memory.error[PHI] + step.memory.error[PHI + 1]
+def angle_error_explains_turn_tests(monitor, angle):
+    """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
+    the residual of the angle's own test allows."""
+    redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[ANGLE_TEST + angle]
+    error_bound = redundancy.memory.reading_error_bound
+    tilt_error_bound = error_bound[PHI] + error_bound[THETA]
     for j in range(3):
-        turn, per_angle = step.test[TURN + j], abs(redundancy.axis_turn_per_angle(step, j, i)) + unsure
-        for m in range(step.config.decay.size):
-            most = abs(angle.filtered[m]) + angle.bound[m]
-            hidden = (
-                initial_errors.held_error_part(monitor.initial, PHI_ERROR + i, TURN + j, m) if i < 2 else 0.0
+        turn = redundancy.test[TURN_TEST + j]
+        turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle)) + tilt_error_bound
+        for m in range(redundancy.config.filter_decay.size):
+            max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
+            initial_error_effect = (
+                max_error_effect_at_alarm(monitor.initial_errors, PHI_HYPOTHESIS + angle, TURN_TEST + j, m)
+                if angle < 2
+                else 0.0
             )
             if (
-                monitor.memory.exceeded[TURN + j]
-                and abs(turn.filtered[m]) > per_angle * most + turn.bound[m] + hidden
+                monitor.memory.exceeded_tests[TURN_TEST + j]
+                and abs(turn.filtered_residual[m])
+                > turn_per_angle * max_angle_error + turn.filtered_bound[m] + initial_error_effect
             ):
                 return False
     return True
 
 
 @kernel
-def axis_showing_angle(monitor, i):
-    """The body axis whose rate shows the error of angle i: the one with the largest share of its bound."""
-    axis = i
+def axis_of_largest_turn_residual(monitor, default_axis):
+    """The body axis (0, 1, 2) whose test of turning has the largest ratio of residual to bound; default_axis
+    if none is larger than its own."""
+    axis, test = default_axis, monitor.redundancy.test
     for j in range(3):
-        if monitor.step.test[TURN + j].share > monitor.step.test[TURN + axis].share:
+        if test[TURN_TEST + j].residual_bound_ratio > test[TURN_TEST + axis].residual_bound_ratio:
             axis = j
     return axis
 
 
 @kernel
-def allows_isolation(monitor, known):
-    """Whether a surface may be isolated; known: the alarm was a frame or more ago."""
+def allows_surface_isolation(monitor, alarm_is_old):
+    """Whether a surface may be isolated; alarm_is_old: the alarm was a frame or more ago."""
     if not monitor.config.enabled:
         return True
     return (
-        known == 1
-        and (monitor.memory.gyros_excluded == 1 or not monitor.config.noisy_attitude)
-        and not flow_is_frozen(monitor)
+        alarm_is_old == 1
+        and (monitor.memory.gyros_excluded == 1 or not monitor.config.attitude_is_noisy)
+        and not flow_sensor_is_frozen(monitor)
     )
 
 
 @kernel
-def alarm_is_at_start(monitor, detected_at_s):
+def surface_alarm_may_be_initial_error(monitor, detected_at_s):
     """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
     may have caused it: the design model uses its reading from the first frame on."""
-    return monitor.config.enabled and detected_at_s < monitor.memory.started_at_s + SETTLED_S
+    return monitor.config.enabled and detected_at_s < monitor.memory.started_at_s + INITIAL_ERROR_WINDOW_S
 
 
 @kernel
-def flow_is_frozen(monitor):
+def flow_sensor_is_frozen(monitor):
     """Whether a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
     flight a sideslip of zero stays zero."""
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
-        if monitor.step.memory.previous[i] != 0.0 and is_frozen(monitor, i):
+        if monitor.redundancy.memory.previous_reading[i] != 0.0 and is_frozen(monitor, i):
             return True
     return False
 
@@ -727,56 +907,64 @@ def has_alarm(monitor):
 
 
 @kernel
-def replace_readings(monitor, belief, measured):
-    """Replace the readings of named or missing sensors by estimates from the others. Accelerometers are not
-    replaced: then none of them is used."""
-    signal, changed = measured.signal, 0
+def replace_isolated_readings(monitor, prediction, measured):
+    """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
+    not replaced: then none of them is used."""
+    signal, any_replaced, slipstream_changes = measured.signal, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
-            monitor.output.replaced[i] = 1
-        if monitor.output.replaced[i] and i < AX:
-            signal[i] = substitute_of(monitor, belief, signal, i)
-            changed = 2 if i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD) else max(changed, 1)
-    if changed > 0:
+            monitor.output.is_replaced[i] = 1
+        if monitor.output.is_replaced[i] and i < AX:
+            signal[i] = estimate_reading(monitor, prediction, signal, i)
+            any_replaced = True
+            slipstream_changes = slipstream_changes or i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD)
+    if any_replaced:
         share_out(measured)
-    if changed > 1 and monitor.config.engine:
+    if slipstream_changes and monitor.config.has_engine_sensors:
         note_slipstream(measured)
 
 
 @kernel
-def substitute_of(monitor, belief, signal, i):
-    """The estimate of sensor i's reading from the other sensors."""
-    step = monitor.step
-    if i < 3:
-        return rate_from_attitude(monitor, belief, i)
-    if i in (ALPHA, BETA):
-        return step.memory.predicted[i] + step.config.h / FORGETTING_S * (
-            monitor.config.trim[i] - step.memory.predicted[i]
+def estimate_reading(monitor, prediction, signal, sensor):
+    """The estimate of a sensor's reading from the other sensors, in its unit."""
+    memory = monitor.redundancy.memory
+    if sensor < 3:
+        return estimate_rate_from_attitude(monitor, prediction, sensor)
+    if sensor in (ALPHA, BETA):
+        return memory.predicted_reading[
+            sensor
+        ] + monitor.redundancy.config.sample_time_s / VANE_ESTIMATE_TIME_CONSTANT_S * (
+            monitor.config.trim_reading[sensor] - memory.predicted_reading[sensor]
         )
-    density = 2.0 * step.memory.previous[QDYN] / step.memory.previous[AIRSPEED] ** 2
-    if i == AIRSPEED:
-        return np.sqrt(max(2.0 * signal[QDYN] / density, 1.0))
-    if i == QDYN:
+    density = 2.0 * memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
+    if sensor == AIRSPEED:
+        return np.sqrt(max(2.0 * signal[QDYN] / density, MIN_AIRSPEED_MPS**2))
+    if sensor == QDYN:
         return 0.5 * density * signal[AIRSPEED] ** 2
-    if i >= ENGINE_SPEED:
-        return step.memory.command[i - ENGINE_SPEED]
-    return step.memory.predicted[i]
+    if sensor >= ENGINE_SPEED:
+        return memory.engine_command[sensor - ENGINE_SPEED]
+    return memory.predicted_reading[sensor]
 
 
 @kernel
-def rate_from_attitude(monitor, belief, i):
-    """Rate i, rad/s: that of the attitude by the sample before, and the model's change since.
+def estimate_rate_from_attitude(monitor, prediction, axis):
+    """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
+    change since.
 
     The rate itself is used for the next sample: its own error shows there.
     """
-    step = monitor.step
-    u = belief.u_before if monitor.memory.substep == 0 else belief.u
-    acceleration = belief.f[i]
+    config, memory, test = (
+        monitor.redundancy.config,
+        monitor.redundancy.memory,
+        monitor.redundancy.test[TURN_TEST + axis],
+    )
+    u = prediction.u_before if monitor.memory.substep == 0 else prediction.u
+    acceleration = prediction.f[axis]
     for s in range(u.size):
-        acceleration += belief.G[i, s] * u[s]
-    shown = monitor.config.attitude_correction_share * step.test[TURN + i].residual
-    if not monitor.memory.rate_replaced[i] and monitor.config.attitude_correction_share < 1.0:
-        shown = step.config.h * QUICK_PER_S * step.test[TURN + i].filtered[1]
-    monitor.memory.rate_replaced[i] = 1
-    known = step.memory.previous[i] + shown / step.config.h
-    return known + step.config.h * acceleration
+        acceleration += prediction.G[axis, s] * u[s]
+    correction = monitor.config.attitude_correction_share * test.residual  # rad
+    if not monitor.memory.is_rate_replaced[axis] and monitor.config.attitude_correction_share < 1.0:
+        correction = config.sample_time_s * FILTER_POLES_PER_S[FAST_POLE] * test.filtered_residual[FAST_POLE]
+    monitor.memory.is_rate_replaced[axis] = 1
+    previous_rate = memory.previous_reading[axis] + correction / config.sample_time_s
+    return previous_rate + config.sample_time_s * acceleration

@@ -24,43 +24,50 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS
 
-TUNED = Path(__file__).with_name("tuned.json")
-EXACT, ACTUATORS, ERRORS = "exact", "actuators", "errors"
-GRADES = (EXACT, ACTUATORS, ERRORS)
-KINDS = {DETECTORS: "detectors", LAWS: "laws"}
+TUNED_FILE = Path(__file__).with_name("tuned.json")
+EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE = "exact", "actuators", "errors"
+FLIGHT_GRADES = (EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE)
+TUNED_GROUP_NAMES = {DETECTORS: "detectors", LAWS: "laws"}
 
-Tuned = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> its values
+TunedValues = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> its values
 
 
 @cache
-def tuned() -> Tuned:
-    """What `beaver-ftc compare --tune` chose, as shipped."""
-    found: Tuned = json.loads(TUNED.read_text(encoding="utf-8"))["grades"]
-    return found
+def tuned_parameters() -> TunedValues:
+    """Return the parameters that `beaver-ftc compare --tune` chose, as shipped."""
+    grades: TunedValues = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
+    return grades
 
 
-def grade(noise: bool, ideal_actuators: bool) -> str:
-    """Of a flight: with declared errors of sensors or air, with actuators that lag, or with neither."""
-    if noise:
-        return ERRORS
-    return EXACT if ideal_actuators else ACTUATORS
+def flight_grade(has_errors: bool, ideal_actuators: bool) -> str:
+    """Return the grade of a flight: with declared errors of sensors or air, with actuators that lag, or with
+    neither."""
+    if has_errors:
+        return ERRORS_GRADE
+    return EXACT_GRADE if ideal_actuators else ACTUATORS_GRADE
 
 
-def values_of(chosen: Tuned, of_grade: str, group: str, name: str) -> dict[str, float]:
-    """The values chosen for a method on a grade of flights; none if it was not tuned there."""
-    found: dict[str, float] = chosen.get(of_grade, {}).get(KINDS[group], {}).get(name, {})
-    return found
+def tuned_values(tuned: TunedValues, grade: str, group: str, method: str) -> dict[str, float]:
+    """The values chosen for a method on a grade of flights; none if nothing was chosen there."""
+    values: dict[str, float] = tuned.get(grade, {}).get(TUNED_GROUP_NAMES[group], {}).get(method, {})
+    return values
 
 
-def options_of(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
+def rival_options(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
     """The parameters a rival flies with: its defaults, what the tuning found, what the scenario says.
 
     The last one counts. Raises BadInput for one it does not have.
     """
-    for key in context.options:
-        if key not in defaults:
-            raise BadInput(f"{name}: options.{key}: unknown option{suggestion(key, defaults)}")
+    for option in context.options:
+        if option not in defaults:
+            raise BadInput(f"{name}: options.{option}: unknown option{suggestion(option, defaults)}")
     declared = context.declared
-    flown = grade(declared.noisy, not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any())
-    found = {key: value for group in KINDS for key, value in values_of(tuned(), flown, group, name).items()}
-    return {**defaults, **found, **context.options}
+    grade = flight_grade(
+        declared.noisy, not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
+    )
+    tuned_options = {
+        option: value
+        for group in TUNED_GROUP_NAMES
+        for option, value in tuned_values(tuned_parameters(), grade, group, name).items()
+    }
+    return {**defaults, **tuned_options, **context.options}

@@ -11,43 +11,52 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
-from beaver_ftc.diagnosis.rivals.kalman import Air, log_likelihood, unexplained, update
+from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.diagnosis.rivals import rival_options
+from beaver_ftc.diagnosis.rivals.kalman import (
+    GustStates,
+    log_likelihood,
+    unexplained_acceleration_size,
+    update_state,
+)
 
-LEVELS = (-0.25, -0.5, -0.9)
+LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
 # (leader of roll, pitch or yaw, theta); the last one is noise
-MODES = ((None, 0.0), *((s, level) for s in range(3) for level in LEVELS))
-N_MODES = len(MODES) + 1
-_LEAST = 1e-12  # no probability below it: a mode must be able to come back
+MODE_DEFINITIONS = ((None, 0.0), *((s, level) for s in range(3) for level in LOSS_THETA_LEVELS))
+N_MODES = len(MODE_DEFINITIONS) + 1
+_MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 
 
-def transition(stay: float, n: int) -> np.ndarray:
-    """Markov chain (n, n): stay with probability `stay`, else go anywhere alike."""
-    chain = np.full((n, n), (1.0 - stay) / (n - 1))
-    np.fill_diagonal(chain, stay)
-    return chain
+def transition_matrix(stay_probability: float, n_modes: int) -> np.ndarray:
+    """Markov chain (n, n): stay with that probability, else go anywhere alike."""
+    transition_probabilities = np.full((n_modes, n_modes), (1.0 - stay_probability) / (n_modes - 1))
+    np.fill_diagonal(transition_probabilities, stay_probability)
+    return transition_probabilities
 
 
-def mix(
-    x: np.ndarray, P: np.ndarray, probability: np.ndarray, chain: np.ndarray
+def mix_states(
+    x: np.ndarray, P: np.ndarray, mode_probability: np.ndarray, transition_probabilities: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mixed states (M, n), covariances (M, n, n) and predicted probabilities (M,) [Blom1988, steps 1 and
     2]."""
-    predicted = probability @ chain
-    weight = chain * probability[:, None] / predicted[None, :]
-    mean = weight.T @ x
-    off = x[:, None, :] - mean[None, :, :]
-    spread = P[:, None] + off[..., :, None] * off[..., None, :]
-    return mean, np.einsum("ij,ijab->jab", weight, spread), predicted
+    predicted_probabilities = mode_probability @ transition_probabilities
+    mixing_weights = transition_probabilities * mode_probability[:, None] / predicted_probabilities[None, :]
+    mixed_states = mixing_weights.T @ x
+    deviations = x[:, None, :] - mixed_states[None, :, :]
+    spread_covariances = P[:, None] + deviations[..., :, None] * deviations[..., None, :]
+    return (
+        mixed_states,
+        np.einsum("ij,ijab->jab", mixing_weights, spread_covariances),
+        predicted_probabilities,
+    )
 
 
-def posterior(predicted: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
+def posterior_probabilities(predicted_probabilities: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
     """Bayes' rule, in logarithms so that nothing underflows."""
-    score = np.log(predicted) + log_likelihoods
-    score = np.exp(score - score.max())
-    score = np.maximum(score / score.sum(), _LEAST)
-    return score / score.sum()
+    log_weights = np.log(predicted_probabilities) + log_likelihoods
+    log_weights = np.exp(log_weights - log_weights.max())
+    log_weights = np.maximum(log_weights / log_weights.sum(), _MIN_MODE_PROBABILITY)
+    return log_weights / log_weights.sum()
 
 
 class InteractingMultipleModels:
@@ -65,64 +74,79 @@ class InteractingMultipleModels:
 
     def reset(self, context: Context) -> None:
         """Healthy, almost certainly."""
-        self.context, self.option = context, options_of(self.name, self.defaults, context)
+        self.context, self.options = context, rival_options(self.name, self.defaults, context)
         self.dt = context.dt_s
-        self.chain = transition(self.option["stay"], N_MODES)
-        self.probability = np.full(N_MODES, _LEAST)
-        self.probability[0] = 1.0 - (N_MODES - 1) * _LEAST
-        self.air = Air(context)
-        rates = context.declared.rate_variance(self.option["measurement_rad_s"])
-        self.R = np.diag(rates)
-        self.x = np.zeros((N_MODES, 3 + self.air.n))
-        self.P = np.tile(np.diag(np.concatenate((rates, self.air.variance))), (N_MODES, 1, 1))
-        self.F = np.eye(3 + self.air.n)
-        self.F[:3, 3:], self.F[3:, 3:] = self.air.effect, np.diag(self.air.keep)
-        self.noise = np.full(N_MODES, self.option["noise"])
-        self.noise[-1] = self.option["unknown_noise"]
+        self.transition_probabilities = transition_matrix(self.options["stay"], N_MODES)
+        self.mode_probability = np.full(N_MODES, _MIN_MODE_PROBABILITY)
+        self.mode_probability[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
+        self.gust_states = GustStates(context)
+        rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
+        self.R = np.diag(rate_variance)
+        self.x = np.zeros((N_MODES, 3 + self.gust_states.n_states))
+        self.P = np.tile(
+            np.diag(np.concatenate((rate_variance, self.gust_states.initial_variance))), (N_MODES, 1, 1)
+        )
+        self.F = np.eye(3 + self.gust_states.n_states)
+        self.F[:3, 3:], self.F[3:, 3:] = self.gust_states.rate_effect, np.diag(self.gust_states.decay_factor)
+        self.acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
+        self.acceleration_noise_scale[-1] = self.options["unknown_noise"]
         self.detected = False
-        self.first = True
+        self.is_first_frame = True
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Mix, filter, weigh, decide."""
-        if self.first:
-            self.first, self.x[:, :3] = False, measured.x
+        if self.is_first_frame:
+            self.is_first_frame, self.x[:, :3] = False, measured.x
             return Verdict(statistic=0.0)
-        x, P, predicted = mix(self.x, self.P, self.probability, self.chain)
-        if self.air.n:
+        x, P, predicted_probabilities = mix_states(
+            self.x, self.P, self.mode_probability, self.transition_probabilities
+        )
+        if self.gust_states.n_states:
             x, P = x @ self.F.T, self.F @ P @ self.F.T
-            P[:, range(3, 6), range(3, 6)] += self.air.noise
+            P[:, range(3, 6), range(3, 6)] += self.gust_states.process_noise_variance
         x[:, :3] += self.dt * self.accelerations(measured)
-        size = unexplained(self.context, measured.eta_bar)
-        P[:, :3, :3] += np.einsum("m,ij->mij", (self.dt * self.noise) ** 2, np.diag(size**2))
+        acceleration_size = unexplained_acceleration_size(self.context, measured.eta_bar)
+        P[:, :3, :3] += np.einsum(
+            "m,ij->mij", (self.dt * self.acceleration_noise_scale) ** 2, np.diag(acceleration_size**2)
+        )
         nu = measured.x - x[:, :3]
-        self.x, self.P, S = update(x, P, nu, self.R)
-        self.probability = posterior(predicted, log_likelihood(nu, S))
+        self.x, self.P, S = update_state(x, P, nu, self.R)
+        self.mode_probability = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))
         return self.verdict()
 
     def accelerations(self, measured: Measured) -> np.ndarray:
-        """What each hypothesis makes of the elapsed frame, (M, 3) rad/s2."""
-        each = np.tile(measured.acceleration, (N_MODES, 1))
-        for m, (leader, theta) in enumerate(MODES):
+        """Compute each hypothesis' acceleration in the elapsed frame, (M, 3) rad/s2."""
+        accelerations = np.tile(measured.acceleration, (N_MODES, 1))
+        for m, (leader, theta) in enumerate(MODE_DEFINITIONS):
             if leader is not None:
-                each[m] += theta * measured.contribution[:, self.context.leading[leader]]
-        return each
+                accelerations[m] += theta * measured.contribution[:, self.context.leading[leader]]
+        return accelerations
 
     def verdict(self) -> Verdict:
         """The alarm by the odds of any fault; the surface by the sum of its hypotheses."""
-        healthy = self.probability[0]
-        statistic = float(np.log((1.0 - healthy) / healthy) / self.option["alarm"])
+        healthy_probability = self.mode_probability[0]
+        statistic = float(np.log((1.0 - healthy_probability) / healthy_probability) / self.options["alarm"])
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
-        unknown, known = float(self.probability[-1]), self.probability[1:-1].reshape(3, len(LEVELS))
-        likely = known.sum(axis=1)
-        if unknown > self.option["isolate"]:
+        unknown_fault_probability, loss_mode_probabilities = (
+            float(self.mode_probability[-1]),
+            self.mode_probability[1:-1].reshape(3, len(LOSS_THETA_LEVELS)),
+        )
+        surface_probabilities = loss_mode_probabilities.sum(axis=1)
+        if unknown_fault_probability > self.options["isolate"]:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)
-        worst = int(np.argmax(likely))
-        if likely[worst] < self.option["isolate"]:
-            least = 1.0 - self.option["isolate"]
-            left = tuple(s for s, p in zip(self.context.leaders, likely, strict=True) if p > least)
-            return Verdict(True, "pqr"[worst], statistic=statistic, candidates=left)
-        theta = float(known[worst] @ LEVELS / likely[worst])
-        name = self.context.leaders[worst]
-        return Verdict(True, "pqr"[worst], name, "loss_of_effectiveness", theta, None, statistic)
+        most_likely = int(np.argmax(surface_probabilities))
+        if surface_probabilities[most_likely] < self.options["isolate"]:
+            min_probability = 1.0 - self.options["isolate"]
+            candidates = tuple(
+                s
+                for s, p in zip(self.context.leaders, surface_probabilities, strict=True)
+                if p > min_probability
+            )
+            return Verdict(True, "pqr"[most_likely], statistic=statistic, candidates=candidates)
+        theta = float(
+            loss_mode_probabilities[most_likely] @ LOSS_THETA_LEVELS / surface_probabilities[most_likely]
+        )
+        name = self.context.leaders[most_likely]
+        return Verdict(True, "pqr"[most_likely], name, "loss_of_effectiveness", theta, None, statistic)

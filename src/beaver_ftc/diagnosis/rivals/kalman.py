@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 
 
-class Air:
+class GustStates:
     """n: states, 3, or none without a declaration. keep (n,): their decay over a frame.
 
     noise (n,): their process noise, variance. effect (3, n): what they add to the rates over a frame.
@@ -25,15 +25,15 @@ class Air:
 
     def __init__(self, context: Context) -> None:
         declared, dt = context.declared, context.dt_s
-        self.n = 3 if declared.air else 0
-        self.keep = np.exp(-dt / declared.gust_time_s[: self.n])
-        self.variance = declared.gust_rad_s[: self.n] ** 2
-        self.noise = (1.0 - self.keep**2) * self.variance
-        self.effect = dt * declared.gust_effect[:, : self.n]
+        self.n_states = 3 if declared.air else 0
+        self.decay_factor = np.exp(-dt / declared.gust_time_s[: self.n_states])
+        self.initial_variance = declared.gust_rad_s[: self.n_states] ** 2
+        self.process_noise_variance = (1.0 - self.decay_factor**2) * self.initial_variance
+        self.rate_effect = dt * declared.gust_effect[:, : self.n_states]
 
 
-def unexplained(context: Context, eta_bar: np.ndarray) -> np.ndarray:
-    """What is taken for the size (3,) rad/s2 of the acceleration that nothing explains.
+def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.ndarray:
+    """Return the assumed size (3,) rad/s2 of the acceleration that nothing explains.
 
     The declared bound, eta_bar, as long as it is the published one; with more declared that bound is the sum
     of all worst cases, instruments and air included, which have states or a variance of their own here.
@@ -42,49 +42,52 @@ def unexplained(context: Context, eta_bar: np.ndarray) -> np.ndarray:
     return np.hypot(context.constant_rad_s2, declared.model_rad_s2) if declared.errors else eta_bar
 
 
-def update(
+def update_state(
     z: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Condition (z, P) on the innovation nu (..., m) of the first m states; returns z, P and S (..., m,
     m)."""
-    m = nu.shape[-1]
-    S = P[..., :m, :m] + R
-    K = np.linalg.solve(S, P[..., :m, :]).swapaxes(-1, -2)
+    n_measured = nu.shape[-1]
+    S = P[..., :n_measured, :n_measured] + R
+    K = np.linalg.solve(S, P[..., :n_measured, :]).swapaxes(-1, -2)
     z = z + (K @ nu[..., None])[..., 0]
-    P = P - K @ P[..., :m, :]
+    P = P - K @ P[..., :n_measured, :]
     return z, 0.5 * (P + P.swapaxes(-1, -2)), S
 
 
-def normalised_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
+def normalised_innovation_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
     """nu' S^-1 nu: chi-square with as many degrees of freedom as nu has entries, if the filter is right."""
     return np.einsum("...i,...i->...", nu, np.linalg.solve(S, nu[..., None])[..., 0])
 
 
 def log_likelihood(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
     """Logarithm of the Gaussian density of the innovation."""
-    m = nu.shape[-1]
-    return -0.5 * (normalised_square(nu, S) + np.linalg.slogdet(S)[1] + m * np.log(2.0 * np.pi))
+    n_measured = nu.shape[-1]
+    return -0.5 * (
+        normalised_innovation_square(nu, S) + np.linalg.slogdet(S)[1] + n_measured * np.log(2.0 * np.pi)
+    )
 
 
-def sigma_points(z: np.ndarray, P: np.ndarray, spread: float) -> tuple[np.ndarray, np.ndarray]:
+def sigma_points(z: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.ndarray, np.ndarray]:
     """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean z and the covariance P.
 
-    spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one dimension.
+    point_spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one
+    dimension.
     """
-    n = len(z)
-    root = _root(spread * P).T
-    points = np.concatenate((z[None], z + root, z - root))
-    weights = np.full(2 * n + 1, 0.5 / spread)
-    weights[0] = 1.0 - n / spread
+    n_states = len(z)
+    scaled_root = _matrix_root(point_spread * P).T
+    points = np.concatenate((z[None], z + scaled_root, z - scaled_root))
+    weights = np.full(2 * n_states + 1, 0.5 / point_spread)
+    weights[0] = 1.0 - n_states / point_spread
     return points, weights
 
 
-def _root(P: np.ndarray) -> np.ndarray:
+def _matrix_root(P: np.ndarray) -> np.ndarray:
     """L with L L' = P. Where rounding has cost P its definiteness, as after a reading far beyond what the
     filter expects, what is below zero counts as nothing."""
     try:
         return np.linalg.cholesky(P)
     except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(P)
-        root: np.ndarray = vectors * np.sqrt(np.maximum(values, 0.0))
-        return root
+        eigenvalues, eigenvectors = np.linalg.eigh(P)
+        matrix_root: np.ndarray = eigenvectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+        return matrix_root

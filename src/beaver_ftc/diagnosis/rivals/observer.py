@@ -20,44 +20,55 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.diagnosis.rivals import rival_options
 
 
-class Fit:
+class SurfaceFit:
     """Fading sums of residual and regressors, and what each surface makes of them.
 
     J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold.
     """
 
-    def __init__(self, fade: float) -> None:
-        self._fade = fade
-        self.count, self.residual = 0.0, 0.0
-        self.cross, self.regressor = np.zeros(3), np.zeros(3)
+    def __init__(self, fading_factor: float) -> None:
+        self._fading_factor = fading_factor
+        self.weight_sum, self.residual_square_sum = 0.0, 0.0
+        self.cross_sums, self.regressor_square_sums = np.zeros(3), np.zeros(3)
 
     def step(self, eps: np.ndarray, Omega: np.ndarray) -> None:
         """Add one frame: eps (3,) and Omega (3, 3), a column a surface, both over the threshold."""
-        self.count = self._fade * self.count + 1.0
-        self.residual = self._fade * self.residual + float(eps @ eps)
-        self.cross = self._fade * self.cross + eps @ Omega
-        self.regressor = self._fade * self.regressor + (Omega**2).sum(axis=0)
+        self.weight_sum = self._fading_factor * self.weight_sum + 1.0
+        self.residual_square_sum = self._fading_factor * self.residual_square_sum + float(eps @ eps)
+        self.cross_sums = self._fading_factor * self.cross_sums + eps @ Omega
+        self.regressor_square_sums = self._fading_factor * self.regressor_square_sums + (Omega**2).sum(axis=0)
 
-    def best(self) -> tuple[int, float, float]:
+    def best_surface(self) -> tuple[int, float, float]:
         """(surface, theta, mean misfit square of an axis) of the surface that fits best."""
-        theta = np.clip(self.cross / np.maximum(self.regressor, 1e-300), -1.0, 0.0)
-        J = self.residual - 2.0 * theta * self.cross + theta**2 * self.regressor
-        s = int(np.argmin(J))
-        return s, float(theta[s]), float(J[s] / (3.0 * self.count))
+        theta = np.clip(self.cross_sums / np.maximum(self.regressor_square_sums, 1e-300), -1.0, 0.0)
+        misfit = (
+            self.residual_square_sum - 2.0 * theta * self.cross_sums + theta**2 * self.regressor_square_sums
+        )
+        best_surface = int(np.argmin(misfit))
+        return best_surface, float(theta[best_surface]), float(misfit[best_surface] / (3.0 * self.weight_sum))
 
 
-def residual_deviation(context: Context, a: float) -> np.ndarray:
+def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
     declared, dt = context.declared, context.dt_s
-    steady = np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - a)
-    r = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
-    air = dt * declared.turbulence_rad_s2 * np.sqrt((1.0 + a * r) / ((1.0 - a * a) * (1.0 - a * r)))
-    gyro = declared.gyro_rad_s * sqrt(2.0 / (1.0 + a))
-    return np.sqrt(steady**2 + air**2 + gyro**2)
+    constant_std = (
+        np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - decay_factor)
+    )
+    air_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
+    air_std = (
+        dt
+        * declared.turbulence_rad_s2
+        * np.sqrt(
+            (1.0 + decay_factor * air_correlation)
+            / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * air_correlation))
+        )
+    )
+    gyro_std = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
+    return np.sqrt(constant_std**2 + air_std**2 + gyro_std**2)
 
 
 class ConstantThresholdObserver:
@@ -68,43 +79,52 @@ class ConstantThresholdObserver:
 
     def reset(self, context: Context) -> None:
         """No residual."""
-        self.option = options_of(self.name, self.defaults, context)
-        self.leading, self.leaders = list(context.leading), context.leaders
-        pole = self.option["pole_per_s"]
-        self.dt, self.a = context.dt_s, exp(-pole * context.dt_s)
+        self.options = rival_options(self.name, self.defaults, context)
+        self.leading_surfaces, self.leaders = list(context.leading), context.leaders
+        pole_per_s = self.options["pole_per_s"]
+        self.dt_s, self.decay_factor = context.dt_s, exp(-pole_per_s * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
-        self.scale = self.option["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole
+        self.threshold = self.options["alarm"] * np.maximum(context.constant_rad_s2, 1e-4) / pole_per_s
         if context.declared.errors:
-            self.scale = self.option["alarm"] * residual_deviation(context, self.a)
-        self.eps, self.since, self.Omega = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-        self.before: np.ndarray | None = None
-        self.fit = Fit(exp(-context.dt_s / self.option["window_s"]))
-        self.alarm_s: float | None = None
-        self.axis, self.named = "p", Verdict()
+            self.threshold = self.options["alarm"] * healthy_residual_std(context, self.decay_factor)
+        self.eps, self.residual_since_alarm, self.filtered_effects = (
+            np.zeros(3),
+            np.zeros(3),
+            np.zeros((3, 3)),
+        )
+        self.previous_rates: np.ndarray | None = None
+        self.surface_fit = SurfaceFit(exp(-context.dt_s / self.options["window_s"]))
+        self.alarm_at_s: float | None = None
+        self.alarm_axis, self.isolation_verdict = "p", Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Filter the innovation, compare, and from the alarm on ask whose effect it is."""
-        if self.before is not None:
-            innovation = measured.x - self.before - self.dt * measured.acceleration
-            self.eps = self.a * self.eps + innovation
-            self.since = self.a * self.since + innovation
-            self.Omega = self.a * self.Omega + self.dt * measured.contribution[:, self.leading]
-        self.before = measured.x
-        share = np.abs(self.eps) / self.scale
-        statistic = float(share.max())
-        if statistic > 1.0 and self.alarm_s is None:
-            self.alarm_s, self.axis = measured.t_s, "pqr"[int(np.argmax(share))]
-            self.since, self.Omega = np.zeros(3), np.zeros((3, 3))
-        if self.alarm_s is None:
+        if self.previous_rates is not None:
+            innovation = measured.x - self.previous_rates - self.dt_s * measured.acceleration
+            self.eps = self.decay_factor * self.eps + innovation
+            self.residual_since_alarm = self.decay_factor * self.residual_since_alarm + innovation
+            self.filtered_effects = (
+                self.decay_factor * self.filtered_effects
+                + self.dt_s * measured.contribution[:, self.leading_surfaces]
+            )
+        self.previous_rates = measured.x
+        threshold_share = np.abs(self.eps) / self.threshold
+        statistic = float(threshold_share.max())
+        if statistic > 1.0 and self.alarm_at_s is None:
+            self.alarm_at_s, self.alarm_axis = measured.t_s, "pqr"[int(np.argmax(threshold_share))]
+            self.residual_since_alarm, self.filtered_effects = np.zeros(3), np.zeros((3, 3))
+        if self.alarm_at_s is None:
             return Verdict(statistic=statistic)
-        if measured.t_s <= self.alarm_s + self.option["window_s"]:
-            self.named = self.verdict()
-        return self.named._replace(statistic=statistic)
+        if measured.t_s <= self.alarm_at_s + self.options["window_s"]:
+            self.isolation_verdict = self.verdict()
+        return self.isolation_verdict._replace(statistic=statistic)
 
     def verdict(self) -> Verdict:
         """The surface that fits; none fits if what it leaves is still over the threshold in the mean."""
-        self.fit.step(self.since / self.scale, self.Omega / self.scale[:, None])
-        s, theta, misfit = self.fit.best()
+        self.surface_fit.step(
+            self.residual_since_alarm / self.threshold, self.filtered_effects / self.threshold[:, None]
+        )
+        s, theta, misfit = self.surface_fit.best_surface()
         if misfit > 1.0:
-            return Verdict(True, self.axis, "unanticipated", "unanticipated")
-        return Verdict(True, self.axis, self.leaders[s], "loss_of_effectiveness", theta)
+            return Verdict(True, self.alarm_axis, "unanticipated", "unanticipated")
+        return Verdict(True, self.alarm_axis, self.leaders[s], "loss_of_effectiveness", theta)

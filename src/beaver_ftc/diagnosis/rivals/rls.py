@@ -17,8 +17,8 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis.base import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import options_of
+from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.diagnosis.rivals import rival_options
 
 
 class RecursiveLeastSquares:
@@ -28,39 +28,42 @@ class RecursiveLeastSquares:
     P, which would otherwise grow without excitation.
     """
 
-    def __init__(self, n: int, forgetting: float, prior: float) -> None:
-        self.w, self.P = np.zeros(n), np.eye(n) * prior
-        self._forgetting, self._prior = forgetting, prior
+    def __init__(self, n_parameters: int, forgetting_factor: float, prior_variance: float) -> None:
+        self.weights, self.P = np.zeros(n_parameters), np.eye(n_parameters) * prior_variance
+        self._forgetting_factor, self._prior_variance = forgetting_factor, prior_variance
 
     def step(self, phi: np.ndarray, y: float) -> float:
         """Learn from one sample; returns the error of the prediction made before it."""
         Pphi = self.P @ phi
-        gain = Pphi / (self._forgetting + phi @ Pphi)
-        error = y - float(self.w @ phi)
-        self.w = self.w + gain * error
-        P = (self.P - np.outer(gain, Pphi)) / self._forgetting
-        largest = float(P.diagonal().max())
-        self.P = P if largest <= self._prior else P * (self._prior / largest)
-        return error
+        gain = Pphi / (self._forgetting_factor + phi @ Pphi)
+        prediction_error = y - float(self.weights @ phi)
+        self.weights = self.weights + gain * prediction_error
+        P = (self.P - np.outer(gain, Pphi)) / self._forgetting_factor
+        max_variance = float(P.diagonal().max())
+        self.P = P if max_variance <= self._prior_variance else P * (self._prior_variance / max_variance)
+        return prediction_error
 
 
-class Pair:
+class InputOutputPair:
     """One input, one output: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a constant."""
 
-    def __init__(self, forgetting: float, fade: float, floor: float) -> None:
-        self._model = RecursiveLeastSquares(5, forgetting, 1e4)
-        self._fade, self._floor = fade, floor
-        self._past = np.zeros(5)
-        self._past[4] = 1.0
-        self.mean, self.variance = 0.0, 0.0
+    def __init__(self, forgetting_factor: float, averaging_decay: float, min_error_std: float) -> None:
+        self._model = RecursiveLeastSquares(5, forgetting_factor, 1e4)
+        self._averaging_decay, self._min_error_std = averaging_decay, min_error_std
+        self._regressor = np.zeros(5)
+        self._regressor[4] = 1.0
+        self.error_mean, self.error_variance = 0.0, 0.0
 
     def step(self, u: float, y: float) -> float:
         """|z| of the newest output; then learn from it."""
-        error = self._model.step(self._past, y)
-        score = abs(error - self.mean) / sqrt(self.variance + self._floor**2)
-        self.mean += (1.0 - self._fade) * (error - self.mean)
-        self.variance = self._fade * self.variance + (1.0 - self._fade) * (error - self.mean) ** 2
-        self._past = np.array([y, self._past[0], u, self._past[2], 1.0])
+        prediction_error = self._model.step(self._regressor, y)
+        score = abs(prediction_error - self.error_mean) / sqrt(self.error_variance + self._min_error_std**2)
+        self.error_mean += (1.0 - self._averaging_decay) * (prediction_error - self.error_mean)
+        self.error_variance = (
+            self._averaging_decay * self.error_variance
+            + (1.0 - self._averaging_decay) * (prediction_error - self.error_mean) ** 2
+        )
+        self._regressor = np.array([y, self._regressor[0], u, self._regressor[2], 1.0])
         return score
 
 
@@ -78,25 +81,27 @@ class RlsMonitor:
 
     def reset(self, context: Context) -> None:
         """Know nothing."""
-        self.option = options_of(self.name, self.defaults, context)
-        forgetting = exp(-context.dt_s / self.option["forgetting_s"])
-        fade = exp(-context.dt_s / self.option["score_s"])
-        floor = np.hypot(self.option["floor_rad_s"], context.declared.gyro_rad_s)
-        self.pairs = [Pair(forgetting, fade, float(floor[i])) for i in range(3)]
-        self.leading, self.leaders = context.leading, context.leaders
+        self.options = rival_options(self.name, self.defaults, context)
+        forgetting_factor = exp(-context.dt_s / self.options["forgetting_s"])
+        averaging_decay = exp(-context.dt_s / self.options["score_s"])
+        min_error_std = np.hypot(self.options["floor_rad_s"], context.declared.gyro_rad_s)
+        self.pairs = [
+            InputOutputPair(forgetting_factor, averaging_decay, float(min_error_std[i])) for i in range(3)
+        ]
+        self.leading_surfaces, self.leaders = context.leading, context.leaders
         self.verdict = Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Score every pair; the first beyond the limit is the fault."""
         scores = [
             pair.step(float(command[s]), float(rate))
-            for pair, s, rate in zip(self.pairs, self.leading, measured.x, strict=True)
+            for pair, s, rate in zip(self.pairs, self.leading_surfaces, measured.x, strict=True)
         ]
-        if measured.t_s < self.option["warm_up_s"]:
+        if measured.t_s < self.options["warm_up_s"]:
             return Verdict(statistic=0.0)
-        worst = int(np.argmax(scores))
-        statistic = scores[worst] / self.option["alarm"]
+        worst_pair = int(np.argmax(scores))
+        statistic = scores[worst_pair] / self.options["alarm"]
         if statistic > 1.0 and not self.verdict.detected:
-            surface = self.leaders[worst]
-            self.verdict = Verdict(True, "pqr"[worst], surface, candidates=(surface,))
+            surface = self.leaders[worst_pair]
+            self.verdict = Verdict(True, "pqr"[worst_pair], surface, candidates=(surface,))
         return self.verdict._replace(statistic=statistic)

@@ -1,7 +1,7 @@
 """The diagnosis as a whole: its record, its configuration, and the kernels of the scheme in charge.
 
 `begin`, `predict`, `conclude`, `prepare` and `accumulate` call the kernel of a scheme by its number
-(contract.CompiledScheme; state.SCHEME_KERNELS). The frame (loop/frame.py) calls them.
+(adaptive_estimators.CompiledScheme; state.SCHEME_PATHS). The frame (loop/frame.py) calls them.
 
 fdi: of `diagnosis_dtype`; t s.
 """
@@ -11,17 +11,17 @@ from importlib import import_module
 import numpy as np
 
 from beaver_ftc.compiled import kernel, one_of, record, sized
-from beaver_ftc.diagnosis import bounds, isolation, state
+from beaver_ftc.diagnosis import bounds, isolation, monitors, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.diagnosis.detection.filters import largest_share
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize
-from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR
+from beaver_ftc.diagnosis.detection.filters import max_residual_threshold_ratio
+from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, StatisticalRecordSize
+from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
-from beaver_ftc.diagnosis.schemes.contract import CompiledScheme
-from beaver_ftc.diagnosis.state import SCHEME_KERNELS, STATISTICAL_DETECTOR
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme
+from beaver_ftc.diagnosis.state import SCHEME_PATHS, STATISTICAL_DETECTOR
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
@@ -30,96 +30,109 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
-def diagnosis_dtype(n: int, size: RecordSize = USUAL_SIZE) -> np.dtype:
+def diagnosis_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
     return record(
-        config=state.CONFIG, bound=bound_dtype(n, size.boxes), bank=filters.BANK, fdae=filters.FDAE,
+        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_error_map_boxes),
+        bank=filters.BANK_RECORD,
+        fdae=filters.FDAE_RECORD,
         verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n),
         types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size),
-        sensor_monitor=SENSOR_MONITOR, published=published.PUBLISHED_RECORD, engines=engine_symmetry.ENGINES,
+        sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
+        engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
     )  # fmt: skip
 
 
-def configure_diagnosis(fdi: np.void, belief: np.void, scenario: Scenario, travel: np.ndarray) -> None:
-    """Fill in the stages of the diagnosis; belief: already filled in. travel (2, n) rad: the stops."""
+def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, travel: np.ndarray) -> None:
+    """Fill in the stages of the diagnosis; prediction: already filled in. travel (2, n) rad: the stops."""
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
-    members = isolation.members_of(config.fault_class, aircraft)
-    state.configure_shared(fdi["config"], scenario)
-    fdi["config"]["fault_class"] = adaptive_estimators.fault_class_number(config)
-    state.configure_layout(fdi["layout"], members, aircraft)
-    isolation.configure_isolation(fdi["isolation"], scenario, members, travel)
+    estimator_entries = isolation.list_isolation_estimators(config.fault_class, aircraft)
+    state.configure_shared_config(fdi["config"], scenario)
+    fdi["config"]["isolation_variant"] = adaptive_estimators.isolation_variant_number(config)
+    state.configure_layout(fdi["layout"], estimator_entries, aircraft)
+    isolation.configure_isolation(fdi["isolation"], scenario, estimator_entries, travel)
     if config.pairs:
-        _check_pairs(scenario)
+        _refuse_unavailable_pairs(scenario)
     declared = Declared.of(scenario)
-    bounds.configure_bound(fdi["bound"], scenario, declared, belief["design"])
+    bounds.configure_uncertainty_bound(fdi["bound"], scenario, declared, prediction["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
     filters.configure_fdae(fdi["fdae"], scenario)
-    engine_symmetry.configure_engine_monitor(fdi["engines"]["config"], aircraft)
+    monitors.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         published.configure_published(fdi, scenario, travel)
-    registry.configure_types(fdi["types"], fdi["layout"], belief["actuators"], scenario, travel)
+    registry.configure_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
     fdi["types"]["config"]["has_surface_errors"] = fdi["bound"]["has_surface_errors"]
-    conclusions.configure_conclusion(fdi["verdict"])
+    conclusions.reset_conclusion(fdi["verdict"])
 
 
-def restart_diagnosis(fdi: np.void, before: np.void, in_flight: bool) -> None:
-    """Prepare a configured diagnosis to take over from the one in `before`, of the same flight.
+def restart_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
+    """Prepare a configured diagnosis to take over from the one in `previous_fdi`, of the same flight.
 
     Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.
     in_flight: whether the air moves by then. The sensor monitor's first JSBSim frame begins a frame of the
     loop.
     """
-    fdi["statistical"]["alarm"]["closest"] = before["statistical"]["alarm"]["closest"]
-    if fdi["bank"]["config"]["n"] == before["bank"]["config"]["n"]:
-        fdi["bank"]["output"]["closest"] = before["bank"]["output"]["closest"]
-    for air in ("air", "inertial_air"):
-        fdi["statistical"][air]["config"]["in_flight"] = in_flight
+    fdi["statistical"]["alarm"]["max_score_over_alarm_level"] = previous_fdi["statistical"]["alarm"][
+        "max_score_over_alarm_level"
+    ]
+    if fdi["bank"]["config"]["n_filters"] == previous_fdi["bank"]["config"]["n_filters"]:
+        fdi["bank"]["output"]["max_threshold_ratio_so_far"] = previous_fdi["bank"]["output"][
+            "max_threshold_ratio_so_far"
+        ]
+    for gust in ("gust", "inertial_gust"):
+        fdi["statistical"][gust]["config"]["starts_in_flight"] = in_flight
     fdi["sensor_monitor"]["memory"]["substep"] = 0
 
 
-def _check_pairs(scenario: Scenario) -> None:
+def _refuse_unavailable_pairs(scenario: Scenario) -> None:
     """Raises BadInput where a change in flight declares errors with which pairs are not available."""
-    if why := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):
-        raise BadInput(f"{scenario.name}: fdi.pairs: {why}, allowed: false")
+    if refusal := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):
+        raise BadInput(f"{scenario.name}: fdi.pairs: {refusal}, allowed: false")
 
 
 @kernel
-def record_named_surfaces(fdi, t):
-    """Record at t s which surfaces are named: those of a pair, or the isolated one; none once a sensor is
+def record_isolated_surfaces(fdi, t):
+    """Record at t s which surfaces are isolated: those of a pair, or the isolated one; none once a sensor is
     found broken."""
-    found, monitor = fdi.verdict, fdi.sensor_monitor
-    void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
-    only = conclusions.isolated_surface(found, fdi.isolation.estimator)
+    conclusion, monitor = fdi.verdict, fdi.sensor_monitor
+    is_void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_isolated_surface
+    sole_isolated_surface = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
-        named = fdi.types.surface[s].status.named if fdi.types.pair.enabled else s == only
-        conclusions.record_named(found, s, named and not void, t)
+        is_isolated = (
+            fdi.types.surface[s].status.is_isolated if fdi.types.pair.enabled else s == sole_isolated_surface
+        )
+        conclusions.update_isolation_interval(conclusion, s, is_isolated and not is_void, t)
 
 
 @kernel
-def built_in_statistic(bank, alarm, authority, uses_estimates):
+def built_in_statistic(bank, alarm, authority, uses_statistical_estimates):
     """The largest share of its threshold that the built-in detection reaches at this frame; alarm: `ALARM` of
     the statistical detector; likely: whether its estimates count.
 
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.
     """
-    score = alarm.score if uses_estimates else 0.0
+    statistical_score = alarm.score_over_alarm_level if uses_statistical_estimates else 0.0
     if authority == STATISTICAL_DETECTOR:
-        return score
-    certain = largest_share(bank)
-    return max(score, certain) if certain > 1.0 or not uses_estimates else score
+        return statistical_score
+    worst_case_share = max_residual_threshold_ratio(bank)
+    return (
+        max(statistical_score, worst_case_share)
+        if worst_case_share > 1.0 or not uses_statistical_estimates
+        else statistical_score
+    )
 
 
-def _scheme(place: str) -> CompiledScheme:
+def _load_scheme(path: str) -> CompiledScheme:
     """The scheme at `module` or `module:NAME`; without a name SCHEME."""
-    module, _, name = place.partition(":")
-    found: CompiledScheme = getattr(import_module(module), name or "SCHEME")
-    return found
+    module, _, name = path.partition(":")
+    scheme: CompiledScheme = getattr(import_module(module), name or "SCHEME")
+    return scheme
 
 
-SCHEMES = tuple(map(_scheme, SCHEME_KERNELS))
+SCHEMES = tuple(map(_load_scheme, SCHEME_PATHS))
 
 begin = one_of([scheme.begin for scheme in SCHEMES])
 predict = one_of([scheme.predict for scheme in SCHEMES])

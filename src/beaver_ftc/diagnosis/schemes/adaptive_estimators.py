@@ -1,16 +1,18 @@
-"""Our scheme: detection by the bank of filters and the statistical detector, isolation by fault class.
+"""Compiled schemes: their contract with the frame, our scheme, and those of a plug-in and of no diagnosis.
 
+Our scheme (SCHEME) detects by the bank of filters and the statistical detector, and isolates by fault class.
 The acceleration by known faults is part of the prediction, so the estimator of the unknown explains the rest.
-A Python plug-in has a scheme of its own (PLUGGED): its verdict replaces ours, and our estimators run on,
-because the laws use them.
+A Python plug-in has a scheme of its own (PYTHON_PLUGIN): its verdict replaces ours, and our estimators run
+on, because the laws use them. The scheme `none` (NO_DIAGNOSIS) only begins the detection filters.
 
-The isolation depends on the fault class and on the detectors in authority; a row of FAULT_CLASSES for each:
+The isolation depends on the fault class and on the detectors in authority; a row of ISOLATION_VARIANTS for
+each:
 
     class        of the bank of estimators excludes  and decides
     published    worst case, statistics, or either   the estimator that is left: a loss of one surface
     all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
 
-`fault_class_number` chooses the row when a flight is assembled.
+`isolation_variant_number` chooses the row when a flight is assembled.
 """
 
 from collections.abc import Callable
@@ -18,24 +20,106 @@ from typing import NamedTuple
 
 from beaver_ftc.compiled import apart, kernel, one_of
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
-from beaver_ftc.diagnosis import conclusion, gusts, isolation
+from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
-from beaver_ftc.diagnosis.expectation import form_innovation, predict_control_effect
-from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.schemes import contract
-from beaver_ftc.diagnosis.schemes.contract import CompiledScheme
+from beaver_ftc.diagnosis.model_prediction import form_innovation, predict_control_effect
+from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import pairs, registry, verdict
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 
-class FaultClass(NamedTuple):
+class CompiledScheme(NamedTuple):
+    """Lazy kernels (compiled.py), called with `fdi` (`diagnosis_dtype`), and `prediction` and `measured`, the
+    records of the prediction and the sensors. A row of plugins.yaml names
+    the scheme: `module`, whose SCHEME it is, or `module:NAME`.
+
+    begin(fdi, prediction, measured): start the estimators at the first frame.
+    predict(fdi, prediction, measured, k, t): bring the estimators from the frame before to frame k at t s.
+    conclude(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
+    prepare(fdi, prediction, measured, k): prepare the estimators for the next frame.
+    accumulate(fdi, prediction, measured): add one JSBSim frame inside the next frame.
+    """
+
+    begin: Callable[..., None]
+    predict: Callable[..., None]
+    conclude: Callable[..., None]
+    prepare: Callable[..., None]
+    accumulate: Callable[..., None]
+
+
+@apart
+def predict_nothing(fdi, prediction, measured, k, t):
+    """The `predict` of a scheme without estimators."""
+
+
+@apart
+def conclude_nothing(fdi, prediction, measured, t):
+    """The `conclude` of a scheme without a verdict."""
+
+
+@apart
+def prepare_nothing(fdi, prediction, measured, k):
+    """The `prepare` of a scheme whose estimators need nothing but the means over the frame."""
+
+
+@apart
+def accumulate_nothing(fdi, prediction, measured):
+    """The `accumulate` of such a scheme."""
+
+
+@kernel
+def begin_filters(fdi, x):
+    """Begin the detection filters at the first measurement x (3,) rad/s."""
+    filters.start_fdae(fdi.fdae, fdi.bound.gyro_change_bound, x)
+    filters.start_bank(fdi.bank, fdi.bound.gyro_change_bound)
+
+
+@kernel
+def update_estimators(fdi, prediction):
+    """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
+    config, bound, isolation_record, frame_means = (
+        fdi.config,
+        fdi.bound,
+        fdi.isolation,
+        prediction.frame_means,
+    )
+    is_detected = fdi.verdict.detected
+    isolation.update_hypotheses(
+        isolation_record,
+        fdi.bank,
+        bound,
+        config,
+        is_detected,
+        frame_means.G,
+        frame_means.Gu,
+        frame_means.Gu_spread,
+    )
+    if is_detected:
+        isolation.predict_estimators(
+            isolation_record, bound, prediction.x_before, frame_means.acceleration, config.dt
+        )
+
+
+@apart
+def begin_without_diagnosis(fdi, prediction, measured):
+    """Begin the detection filters, which the log records (CompiledScheme)."""
+    begin_filters(fdi, measured.x)
+
+
+NO_DIAGNOSIS = CompiledScheme(
+    begin_without_diagnosis, predict_nothing, conclude_nothing, prepare_nothing, accumulate_nothing
+)  # fmt: skip
+
+
+class IsolationVariant(NamedTuple):
     """Lazy kernels of a row.
 
     begin(fdi): start, at the alarm, with no knowledge of any fault.
-    observe(fdi, belief): record what each surface was commanded in the elapsed frame.
-    isolate(fdi, measured, t, started): exclude faults at t s, and decide; started: a frame or more ago.
+    observe(fdi, prediction): record what each surface was commanded in the elapsed frame.
+    isolate(fdi, measured, t, isolation_has_run): exclude faults at t s, and decide; isolation_has_run: it
+    started a frame or more ago.
     """
 
     begin: Callable[..., None]
@@ -44,25 +128,39 @@ class FaultClass(NamedTuple):
 
 
 @kernel
-def isolate_fault(fdi, measured, t, known):
-    """From the alarm on, exclude faults and decide; known: whether the alarm came a frame or more ago.
+def isolate_fault(fdi, measured, t, was_detected_before):
+    """From the alarm on, exclude faults and decide; was_detected_before: the alarm came a frame or more ago.
 
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
     a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
     """
-    row, monitor = fdi.config.fault_class, fdi.sensor_monitor
-    if not known:
-        isolation.start_estimators(fdi.isolation, fdi.bound.noise, measured.x)
-        begin_by_class(row, fdi)
-    sound = not sensor_monitor.alarm_is_at_start(monitor, fdi.verdict.detected_at_s)
-    if sound and sensor_monitor.allows_isolation(monitor, known) and not fdi.engines.output.failed:
-        isolate_by_class(row, fdi, measured, t, known)
+    variant, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
+    if not was_detected_before:
+        isolation.start_estimators(fdi.isolation, fdi.bound.gyro_change_bound, measured.x)
+        begin_isolation_variant(variant, fdi)
+    sensors_are_sound = not sensor_monitor.surface_alarm_may_be_initial_error(
+        monitor, fdi.verdict.detected_at_s
+    )
+    if (
+        sensors_are_sound
+        and sensor_monitor.allows_surface_isolation(monitor, was_detected_before)
+        and not fdi.engine_monitor.output.failed
+    ):
+        isolate_by_variant(variant, fdi, measured, t, was_detected_before)
 
 
 @kernel
-def is_possible_in_worst_case(fdi, fie, x, started):
+def is_possible_in_worst_case(fdi, fie, x, isolation_has_run):
     """Whether the fault of estimator fie is possible in the worst case; x (3,) rad/s: measured."""
-    return isolation.is_possible(fdi.isolation, fie, fdi.bank, fdi.bound.frame, fdi.config.abrupt, x, started)
+    return isolation.is_fault_possible(
+        fdi.isolation,
+        fie,
+        fdi.bank,
+        fdi.bound.frame_innovation_bound,
+        fdi.config.abrupt,
+        x,
+        isolation_has_run,
+    )
 
 
 @kernel
@@ -71,10 +169,10 @@ def likelihood_excludes(fdi, fie):
     detector, config = fdi.statistical, fdi.config
     if detector.alarm.detected_at_s < 0.0:
         return False
-    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.air.output.moving
+    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.gust.output.is_turbulent
     isolation.update_likelihood_exclusion(
         fie,
-        detector.tests,
+        detector.test_config,
         detector.block,
         fdi.isolation,
         fdi.layout.loss_estimator,
@@ -87,278 +185,332 @@ def likelihood_excludes(fdi, fie):
 @kernel
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    detector, position = fdi.statistical, fdi.layout.position_estimator[fie.surface]
-    views, column = detector.views[: detector.n_views], fdi.isolation.estimator[position].effect.Z
-    return parity.excludes_surface(views, detector.tests, detector.forces, detector.air, fie.surface, column)
+    detector, position_estimator = fdi.statistical, fdi.layout.position_estimator[fie.surface]
+    views, effect_column = (
+        detector.views[: detector.n_views],
+        fdi.isolation.estimator[position_estimator].effect.regressor,
+    )
+    return parity.excludes_surface(
+        views, detector.test_config, detector.forces, detector.gust, fie.surface, effect_column
+    )
 
 
 @kernel
-def exclude_by_worst_case(fdi, x, t, started):
+def exclude_by_worst_case(fdi, x, t, isolation_has_run):
     """Exclude the faults that are not possible in the worst case."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n]:
-        if not is_possible_in_worst_case(fdi, fie, x, started):
+    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+        if not is_possible_in_worst_case(fdi, fie, x, isolation_has_run):
             isolation.exclude_fault(fie, t)
 
 
 @kernel
-def decide_loss(fdi, t):
+def decide_isolated_loss(fdi, t):
     """Isolate the loss of effectiveness whose estimator is the only one left."""
-    conclusion.record_isolated(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
+    conclusion.record_isolated_estimator(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
 
 
 @apart
-def isolate_loss(fdi, measured, t, started):
-    """Isolate by the worst case alone (FaultClass)."""
-    exclude_by_worst_case(fdi, measured.x, t, started)
-    decide_loss(fdi, t)
+def isolate_loss(fdi, measured, t, isolation_has_run):
+    """Isolate by the worst case alone (IsolationVariant)."""
+    exclude_by_worst_case(fdi, measured.x, t, isolation_has_run)
+    decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_loss_by_either(fdi, measured, t, started):
-    """Isolate by the worst case and the statistical detector (FaultClass)."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n]:
-        if not is_possible_in_worst_case(fdi, fie, measured.x, started) or likelihood_excludes(fdi, fie):
+def isolate_loss_by_either(fdi, measured, t, isolation_has_run):
+    """Isolate by the worst case and the statistical detector (IsolationVariant)."""
+    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+        if not is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run) or likelihood_excludes(
+            fdi, fie
+        ):
             isolation.exclude_fault(fie, t)
-    decide_loss(fdi, t)
+    decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_loss_by_statistics(fdi, measured, t, started):
-    """Isolate by the statistical detector alone (FaultClass); the residuals are logged all the same."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n]:
-        is_possible_in_worst_case(fdi, fie, measured.x, started)
+def isolate_loss_by_statistics(fdi, measured, t, isolation_has_run):
+    """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
+    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+        is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run)
         if likelihood_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
-    decide_loss(fdi, t)
+    decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_type(fdi, measured, t, started):
-    """Isolate a fault of any type by the worst case alone (FaultClass)."""
-    exclude_by_worst_case(fdi, measured.x, t, started)
-    decide_type(fdi, t, started)
+def isolate_fault_type(fdi, measured, t, isolation_has_run):
+    """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
+    exclude_by_worst_case(fdi, measured.x, t, isolation_has_run)
+    decide_fault_type(fdi, t, isolation_has_run)
 
 
 @apart
-def isolate_type_by_either(fdi, measured, t, started):
-    """Isolate a fault of any type by the worst case and the parity views (FaultClass)."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n]:
-        if not is_possible_in_worst_case(fdi, fie, measured.x, started) or parity_excludes(fdi, fie):
+def isolate_fault_type_by_either(fdi, measured, t, isolation_has_run):
+    """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
+    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+        if not is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run) or parity_excludes(
+            fdi, fie
+        ):
             isolation.exclude_fault(fie, t)
-    decide_type(fdi, t, started)
+    decide_fault_type(fdi, t, isolation_has_run)
 
 
 @kernel
-def decide_type(fdi, t, started):
+def decide_fault_type(fdi, t, isolation_has_run):
     """Decide which fault of every type, alone or two at a time, is there."""
-    types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
-    records, bound = fdi.isolation.estimator, fdi.bound
-    verdict.record_refuted(types.surface, layout, records)
+    types, conclusion_record, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
+    estimators, bound = fdi.isolation.estimator, fdi.bound
+    verdict.record_excluded_estimators(types.surface, layout, estimators)
     if types.pair.enabled:
-        pairs.examine_pairs(types, layout, records, bank, bound.frame)
-        conclusion.record_finding(found, pairs.decide_pairs(types, found, layout, t))
+        pairs.observe_and_judge_pairs(types, layout, estimators, bank, bound.frame_innovation_bound)
+        conclusion.record_isolation_finding(
+            conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
+        )
         return
-    if started or fdi.isolation.config.memory:
-        registry.examine_frame(types, layout, records, bank.output.innovation, bound)
-    conclusion.record_finding(found, verdict.decide_surface_and_type(types, found, layout, records, t))
+    if isolation_has_run or fdi.isolation.config.uses_reach_test:
+        registry.observe_and_judge_frame(types, layout, estimators, bank.output.innovation, bound)
+    conclusion.record_isolation_finding(
+        conclusion_record, verdict.decide_surface_and_type(types, conclusion_record, layout, estimators, t)
+    )
 
 
 @apart
-def begin_losses(fdi):
-    """The estimators are all that a loss needs (FaultClass)."""
+def begin_loss_isolation(fdi):
+    """The estimators are all that a loss needs (IsolationVariant)."""
 
 
 @apart
-def begin_types(fdi):
-    """Start the feasible sets of all types (FaultClass)."""
+def begin_fault_type_isolation(fdi):
+    """Start the feasible sets of all types (IsolationVariant)."""
     registry.restart_types(fdi.types)
 
 
 @apart
-def observe_losses(fdi, belief):
-    """The estimators have observed all that a loss needs (FaultClass)."""
+def observe_nothing_for_losses(fdi, prediction):
+    """The estimators have observed all that a loss needs (IsolationVariant)."""
 
 
 @apart
-def observe_types(fdi, belief):
-    """Record the orders to each surface (FaultClass)."""
-    registry.record_commands(fdi.types, belief.commanded, belief.means)
+def observe_surface_commands(fdi, prediction):
+    """Record the orders to each surface (IsolationVariant)."""
+    registry.record_commands(fdi.types, prediction.commanded, prediction.frame_means)
 
 
-FAULT_CLASSES = {
-    ("published", "worst-case"): FaultClass(begin_losses, observe_losses, isolate_loss),
-    ("published", "either"): FaultClass(begin_losses, observe_losses, isolate_loss_by_either),
-    ("published", "statistical"): FaultClass(begin_losses, observe_losses, isolate_loss_by_statistics),
-    ("all", "worst-case"): FaultClass(begin_types, observe_types, isolate_type),
-    ("all", "either"): FaultClass(begin_types, observe_types, isolate_type_by_either),
+ISOLATION_VARIANTS = {
+    ("published", "worst-case"): IsolationVariant(
+        begin_loss_isolation, observe_nothing_for_losses, isolate_loss
+    ),
+    ("published", "either"): IsolationVariant(
+        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_either
+    ),
+    ("published", "statistical"): IsolationVariant(
+        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_statistics
+    ),
+    ("all", "worst-case"): IsolationVariant(
+        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type
+    ),
+    ("all", "either"): IsolationVariant(
+        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type_by_either
+    ),
 }
-PUBLISHED_CLASS = 0  # the place of the published class without statistics
+PUBLISHED_WORST_CASE_VARIANT = 0  # the place of the published class without statistics
 
-begin_by_class = one_of([row.begin for row in FAULT_CLASSES.values()])
-observe_by_class = one_of([row.observe for row in FAULT_CLASSES.values()])
-isolate_by_class = one_of([row.isolate for row in FAULT_CLASSES.values()])
+begin_isolation_variant = one_of([row.begin for row in ISOLATION_VARIANTS.values()])
+observe_in_isolation_variant = one_of([row.observe for row in ISOLATION_VARIANTS.values()])
+isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()])
 
 
-def fault_class_number(config: FdiConfig) -> int:
+def isolation_variant_number(config: FdiConfig) -> int:
     """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
     authority = config.authority if config.weighs_chance else "worst-case"
     if config.fault_class == "all" and authority == "statistical":
         authority = "either"
-    return list(FAULT_CLASSES).index((config.fault_class, authority))
+    return list(ISOLATION_VARIANTS).index((config.fault_class, authority))
 
 
 @apart
-def update_statistical_tests(fdi, belief, measured, k, t):
+def update_statistical_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    detector, y, bounded = fdi.statistical, measured.y, fdi.statistical.noise.bounded
-    tests, blocks, gust, force_record = detector.tests, detector.block, detector.air, detector.forces
-    views, inertial, mean = detector.views[: detector.n_views], detector.inertial_air, belief.means
+    detector, y, uncertainty_bound = fdi.statistical, measured.y, fdi.statistical.noise.uncertainty_bound
+    tests, blocks, gust, force_record = detector.test_config, detector.block, detector.gust, detector.forces
+    parity_views, inertial_gust, mean = (
+        detector.views[: detector.n_views],
+        detector.inertial_gust,
+        prediction.frame_means,
+    )
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
-    gusts.average_gust_frame(gust, belief.share)
-    if inertial.output.moving:
-        gusts.average_gust_frame(inertial, belief.share)
+    gusts.fill_frame_mean_gust(gust, prediction.frame_share_per_instant)
+    if inertial_gust.output.is_turbulent:
+        gusts.fill_frame_mean_gust(inertial_gust, prediction.frame_share_per_instant)
     predict_control_effect(mean)
-    fill_block_signatures(blocks, mean.Gu_predicted, unanticipated_pitch(belief.design, y, 1.0))
-    latched, ends = detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
-    statistical.update_blocks(tests, bounded, blocks, gust, innovation, dt, k, latched, ends)
-    parity.update_directions(views, force_record, gust, fdi.bound, mean.G_predicted, mean.Gu_predicted)
+    fill_block_signatures(blocks, mean.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0))
+    is_alarm_latched, loss_can_end = detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
+    statistical.update_blocks(
+        tests, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
+    )
+    parity.update_view_directions(
+        parity_views, force_record, gust, fdi.bound, mean.previous_G, mean.Gu_with_previous_G
+    )
     parity.project_innovation(
-        views,
-        tests.has_tolerances,
+        parity_views,
+        tests.has_regressors,
         detector.noise,
         blocks,
         force_record,
         gust,
-        inertial,
+        inertial_gust,
         innovation,
         y[AIRSPEED],
     )
-    parity.update_views(views, tests, detector.tone_config, y, dt, k, latched)
-    known = fdi.bound.error_map.outside == 0
-    statistical.update_alarm(detector.alarm, tests, blocks, views, force_record, gust, t, known)
-    form_innovation(belief, measured.x, dt)
-    statistical.track_residual_mean(blocks, gust, belief.innovation_after_known_faults, dt)
+    parity.update_view_tests(parity_views, tests, detector.tone_config, y, dt, k, is_alarm_latched)
+    is_error_mapped = fdi.bound.model_error_map.is_outside_all_boxes == 0
+    statistical.update_alarm(
+        detector.alarm, tests, blocks, parity_views, force_record, gust, t, is_error_mapped
+    )
+    form_innovation(prediction, measured.x, dt)
+    statistical.filter_residual_mean(blocks, gust, prediction.innovation_after_known_faults, dt)
 
 
 @apart
-def prepare_statistical(fdi, belief, measured, k):
+def prepare_statistical(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     detector, dt = fdi.statistical, fdi.config.dt
-    tests, noise, gust = detector.tests, detector.noise, detector.air
-    update_gusts(gust, detector.inertial_air, detector.forces, belief, measured, k, dt)
+    tests, noise, gust = detector.test_config, detector.noise, detector.gust
+    update_gusts(gust, detector.inertial_gust, detector.forces, prediction, measured, k, dt)
     statistical.prepare_tests(
-        tests, noise, detector.block, gust, fdi.bound, belief.design, measured, belief.u, dt
+        tests, noise, detector.block, gust, fdi.bound, prediction.design, measured, prediction.u, dt
     )
 
 
 @apart
-def accumulate_statistical(fdi, belief, measured):
+def accumulate_statistical(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
-    detector, dt = fdi.statistical, belief.share * fdi.config.dt
-    tests, noise, gust = detector.tests, detector.noise, detector.air
-    statistical.accumulate_test_substep(
-        tests, noise, detector.block, gust, fdi.bound, belief.design, measured, belief.u, dt
+    detector, dt = fdi.statistical, prediction.frame_share_per_instant * fdi.config.dt
+    tests, noise, gust = detector.test_config, detector.noise, detector.gust
+    statistical.add_instant_to_tests(
+        tests, noise, detector.block, gust, fdi.bound, prediction.design, measured, prediction.u, dt
     )
 
 
 @kernel
-def update_gusts(gust, inertial, force_record, belief, measured, k, dt):
+def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
-    if gust.output.moving:
-        gusts.set_gust_intensity(gust, measured.altitude)
-        gusts.update_gust_estimate(gust, measured.y, measured.attitude, belief.share * dt, k)
-    if (force_record.known or gust.output.uses_accelerometers) and not measured.inertial:
-        forces.stop_forces(force_record, gust, inertial)
-    if force_record.known or gust.output.uses_accelerometers:
-        gusts.store_accelerometers(gust, measured.force)
-    if force_record.known:
-        update_inertial_gusts(gust, inertial, force_record, belief, measured, k, dt)
+    if gust.output.is_turbulent:
+        gusts.set_gust_drift_intensity(gust, measured.altitude)
+        gusts.update_gust_estimate(
+            gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
+        )
+    if (force_record.in_use or gust.output.uses_accelerometers) and not measured.inertial:
+        forces.stop_using_forces(force_record, gust, inertial_gust)
+    if force_record.in_use or gust.output.uses_accelerometers:
+        gusts.store_accelerometer_reading(gust, measured.force)
+    if force_record.in_use:
+        update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt)
 
 
 @kernel
-def update_inertial_gusts(gust, inertial, force_record, belief, measured, k, dt):
+def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
-    forces.update_forces(force_record, gust, measured, belief.u, dt)
-    if inertial.output.moving:
-        forces.fill_readings_without_vanes(force_record, inertial.memory.rotation, measured.y)
-        gusts.store_accelerometers(inertial, measured.force)
-        gusts.set_gust_intensity(inertial, measured.altitude)
-        gusts.update_gust_estimate(inertial, force_record.y, measured.attitude, dt, k)
-        gusts.fill_gust_effect(inertial, belief.design, measured.x, force_record.y, belief.u)
-        gusts.begin_gust_sums(inertial, force_record.y[AIRSPEED], dt)
+    forces.update_forces(force_record, gust, measured, prediction.u, dt)
+    if inertial_gust.output.is_turbulent:
+        forces.fill_readings_without_vanes(
+            force_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
+        )
+        gusts.store_accelerometer_reading(inertial_gust, measured.force)
+        gusts.set_gust_drift_intensity(inertial_gust, measured.altitude)
+        gusts.update_gust_estimate(inertial_gust, force_record.y_without_vanes, measured.attitude, dt, k)
+        gusts.fill_gust_effect(
+            inertial_gust, prediction.design, measured.x, force_record.y_without_vanes, prediction.u
+        )
+        gusts.begin_gust_sums(inertial_gust, force_record.y_without_vanes[AIRSPEED], dt)
 
 
 @apart
-def begin(fdi, belief, measured):
-    """Begin the filters, and fix the parity direction of each fault (contract.CompiledScheme)."""
-    contract.begin_filters(fdi, measured.x)
-    filters.set_parity_directions(fdi.isolation, belief.G)
+def begin(fdi, prediction, measured):
+    """Begin the filters, and fix the parity direction of each fault (CompiledScheme)."""
+    begin_filters(fdi, measured.x)
+    filters.set_parity_directions(fdi.isolation, prediction.G)
 
 
 @apart
-def predict(fdi, belief, measured, k, t):
-    """Bring bank, likelihoods, isolation and FDAE to this frame (contract.CompiledScheme)."""
-    found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
-    filters.update_bank(fdi.bank, bound, measured.x, belief.x_before, belief.means.acceleration, dt)
-    if fdi.statistical.tests.enabled:
-        update_statistical_tests(fdi, belief, measured, k, t)
-    contract.update_estimators(fdi, belief)
-    observe_by_class(fdi.config.fault_class, fdi, belief)
-    leaking = found.isolated >= 0 or found.lead >= 0
-    filters.predict_fdae(fdi.fdae, bound, belief.x_before, belief.expected, found.detected, leaking, dt)
+def predict(fdi, prediction, measured, k, t):
+    """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
+    conclusion_record, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
+    filters.update_bank(
+        fdi.bank, bound, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+    )
+    if fdi.statistical.test_config.enabled:
+        update_statistical_tests(fdi, prediction, measured, k, t)
+    update_estimators(fdi, prediction)
+    observe_in_isolation_variant(fdi.config.isolation_variant, fdi, prediction)
+    network_leaks = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
+    filters.predict_fdae(
+        fdi.fdae,
+        bound,
+        prediction.x_before,
+        prediction.acceleration_with_known_faults,
+        conclusion_record.detected,
+        network_leaks,
+        dt,
+    )
 
 
 @apart
-def conclude(fdi, belief, measured, t):
-    """From residuals to the alarm and a verdict, unless a sensor is at fault (contract.CompiledScheme)."""
+def conclude(fdi, prediction, measured, t):
+    """From residuals to the alarm and a verdict, unless a sensor is at fault (CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    known, found = fdi.verdict.detected, fdi.verdict
+    was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
-    axis = axis_of_alarm(fdi, measured.y, t)
+    axis = alarm_axis_or_engine_failure(fdi, measured.y, t)
     if axis >= 0:
-        conclusion.latch_alarm(found, axis, t)
-    if found.detected:
-        isolate_fault(fdi, measured, t, known)
+        conclusion.latch_alarm(conclusion_record, axis, t)
+    if conclusion_record.detected:
+        isolate_fault(fdi, measured, t, was_detected_before)
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
-def axis_of_alarm(fdi, y, t):
+def alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    apart_now, found = fdi.bound.error_map.apart_now, fdi.verdict
-    if not found.detected and engine_symmetry.detect_engine_failure(fdi.engines, apart_now, y):
-        conclusion.record_isolated(found, UNANTICIPATED, t)
+    engine_asymmetry_bound, conclusion_record = (
+        fdi.bound.model_error_map.engine_asymmetry_bound_now,
+        fdi.verdict,
+    )
+    if not conclusion_record.detected and monitors.detect_engine_failure(
+        fdi.engine_monitor, engine_asymmetry_bound, y
+    ):
+        conclusion.record_isolated_estimator(conclusion_record, UNANTICIPATED, t)
         return YAW
     return filters.alarm_axis(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
 
 
 @apart
-def prepare(fdi, belief, measured, k):
-    """Prepare the statistical detector, where it is declared (contract.CompiledScheme)."""
-    if fdi.statistical.tests.enabled:
-        prepare_statistical(fdi, belief, measured, k)
+def prepare(fdi, prediction, measured, k):
+    """Prepare the statistical detector, where it is declared (CompiledScheme)."""
+    if fdi.statistical.test_config.enabled:
+        prepare_statistical(fdi, prediction, measured, k)
 
 
 @apart
-def accumulate(fdi, belief, measured):
-    """The same for an instant inside the frame (contract.CompiledScheme)."""
-    if fdi.statistical.tests.enabled:
-        accumulate_statistical(fdi, belief, measured)
+def accumulate(fdi, prediction, measured):
+    """The same for an instant inside the frame (CompiledScheme)."""
+    if fdi.statistical.test_config.enabled:
+        accumulate_statistical(fdi, prediction, measured)
 
 
 SCHEME = CompiledScheme(begin, predict, conclude, prepare, accumulate)
 
 
 @apart
-def conclude_plugin(fdi, belief, measured, t):
-    """Take the plug-in's verdict, fdi.plugin_verdict (contract.CompiledScheme)."""
+def conclude_plugin(fdi, prediction, measured, t):
+    """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
     filters.form_fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
-    isolation.take_plugin_estimate(fdi.isolation, fdi.verdict.isolated, fdi.plugin_verdict.theta)
+    isolation.copy_plugin_estimate(fdi.isolation, fdi.verdict.isolated_estimator, fdi.plugin_verdict.theta)
     if fdi.verdict.detected:
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
-PLUGGED = CompiledScheme(contract.begin_none, predict, conclude_plugin, prepare, accumulate)
+PYTHON_PLUGIN = CompiledScheme(begin_without_diagnosis, predict, conclude_plugin, prepare, accumulate)

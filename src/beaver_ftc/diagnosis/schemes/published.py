@@ -24,41 +24,45 @@ from beaver_ftc.diagnosis import conclusion, isolation
 from beaver_ftc.diagnosis.detection import filters
 from beaver_ftc.diagnosis.detection.filters import fill_gaussians, replace_network_output
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.schemes import adaptive_estimators, contract
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import begin
-from beaver_ftc.diagnosis.schemes.contract import CompiledScheme
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin
 from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.schema import Scenario
 
 # Centres of the network's basis functions on each axis of the aircraft: alpha (pitch) or beta, rad; the rate
 # of the axis, rad/s; the deflection of the surface that leads it, as a share of its travel.
-ALPHA_CENTRES, BETA_CENTRES = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
-RATE_CENTRES, TRAVEL_SHARES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
-N_CENTRES = (len(ALPHA_CENTRES), len(RATE_CENTRES), len(TRAVEL_SHARES))
-N_NODES = N_CENTRES[0] * N_CENTRES[1] * N_CENTRES[2]
+ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
+RATE_CENTRES, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
+N_CENTRES_PER_INPUT = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES), len(TRAVEL_SHARE_CENTRES))
+N_NODES = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
 
-# first, step: of the centres, by axis and input. limit: of a weight, projection P; infinite without one.
-# output: fhat, rad/s2.
-STATE_NETWORK = record(
-    config=record(gain=float, limit=float, first=(3, 3), step=(3, 3)),
-    memory=record(along=(3, N_CENTRES[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
+# first_centre, centre_spacing: of the centres, by axis and input. weight_limit: of a weight, projection P;
+# infinite without one. output: fhat, rad/s2.
+STATE_NETWORK_RECORD = record(
+    config=record(gain=float, weight_limit=float, first_centre=(3, 3), centre_spacing=(3, 3)),
+    memory=record(input_basis=(3, N_CENTRES_PER_INPUT[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
     output=3,
 )
 
-# dead_zone: whether the network waits for a residual outside the threshold; constant: rad/s, in the place of
-# all adaptive thresholds, or 0.
-PUBLISHED_CONFIG = record(dead_zone=int, constant=float)
-PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG, network=STATE_NETWORK)
+# uses_dead_zone: whether the network waits for a residual outside the threshold; constant_threshold: rad/s,
+# in the place of all adaptive thresholds, or 0.
+PUBLISHED_CONFIG_RECORD = record(uses_dead_zone=int, constant_threshold=float)
+PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_RECORD)
 
 
-def configure_network(network: np.void, gain: float, limit: float, travel: np.ndarray) -> None:
+def configure_network(network: np.void, gain: float, weight_limit: float, travel: np.ndarray) -> None:
     """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
-    network["config"]["gain"], network["config"]["limit"] = gain, limit
+    network["config"]["gain"], network["config"]["weight_limit"] = gain, weight_limit
     for i in range(3):
-        reach = travel[0, i] + TRAVEL_SHARES * (travel[1, i] - travel[0, i])
-        for j, centres in enumerate((ALPHA_CENTRES if i == PITCH else BETA_CENTRES, RATE_CENTRES, reach)):
-            network["config"]["first"][i, j], network["config"]["step"][i, j] = (
+        deflection_centres = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
+        for input_index, centres in enumerate(
+            (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES, deflection_centres)
+        ):
+            (
+                network["config"]["first_centre"][i, input_index],
+                network["config"]["centre_spacing"][i, input_index],
+            ) = (
                 centres[0],
                 centres[1] - centres[0],
             )
@@ -68,71 +72,91 @@ def configure_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) ->
     """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n)
     rad: the stops."""
     config, dt, isolation = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
-    option, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
-    published["config"]["dead_zone"] = option["dead_zone"]
-    limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
-    configure_network(published["network"], option["network_gain"], limit, travel[:, fdi["layout"]["main"]])
-    fdi["fdae"]["config"]["decay"] = fdi["bank"]["config"]["decay"][0] = euler_decay(
+    options, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
+    published["config"]["uses_dead_zone"] = options["dead_zone"]
+    weight_limit = options["network_limit_rad_s2"] if options["projection"] else np.inf
+    configure_network(
+        published["network"], options["network_gain"], weight_limit, travel[:, fdi["layout"]["main"]]
+    )
+    fdi["fdae"]["config"]["decay_factor"] = fdi["bank"]["config"]["decay_factor"][0] = euler_decay(
         config.detection_pole_per_s, dt
     )
-    isolation["config"]["decay"] = euler_decay(config.isolation_pole_per_s, dt)
-    isolation["config"]["by_gradient"], isolation["config"]["gradient"] = 1, option["adaptation_gain"]
-    isolation["estimator"]["theta"] = option["initial_theta"]
-    isolation["config"]["unprojected"] = not option["projection"]
-    if not option["adaptive_threshold"]:
-        published["config"]["constant"], isolation["config"]["thresholds"] = (
-            option["constant_threshold_rad_s"],
+    isolation["config"]["filter_decay"] = euler_decay(config.isolation_pole_per_s, dt)
+    isolation["config"]["adapts_by_gradient"], isolation["config"]["gradient_gain"] = (
+        1,
+        options["adaptation_gain"],
+    )
+    isolation["estimator"]["theta"] = options["initial_theta"]
+    isolation["config"]["projection_disabled"] = not options["projection"]
+    if not options["adaptive_threshold"]:
+        published["config"]["constant_threshold"], isolation["config"]["threshold_kind"] = (
+            options["constant_threshold_rad_s"],
             CONSTANT_THRESHOLD,
         )
-    if option["leave_out"]:
-        isolation["estimator"]["excluded"][int(option["leave_out"]) - 1] = 1
+    if options["leave_out"]:
+        isolation["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
 
 
 def euler_decay(pole_per_s: float, dt_s: float) -> float:
-    """What a step of Euler keeps of a filter's state; a pole beyond the frame rate keeps nothing."""
+    """Return the decay of a filter's state in an Euler step; 0 for a pole beyond the frame rate."""
     return max(1.0 - pole_per_s * dt_s, 0.0)
 
 
 @kernel
-def fill_input_basis(network, i, j, count, value):
-    """Fill along[j] with the Gaussians of input j of axis i at `value`; their squares add up to 1."""
-    at = min(max((value - network.config.first[i, j]) / network.config.step[i, j], 0.0), count - 1.0)
-    norm = np.sqrt(fill_gaussians(at, count, 0, network.memory.along[j]))
-    for k in range(count):
-        network.memory.along[j, k] /= norm
+def fill_input_basis(network, i, input_index, n_centres, value):
+    """Fill input_basis[input_index] with the Gaussians of that input of axis i at `value`; their squares add
+    up to 1."""
+    centre_position = min(
+        max(
+            (value - network.config.first_centre[i, input_index])
+            / network.config.centre_spacing[i, input_index],
+            0.0,
+        ),
+        n_centres - 1.0,
+    )
+    norm = np.sqrt(fill_gaussians(centre_position, n_centres, 0, network.memory.input_basis[input_index]))
+    for k in range(n_centres):
+        network.memory.input_basis[input_index, k] /= norm
 
 
 @kernel
-def evaluate_state_network(network, main, x, y, u):
+def evaluate_state_network(network, main_surfaces, x, y, u):
     """Fill basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
 
-    x (3,) rad/s; y: measured signals; u (n,) rad; main (3,): the surface that leads each axis.
+    x (3,) rad/s; y: measured signals; u (n,) rad; main_surfaces (3,): the surface that leads each axis.
     """
     for i in range(3):
-        fill_input_basis(network, i, 0, N_CENTRES[0], y[ALPHA] if i == PITCH else y[BETA])
-        fill_input_basis(network, i, 1, N_CENTRES[1], x[i])
-        fill_input_basis(network, i, 2, N_CENTRES[2], u[main[i]])
-        node, total = 0, 0.0
-        for a in range(N_CENTRES[0]):
-            for b in range(N_CENTRES[1]):
-                for c in range(N_CENTRES[2]):
-                    phi = network.memory.along[0, a] * network.memory.along[1, b] * network.memory.along[2, c]
-                    network.memory.basis[i, node] = phi
-                    total += network.memory.weights[i, node] * phi
+        fill_input_basis(network, i, 0, N_CENTRES_PER_INPUT[0], y[ALPHA] if i == PITCH else y[BETA])
+        fill_input_basis(network, i, 1, N_CENTRES_PER_INPUT[1], x[i])
+        fill_input_basis(network, i, 2, N_CENTRES_PER_INPUT[2], u[main_surfaces[i]])
+        node, weighted_sum = 0, 0.0
+        for a in range(N_CENTRES_PER_INPUT[0]):
+            for b in range(N_CENTRES_PER_INPUT[1]):
+                for c in range(N_CENTRES_PER_INPUT[2]):
+                    basis_value = (
+                        network.memory.input_basis[0, a]
+                        * network.memory.input_basis[1, b]
+                        * network.memory.input_basis[2, c]
+                    )
+                    network.memory.basis[i, node] = basis_value
+                    weighted_sum += network.memory.weights[i, node] * basis_value
                     node += 1
-        network.output[i] = total
+        network.output[i] = weighted_sum
 
 
 @kernel
-def train_state_network(network, signal, dt):
-    """th' = P{Gamma Z^T signal}, by a step of dt s; signal (3,), Z: the basis as it was evaluated."""
+def train_state_network(network, training_signal, dt):
+    """th' = P{Gamma Z^T training_signal}, by a step of dt s; training_signal (3,), Z: the basis as it was
+    evaluated."""
     for i in range(3):
         for j in range(N_NODES):
             weight = (
                 network.memory.weights[i, j]
-                + dt * network.config.gain * network.memory.basis[i, j] * signal[i]
+                + dt * network.config.gain * network.memory.basis[i, j] * training_signal[i]
             )
-            network.memory.weights[i, j] = min(max(weight, -network.config.limit), network.config.limit)
+            network.memory.weights[i, j] = min(
+                max(weight, -network.config.weight_limit), network.config.weight_limit
+            )
 
 
 @kernel
@@ -141,17 +165,17 @@ def train_fdae_network(published, fdae, detected, dt):
 
     Without the dead zone it learns from the first frame on, with any residual.
     """
-    outside = False
+    is_outside_threshold = False
     for i in range(3):
-        outside = outside or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
-    if not published.config.dead_zone or (detected and outside):
+        is_outside_threshold = is_outside_threshold or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
+    if not published.config.uses_dead_zone or (detected and is_outside_threshold):
         train_state_network(published.network, fdae.output.residual, dt)
 
 
 @kernel
-def update_fdae_output(published, fdae, main, x, y, u):
+def update_fdae_output(published, fdae, main_surfaces, x, y, u):
     """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
-    evaluate_state_network(published.network, main, x, y, u)
+    evaluate_state_network(published.network, main_surfaces, x, y, u)
     replace_network_output(fdae.network, published.network.output)
 
 
@@ -165,38 +189,44 @@ def fdae_alarm_axis(fdae):
 
 
 @apart
-def predict(fdi, belief, measured, k, t):
-    """Bring isolation, FDAE and its network to this frame (contract.CompiledScheme)."""
+def predict(fdi, prediction, measured, k, t):
+    """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published, bound, dt = fdi.published, fdi.bound, fdi.config.dt
-    filters.update_bank(fdi.bank, bound, measured.x, belief.x_before, belief.means.acceleration, dt)
-    contract.update_estimators(fdi, belief)
+    filters.update_bank(
+        fdi.bank, bound, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+    )
+    adaptive_estimators.update_estimators(fdi, prediction)
     train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
-    filters.predict_fdae(fdi.fdae, bound, belief.x_before, belief.means.acceleration, False, False, dt)
-    if published.config.constant > 0.0:
-        set_all_thresholds(fdi, published.config.constant)
+    filters.predict_fdae(
+        fdi.fdae, bound, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
+    )
+    if published.config.constant_threshold > 0.0:
+        set_all_constant_thresholds(fdi, published.config.constant_threshold)
 
 
 @kernel
-def set_all_thresholds(fdi, constant):
+def set_all_constant_thresholds(fdi, constant_threshold):
     """Replace all adaptive thresholds by a constant, rad/s."""
-    filters.set_fdae_threshold(fdi.fdae, constant)
-    filters.set_bank_threshold(fdi.bank, constant)
-    isolation.set_isolation_thresholds(fdi.isolation, constant)
+    filters.set_fdae_threshold(fdi.fdae, constant_threshold)
+    filters.set_published_filter_threshold(fdi.bank, constant_threshold)
+    isolation.set_constant_isolation_thresholds(fdi.isolation, constant_threshold)
 
 
 @apart
-def conclude(fdi, belief, measured, t):
-    """Raise the alarm by the FDAE, evaluate its network, and isolate (contract.CompiledScheme)."""
+def conclude(fdi, prediction, measured, t):
+    """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    known, found = fdi.verdict.detected, fdi.verdict
+    was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
     axis = fdae_alarm_axis(fdi.fdae)
-    update_fdae_output(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, belief.u)
+    update_fdae_output(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
     if axis >= 0:
-        conclusion.latch_alarm(found, axis, t)
-    if found.detected:
-        adaptive_estimators.isolate_fault(fdi, measured, t, known)
+        conclusion.latch_alarm(conclusion_record, axis, t)
+    if conclusion_record.detected:
+        adaptive_estimators.isolate_fault(fdi, measured, t, was_detected_before)
 
 
-SCHEME = CompiledScheme(begin, predict, conclude, contract.prepare_nothing, contract.accumulate_nothing)
+SCHEME = CompiledScheme(
+    begin, predict, conclude, adaptive_estimators.prepare_nothing, adaptive_estimators.accumulate_nothing
+)

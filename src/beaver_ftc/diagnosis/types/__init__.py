@@ -20,19 +20,393 @@ A frame that eta alone explains gives no information: so a fault may be intermit
 constant while it is there, is never excluded, and so never misnamed. What cannot be distinguished stays a
 candidate.
 
-Each type is a row of a file under table/. contract.py says what is in a row, and has feasible sets and
-observations of a surface; registry.py reads the rows into arrays and records. Each frame it also finds
-where each surface was and tests every type; verdict.py and pairs.py conclude.
+A file under table/ describes fault types; its `TYPES` are the rows. This file says what is in a row
+(`FaultType`) and has two parts of a surface's record, which no other file writes:
+
+- Feasible sets: the set (low, high) of each type's parameter; low > high is the empty set. A type is excluded
+  once its set is empty, and stays excluded until the surface's diagnosis restarts.
+- Observations: where the surface was, if it alone is at fault, in three frames or blocks:
+  `last_observation` is of the elapsed frame, `judged_observation` of the one before it,
+  `earlier_observation` of the one before that. Positions in rad.
+
+registry.py reads the rows into arrays and records; in each frame it finds where each surface was and tests
+every type. verdict.py and pairs.py conclude; they name no type.
+
+type_index: the number of a type, the same in every array over types. config: TYPES_CONFIG of registry.py;
+surface: a record of its `surface_dtype`. k: number of the judged frame, which is the frame before the elapsed
+one.
 """
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from beaver_ftc.public import lazily
+import numpy as np
 
-if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.types.registry import NAMES as TYPE_NAMES
-    from beaver_ftc.diagnosis.types.registry import TYPES as TYPE_ROWS
-    from beaver_ftc.diagnosis.types.registry import WORDS as TYPE_WORDS
-    from beaver_ftc.diagnosis.types.registry import kind_of
-else:
-    __getattr__, __dir__ = lazily(__name__)
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.diagnosis import isolation
+
+Kernel = Callable[..., Any]
+
+# Accommodation modes, what the law does about a surface at fault: scale its command, give the surface up,
+# subtract its offset, or wait for it at the rate that it has.
+SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
+
+UNLIMITED_SET, EMPTY_SET = (-np.inf, np.inf), (np.inf, -np.inf)  # an unlimited set, and an empty one
+
+# `evidence_at_rest`: what a surface says of a type that was given up, stays where it was and shows nothing
+# wrong.
+REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE, REST_POSITION_IS_PARAMETER = range(4)
+
+
+@kernel
+def reachable_range(config, surface, type_index, k):
+    """Anywhere within reach."""
+    return surface.actuator.reachable_low, surface.actuator.reachable_high
+
+
+class DeflectionRelation(NamedTuple):
+    """The deflection p of a surface under a type, by its command u and one parameter theta, all in rad:
+
+    p = gain u + theta, or p = (gain + theta) u where theta is a share of the command (theta_is_share).
+
+    theta_range(low, high): the least and greatest theta; low, high: the travel, rad.
+    """
+
+    gain: float
+    theta_is_share: bool
+    theta_range: Callable[[float, float], tuple[float, float]]
+
+
+def _no_estimate(fdi: np.void, s: int, type_index: int) -> None:
+    """No parameter to estimate."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaultType:
+    """One fault type. A part that is left out has nothing to do.
+
+    name                    in scenarios, reports and metrics
+    description             the type in words, where the name does not say which of two types it is
+    has_constant_parameter  whether its parameter is constant: if so, a frame can refute what another frame
+                            allows
+    sort_rank               place among the types of its sort (constant or not), in numbers and in lists
+
+    The feasible set; kernels:
+
+    consistent_interval(config, surface, type_index, k)
+                            the parameters (low, high) that explain the judged frame, in which something was
+                            wrong; UNLIMITED_SET if every one does, EMPTY_SET (low > high) excludes the
+                            type
+    parameter_range(surface)
+                            the parameters (low, high) that there are; unlimited if left out
+    feasible_set_after_frame(surface, type_index)
+                            the set (low, high) to go on with after a frame; the one there is if left out
+    memory_dtype, record_name
+                            a record of its own, found at `surface.<record_name>`
+    reset_memory(surface, type_index)
+                            its memory is reset: nothing is known yet
+    on_every_frame(config, surface, type_index)             called for every frame, before it is judged
+    on_skipped_frame(config, surface, type_index, k)  called for a frame that is not judged
+    on_possible_release(config, surface, type_index, k)
+                            a repair may have released the surface as the frame began
+    propagate_release(config, surface, type_index)    advance such a release by a frame (held_surface.py)
+    possible_deflection(config, surface, type_index, k)
+                            least and greatest deflection under it by the elapsed frame, rad; of a constant
+                            type
+
+    The evidence that a verdict needs:
+
+    has_shown(surface)      kernel: whether the type has shown itself. A type with this part explains a flight
+                            only once it has shown itself
+    shows_within_half_cycles
+                            half-cycles of the slowest oscillation within which such a type shows itself
+    evidence_at_rest        what a surface that was given up, and stays where it was, says of the type:
+                            REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE (it may be there all
+                            the same) or REST_POSITION_IS_PARAMETER (its parameter is the deflection at
+                            which the surface stands)
+    half_cycles_before_isolating_others
+                            half-cycles of evidence that a fault on another surface needs while this type is
+                            left here
+    error_depends_on_command
+                            whether the deflection error depends on the command. While a type that does not
+                            is left on one surface, no other surface is isolated in its place
+    can_look_like           names of types that this one can look like: they are not named while it is left
+    motion_rules_out(surface, stop_direction)
+                            kernel: whether the surface has moved as this type cannot, towards the stop
+                            of that direction (0: of a type without one)
+    stop_direction          the stop that it runs to: 1 upper, -1 lower, 0 neither
+
+    The accommodation:
+
+    accommodation_mode      SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET or WAIT_FOR_SURFACE
+    other_accommodation_modes
+                            other modes that serve it
+    limit_type_name         name of the type that it becomes at the end of its range: where both are left, the
+                            modes of that one serve this one too
+    deflection_error(surface, type_index)
+                            kernel: how far the surface is off its command, rad; not finite if not known
+    deflection_error_rank   the type of least rank, of those left, gives the deflection error
+
+    What shows from outside that it is excluded, and by which deflections it differs from another:
+
+    deflection_relation     deflection by command and one parameter, where that is all that the type says; of
+                            a type that is not constant theta may differ from frame to frame
+    excluding_comparison    name of the comparison of frames that excludes it, where one frame or two do not
+                            suffice: "offset", "growing offset", "runaway", "swing" or "approach"
+
+    Words, Python functions (verdict.py):
+
+    estimate(fdi, s, type_index)          its parameter, None without one
+    estimate_interval(fdi, s, type_index) the set that the parameter is certain to lie in, or None
+    frequency_rad_s(fdi, s, type_index)   of a periodic type, or None
+    """
+
+    name: str
+    has_constant_parameter: bool
+    consistent_interval: Kernel
+    description: str = ""
+    sort_rank: int = 100
+    parameter_range: Kernel | None = None
+    feasible_set_after_frame: Kernel | None = None
+    memory_dtype: np.dtype | None = None
+    record_name: str = ""
+    reset_memory: Kernel | None = None
+    on_every_frame: Kernel | None = None
+    on_skipped_frame: Kernel | None = None
+    on_possible_release: Kernel | None = None
+    propagate_release: Kernel | None = None
+    possible_deflection: Kernel = reachable_range
+    has_shown: Kernel | None = None
+    shows_within_half_cycles: int = 0
+    evidence_at_rest: int = REST_IS_UNINFORMATIVE
+    half_cycles_before_isolating_others: int = 1
+    error_depends_on_command: bool = True
+    can_look_like: tuple[str, ...] = ()
+    motion_rules_out: Kernel | None = None
+    stop_direction: int = 0
+    accommodation_mode: int = SUBTRACT_OFFSET
+    other_accommodation_modes: tuple[int, ...] = ()
+    limit_type_name: str = ""
+    deflection_error: Kernel | None = None
+    deflection_error_rank: int = 100
+    deflection_relation: DeflectionRelation | None = None
+    excluding_comparison: str = ""
+    estimate: Callable[[np.void, int, int], float | None] = _no_estimate
+    estimate_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
+    frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
+
+
+@kernel
+def limit_to_travel(surface, deflection_rad):
+    """A deflection (rad), cut off by the stops."""
+    return min(max(deflection_rad, surface.actuator.travel_low), surface.actuator.travel_high)
+
+
+@kernel
+def feasible_set_midpoint(surface, type_index):
+    """The middle of a type's set."""
+    return 0.5 * (surface.feasible_sets.low[type_index] + surface.feasible_sets.high[type_index])
+
+
+def feasible_set(fdi: np.void, s: int, type_index: int) -> tuple[float, float]:
+    """The set of a type's parameter on surface s."""
+    surface = fdi["types"]["surface"][s]
+    return float(surface["feasible_sets"]["low"][type_index]), float(
+        surface["feasible_sets"]["high"][type_index]
+    )
+
+
+def parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
+    """The middle of that set."""
+    low, high = feasible_set(fdi, s, type_index)
+    return 0.5 * (low + high)
+
+
+@kernel
+def reset_feasible_sets(surface):
+    """Allow every type with any parameter."""
+    surface.feasible_sets.low[:], surface.feasible_sets.high[:] = -np.inf, np.inf
+    surface.feasible_sets.excluded[:] = 0
+
+
+@kernel
+def set_feasible_set(surface, type_index, interval):
+    """Put an interval in place of the set of a type."""
+    surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index] = interval
+
+
+@kernel
+def intersect_feasible_set(surface, type_index, other_interval):
+    """Keep of the set of a type what is also in other_interval; exclude the type when nothing is left. The
+    set then holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type
+    that it excludes keeps its set."""
+    low, high = other_interval
+    if low == np.inf:
+        surface.feasible_sets.excluded[type_index] = 1
+        return
+    surface.feasible_sets.low[type_index] = max(surface.feasible_sets.low[type_index], low)
+    surface.feasible_sets.high[type_index] = min(surface.feasible_sets.high[type_index], high)
+    if surface.feasible_sets.low[type_index] > surface.feasible_sets.high[type_index]:
+        surface.feasible_sets.excluded[type_index] = 1
+
+
+@kernel
+def exclude_type(surface, type_index):
+    """Exclude a type."""
+    surface.feasible_sets.excluded[type_index] = 1
+
+
+@kernel
+def restore_first_fault_sets(surface):
+    """Return to the sets that were kept when the surface was named (pairs.py)."""
+    surface.feasible_sets.low[:], surface.feasible_sets.high[:] = (
+        surface.first_fault_sets.low,
+        surface.first_fault_sets.high,
+    )
+    surface.feasible_sets.excluded[:] = surface.first_fault_sets.excluded
+
+
+# healthy_position: where a healthy surface was; position_low, position_high: where this one can have been;
+# is_anomalous: whether more than the declared uncertainty was at work; effectiveness_variation: a quarter of
+# its change, in means; stop_can_hide_deflection: whether the lower and the upper stop can cut a deflection
+# off unseen.
+OBSERVATION_RECORD = record(
+    healthy_position=float,
+    position_low=float,
+    position_high=float,
+    is_anomalous=int,
+    effectiveness_variation=float,
+    stop_can_hide_deflection=(int, 2),
+)
+
+
+@kernel
+def reset_observation(surface):
+    """The surface may have been anywhere within reach."""
+    surface.last_observation.position_low, surface.last_observation.position_high = (
+        surface.actuator.reachable_low,
+        surface.actuator.reachable_high,
+    )
+
+
+@kernel
+def shift_observations(surface):
+    """Make room for the elapsed frame."""
+    copy_observation(surface.earlier_observation, surface.judged_observation)
+    copy_observation(surface.judged_observation, surface.last_observation)
+
+
+@kernel
+def copy_observation(target, source):
+    """Copy one observation to another."""
+    (
+        target.healthy_position,
+        target.position_low,
+        target.position_high,
+        target.is_anomalous,
+        target.effectiveness_variation,
+    ) = (
+        source.healthy_position,
+        source.position_low,
+        source.position_high,
+        source.is_anomalous,
+        source.effectiveness_variation,
+    )
+    target.stop_can_hide_deflection[:] = source.stop_can_hide_deflection
+
+
+@kernel
+def observe_position(config, surface, fie, axis, innovation, bound, hypothesis_effect):
+    """Find where a surface can have been: what agrees with the innovation (3,) within its bound (3,).
+
+    fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
+    of the same frame or block, dtype EFFECT_RECORD.
+    """
+    observation, commands = surface.last_observation, surface.commands
+    observation.healthy_position = (
+        -hypothesis_effect.base_acceleration[axis] / hypothesis_effect.regressor[axis]
+    )
+    observation.effectiveness_variation = (
+        0.25
+        * (commands.max_effectiveness - commands.min_effectiveness)
+        / abs(hypothesis_effect.regressor[axis])
+    )
+    observation.position_low, observation.position_high = fie.theta_min, fie.theta_max
+    for i in range(3):
+        if config.frames_per_block > 1 and i != axis and hypothesis_effect.regressor[i] != 0.0:
+            continue  # over a block the axes weigh what varies differently
+        low, high = isolation.consistent_parameters_on_axis(innovation, bound, fie, hypothesis_effect, i)
+        observation.position_low, observation.position_high = (
+            max(observation.position_low, low),
+            min(observation.position_high, high),
+        )
+    mark_stops_that_can_hide_deflection(
+        surface,
+        2.0 * (bound[axis] + hypothesis_effect.error_bound[axis]) / abs(hypothesis_effect.regressor[axis]),
+    )
+
+
+@kernel
+def mark_stops_that_can_hide_deflection(surface, interval_width):
+    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `interval_width`
+    (rad), that of the interval which holds the true deflection."""
+    surface.last_observation.stop_can_hide_deflection[0] = (
+        surface.commands.min_healthy_position[0] - surface.actuator.travel_low < interval_width
+    )
+    surface.last_observation.stop_can_hide_deflection[1] = (
+        surface.actuator.travel_high - surface.commands.max_healthy_position[0] < interval_width
+    )
+
+
+@kernel
+def set_observed_deflection_error(surface, error, tolerance):
+    """A surface was off its command by error +- tolerance (rad). False: nowhere within its reach."""
+    observation, actuator = surface.last_observation, surface.actuator
+    observation.position_low = max(actuator.reachable_low, observation.healthy_position + error - tolerance)
+    observation.position_high = min(actuator.reachable_high, observation.healthy_position + error + tolerance)
+    observation.is_anomalous = abs(error) > tolerance
+    mark_stops_that_can_hide_deflection(surface, 2.0 * tolerance)
+    return observation.position_low <= observation.position_high
+
+
+@kernel
+def set_explained_position(surface, low, high):
+    """A surface whose fault is known was between low and high (rad): that explains what was wrong."""
+    (
+        surface.last_observation.position_low,
+        surface.last_observation.position_high,
+        surface.last_observation.is_anomalous,
+    ) = low, high, 0
+
+
+@kernel
+def set_is_anomalous(surface, is_anomalous):
+    """Replace whether something was wrong in the elapsed frame."""
+    surface.last_observation.is_anomalous = is_anomalous
+
+
+@kernel
+def clear_anomalies(surface):
+    """Nothing has been wrong so far."""
+    surface.last_observation.is_anomalous = surface.judged_observation.is_anomalous = (
+        surface.earlier_observation.is_anomalous
+    ) = 0
+
+
+@kernel
+def observed_deflection_error(surface):
+    """Return the deflection error of the surface in the elapsed frame, rad: the middle of where it can have
+    been."""
+    return (
+        0.5 * (surface.last_observation.position_low + surface.last_observation.position_high)
+        - surface.last_observation.healthy_position
+    )
+
+
+def read_deflection_error(surface: np.void) -> float:
+    """The same of a record outside compiled code, rad."""
+    observation = surface["last_observation"]
+    return float(
+        0.5 * (observation["position_low"] + observation["position_high"]) - observation["healthy_position"]
+    )

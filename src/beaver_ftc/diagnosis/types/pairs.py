@@ -19,10 +19,20 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis import state
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
-from beaver_ftc.diagnosis.types import contract, verdict
+from beaver_ftc.diagnosis.types import (
+    GIVE_UP,
+    SCALE_COMMAND,
+    SUBTRACT_OFFSET,
+    clear_anomalies,
+    observed_deflection_error,
+    restore_first_fault_sets,
+    set_explained_position,
+    set_is_anomalous,
+    set_observed_deflection_error,
+    verdict,
+)
 from beaver_ftc.diagnosis.types import registry as frames
-from beaver_ftc.diagnosis.types.contract import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET
-from beaver_ftc.diagnosis.types.registry import ACCOMMODATION, N_CONSTANT, deflection
+from beaver_ftc.diagnosis.types.registry import ACCOMMODATION_MODES, N_CONSTANT_TYPES, possible_deflection
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
     any_constant_type_remains,
@@ -32,274 +42,331 @@ from beaver_ftc.diagnosis.types.verdict import (
 
 
 @kernel
-def record_plane_alarms(pair, bank):
-    """In which plane a filter of the bank has left its bound."""
+def record_group_alarms(pair, bank):
+    """In which group of surfaces a filter of the bank has left its bound."""
     for i in range(3):
-        plane = PITCH_GROUP if i == PITCH else LATERAL_GROUP
-        for m in range(bank.config.n):
-            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
-                pair.alarmed[plane] = 1
+        group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
+        for filter_index in range(bank.config.n_filters):
+            if abs(bank.output.residual[filter_index, i]) > bank.output.threshold[filter_index, i]:
+                pair.group_has_alarm[group] = 1
 
 
 @kernel
-def solve_roll_and_yaw(types, layout, estimators, innovation, frame_bound):
-    """Where ailerons and rudder were in the elapsed frame: nu = G (p - u) + eta solved for p; nu: innovation
-    (3,), |eta| <= frame_bound (3,) rad/s2."""
-    a, b = layout.main[ROLL], layout.main[YAW]
-    one, other = (
-        estimators[layout.position_estimator[a]].effect,
-        estimators[layout.position_estimator[b]].effect,
+def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, frame_bound):
+    """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
+    innovation (3,), |eta| <= frame_bound (3,) rad/s2."""
+    aileron, rudder = layout.main[ROLL], layout.main[YAW]
+    aileron_effect, rudder_effect = (
+        estimators[layout.position_estimator[aileron]].effect,
+        estimators[layout.position_estimator[rudder]].effect,
     )
-    a_p, a_r, r_p, r_r = one.Z[ROLL], one.Z[YAW], other.Z[ROLL], other.Z[YAW]
-    p, r = innovation[ROLL], innovation[YAW]
-    slack_p = frame_bound[ROLL] + one.spread[ROLL] + other.spread[ROLL]
-    slack_r = frame_bound[YAW] + one.spread[YAW] + other.spread[YAW]
-    determinant = a_p * r_r - a_r * r_p
-    size = abs(determinant)
-    off, slack = (p * r_r - r * r_p) / determinant, (slack_p * abs(r_r) + slack_r * abs(r_p)) / size
-    fits = contract.set_deflection(types.surface[a], off, slack)
-    off, slack = (r * a_p - p * a_r) / determinant, (slack_r * abs(a_p) + slack_p * abs(a_r)) / size
-    if not (contract.set_deflection(types.surface[b], off, slack) and fits):
-        types.pair.no_lateral_pair = 1
+    aileron_roll, aileron_yaw, rudder_roll, rudder_yaw = (
+        aileron_effect.regressor[ROLL],
+        aileron_effect.regressor[YAW],
+        rudder_effect.regressor[ROLL],
+        rudder_effect.regressor[YAW],
+    )
+    roll_innovation, yaw_innovation = innovation[ROLL], innovation[YAW]
+    roll_tolerance = frame_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
+    yaw_tolerance = frame_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
+    determinant = aileron_roll * rudder_yaw - aileron_yaw * rudder_roll
+    abs_determinant = abs(determinant)
+    error, tolerance = (
+        (roll_innovation * rudder_yaw - yaw_innovation * rudder_roll) / determinant,
+        (roll_tolerance * abs(rudder_yaw) + yaw_tolerance * abs(rudder_roll)) / abs_determinant,
+    )
+    aileron_fits = set_observed_deflection_error(types.surface[aileron], error, tolerance)
+    error, tolerance = (
+        (yaw_innovation * aileron_roll - roll_innovation * aileron_yaw) / determinant,
+        (yaw_tolerance * abs(aileron_roll) + roll_tolerance * abs(aileron_yaw)) / abs_determinant,
+    )
+    if not (set_observed_deflection_error(types.surface[rudder], error, tolerance) and aileron_fits):
+        types.pair.lateral_outside_class = 1
 
 
 @kernel
-def deflection_range(config, surface, k):
+def possible_deflection_interval(config, surface, k):
     """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
     of a constant that are left."""
-    least, greatest = np.inf, -np.inf
-    for kind in range(N_CONSTANT):
-        if type_remains(surface, kind):
-            low, high = deflection(config, surface, kind, k)
-            least, greatest = min(least, low), max(greatest, high)
-    low, high = surface.actuator.reach_low, surface.actuator.reach_high
-    return min(max(least, low), high), min(max(greatest, low), high)
+    min_deflection, max_deflection = np.inf, -np.inf
+    for type_index in range(N_CONSTANT_TYPES):
+        if type_remains(surface, type_index):
+            lower_end, upper_end = possible_deflection(config, surface, type_index, k)
+            min_deflection, max_deflection = min(min_deflection, lower_end), max(max_deflection, upper_end)
+    lower_end, upper_end = surface.actuator.reachable_low, surface.actuator.reachable_high
+    return min(max(min_deflection, lower_end), upper_end), min(max(max_deflection, lower_end), upper_end)
 
 
 @kernel
-def solve_pitch(types, layout, estimators, innovation, frame_bound):
+def locate_pitch_surfaces(types, layout, estimators, innovation, frame_bound):
     """Whether pitch shows a fault; after the begin of a second fault, where the second surface was."""
-    first = types.pair.first
+    first = types.pair.first_fault_surface
     if first != NO_SURFACE and not types.surface[first].status.is_candidate:
-        solve_second_in_pitch(types, layout, estimators, innovation, frame_bound)
+        locate_second_pitch_surface(types, layout, estimators, innovation, frame_bound)
         return
     for s, surface in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            contract.set_anomalous(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
+            set_is_anomalous(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
 
 
 @kernel
-def solve_second_in_pitch(types, layout, estimators, innovation, frame_bound):
-    """Where the second surface was, given what is known of the first."""
-    first = types.pair.first
+def locate_second_pitch_surface(types, layout, estimators, innovation, frame_bound):
+    """Find the position of the second surface, given the sets of the first."""
+    first = types.pair.first_fault_surface
     second = layout.partner[first]
-    known = estimators[layout.position_estimator[first]].effect
-    other = estimators[layout.position_estimator[second]].effect
+    first_effect = estimators[layout.position_estimator[first]].effect
+    second_effect = estimators[layout.position_estimator[second]].effect
     surface = types.surface[first]
-    low, high = deflection_range(types.config, surface, types.frame)
-    contract.set_known_deflection(surface, low, high)
-    Z, Z_known = other.Z[PITCH], known.Z[PITCH]
-    share = Z_known * contract.observed_error(surface)
-    slack = abs(Z_known) * 0.5 * (high - low)
-    slack += frame_bound[PITCH] + known.spread[PITCH] + other.spread[PITCH]
-    if not contract.set_deflection(types.surface[second], (innovation[PITCH] - share) / Z, slack / abs(Z)):
-        types.surface[second].status.decided_by = verdict.RULED_OUT
+    min_deflection, max_deflection = possible_deflection_interval(types.config, surface, types.frame_index)
+    set_explained_position(surface, min_deflection, max_deflection)
+    second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
+    first_acceleration = first_regressor * observed_deflection_error(surface)
+    tolerance = abs(first_regressor) * 0.5 * (max_deflection - min_deflection)
+    tolerance += frame_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
+    if not set_observed_deflection_error(
+        types.surface[second],
+        (innovation[PITCH] - first_acceleration) / second_regressor,
+        tolerance / abs(second_regressor),
+    ):
+        types.surface[second].status.decision_basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
-def examine_pairs(types, layout, estimators, bank, frame_bound):
+def observe_and_judge_pairs(types, layout, estimators, bank, frame_bound):
     """Observe the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): bound on it."""
-    record_plane_alarms(types.pair, bank)
-    frames.observe_frame(types, layout, estimators, bank.output.innovation, frame_bound)
-    solve_roll_and_yaw(types, layout, estimators, bank.output.innovation, frame_bound)
-    solve_pitch(types, layout, estimators, bank.output.innovation, frame_bound)
-    frames.judge_frame(types)
+    record_group_alarms(types.pair, bank)
+    frames.infer_surface_positions(types, layout, estimators, bank.output.innovation, frame_bound)
+    locate_roll_and_yaw_surfaces(types, layout, estimators, bank.output.innovation, frame_bound)
+    locate_pitch_surfaces(types, layout, estimators, bank.output.innovation, frame_bound)
+    frames.judge_previous_frame(types)
 
 
 @kernel
-def set_named(surface, named, kind, t):
+def set_isolation_status(surface, is_isolated, type_index, t):
     """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
-    kind = kind if named else -1
+    type_index = type_index if is_isolated else -1
     status = surface.status
-    if named and not status.named:
-        status.named_at_s = t
-    if kind != status.type:
-        status.type_at_s = t
-    status.named, status.type = named, kind
+    if is_isolated and not status.is_isolated:
+        status.isolated_at_s = t
+    if type_index != status.fault_type:
+        status.type_decided_at_s = t
+    status.is_isolated, status.fault_type = is_isolated, type_index
 
 
 @kernel
-def decide_roll_and_yaw(types, layout, t):
+def decide_roll_and_yaw_isolation(types, layout, t):
     """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
     config, pair = types.config, types.pair
-    one, other = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    one_left, other_left = can_be_at_fault(one), can_be_at_fault(other)
-    both = not one_left and not other_left
-    no_pair = (
-        pair.no_lateral_pair == 1 or not verdict.any_type_remains(one) or not verdict.any_type_remains(other)
+    roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
+    roll_can_be_at_fault, yaw_can_be_at_fault = can_be_at_fault(roll_surface), can_be_at_fault(yaw_surface)
+    both_at_fault = not roll_can_be_at_fault and not yaw_can_be_at_fault
+    class_is_refuted = (
+        pair.lateral_outside_class == 1
+        or not verdict.any_type_remains(roll_surface)
+        or not verdict.any_type_remains(yaw_surface)
     )
-    outside = both and no_pair
-    open_yet = both and not (verdict.is_explained(one) and verdict.is_explained(other))
-    certain = pair.alarmed[LATERAL_GROUP] == 1 and not (outside or open_yet)
-    set_named(one, certain and not other_left, verdict.type_at_fault(config, one), t)
-    set_named(other, certain and not one_left, verdict.type_at_fault(config, other), t)
-    return outside
+    outside_class = both_at_fault and class_is_refuted
+    undecided = both_at_fault and not (
+        verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
+    )
+    is_certain = pair.group_has_alarm[LATERAL_GROUP] == 1 and not (outside_class or undecided)
+    set_isolation_status(
+        roll_surface,
+        is_certain and not yaw_can_be_at_fault,
+        verdict.fault_type_on_surface(config, roll_surface),
+        t,
+    )
+    set_isolation_status(
+        yaw_surface,
+        is_certain and not roll_can_be_at_fault,
+        verdict.fault_type_on_surface(config, yaw_surface),
+        t,
+    )
+    return outside_class
 
 
 @kernel
-def store_first_fault(types, s):
+def store_first_fault_sets(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
-    pair, surface, changed = types.pair, types.surface[s], False
-    known = surface.known
-    for kind in range(N_CONSTANT):
-        changed = changed or surface.feasible.excluded[kind] != known.excluded[kind]
-    pair.frames_since_change = pair.frames_since_change + 1 if changed else 0
-    if pair.first != s or pair.frames_since_change >= types.config.half_cycle_frames:
-        pair.first, pair.frames_since_change = s, 0
-        known.low[:], known.high[:] = surface.feasible.low, surface.feasible.high
-        known.excluded[:] = 1
-        known.excluded[:N_CONSTANT] = surface.feasible.excluded[:N_CONSTANT]
+    pair, surface, has_new_exclusion = types.pair, types.surface[s], False
+    stored_sets = surface.first_fault_sets
+    for type_index in range(N_CONSTANT_TYPES):
+        has_new_exclusion = (
+            has_new_exclusion
+            or surface.feasible_sets.excluded[type_index] != stored_sets.excluded[type_index]
+        )
+    pair.n_frames_since_exclusion = pair.n_frames_since_exclusion + 1 if has_new_exclusion else 0
+    if (
+        pair.first_fault_surface != s
+        or pair.n_frames_since_exclusion >= types.config.slowest_half_cycle_frames
+    ):
+        pair.first_fault_surface, pair.n_frames_since_exclusion = s, 0
+        stored_sets.low[:], stored_sets.high[:] = surface.feasible_sets.low, surface.feasible_sets.high
+        stored_sets.excluded[:] = 1
+        stored_sets.excluded[:N_CONSTANT_TYPES] = surface.feasible_sets.excluded[:N_CONSTANT_TYPES]
 
 
 @kernel
 def begin_second_fault(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
-    first, second = types.surface[types.pair.first], types.surface[layout.partner[types.pair.first]]
-    contract.restore_known_sets(first)
-    frames.restart_surface(second)
+    first, second = (
+        types.surface[types.pair.first_fault_surface],
+        types.surface[layout.partner[types.pair.first_fault_surface]],
+    )
+    restore_first_fault_sets(first)
+    frames.restart_surface_types(second)
     for surface in (first, second):
-        surface.status.is_candidate, surface.status.decided_by = 0, verdict.BY_DEDUCTION
-        contract.clear_anomalies(surface)
+        surface.status.is_candidate, surface.status.decision_basis = 0, verdict.DEDUCED_FAULTY
+        clear_anomalies(surface)
 
 
 @kernel
-def evidence_is_long_enough(config, surface):
+def has_enough_evidence(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    growing = verdict.can_be_another_type(surface, verdict.sole_constant_type(surface), False)
-    open_yet = growing or verdict.can_hide_at_rest(config, surface)
-    long = surface.evidence.frames >= config.half_cycle_frames
-    return long and verdict.types_would_have_shown(config, surface) and not open_yet
+    may_be_growing_bias = verdict.can_be_another_type(
+        surface, verdict.sole_remaining_constant_type(surface), False
+    )
+    undecided = may_be_growing_bias or verdict.can_hide_at_rest(config, surface)
+    has_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
+    return has_half_cycle and verdict.types_would_have_shown(config, surface) and not undecided
 
 
 @kernel
-def has_second_fault_in_pitch(types, layout):
+def has_second_pitch_fault(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
-    if types.pair.first == NO_SURFACE or layout.partner[types.pair.first] < 0:
+    if types.pair.first_fault_surface == NO_SURFACE or layout.partner[types.pair.first_fault_surface] < 0:
         return False
-    surface = types.surface[types.pair.first]
+    surface = types.surface[types.pair.first_fault_surface]
     if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_remains(surface)):
         begin_second_fault(types, layout)
     return not surface.status.is_candidate
 
 
 @kernel
-def type_in_pitch(config, surface):
+def pitch_fault_type(config, surface):
     """The type of the one fault of pitch, or -1 while it is open.
 
     A jam may as well be a trailing surface or one at its stop, if the other surface is off by a constant.
     """
-    kind = verdict.type_at_fault(config, surface)
-    return verdict.TYPE_OPEN if kind >= 0 and ACCOMMODATION[kind] == GIVE_UP else kind
+    fault_type = verdict.fault_type_on_surface(config, surface)
+    return (
+        verdict.TYPE_UNDECIDED
+        if fault_type >= 0 and ACCOMMODATION_MODES[fault_type] == GIVE_UP
+        else fault_type
+    )
 
 
 @kernel
-def decide_pitch(types, layout, t):
+def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if has_second_fault_in_pitch(types, layout):
-        first, s = types.surface[types.pair.first], layout.partner[types.pair.first]
-        second = types.surface[s]
-        set_named(first, 1, first.status.type, t)
-        shows = second.evidence.frames > 0 and can_be_at_fault(second) and verdict.is_explained(second)
-        set_named(second, shows, verdict.type_at_fault(types.config, second), t)
+    if has_second_pitch_fault(types, layout):
+        first, second_index = (
+            types.surface[types.pair.first_fault_surface],
+            layout.partner[types.pair.first_fault_surface],
+        )
+        second = types.surface[second_index]
+        set_isolation_status(first, 1, first.status.fault_type, t)
+        shows_fault = (
+            second.evidence.n_anomalous_frames > 0
+            and can_be_at_fault(second)
+            and verdict.any_type_explains_flight(second)
+        )
+        set_isolation_status(second, shows_fault, verdict.fault_type_on_surface(types.config, second), t)
         return
-    s = sole_fault_in_pitch(types, layout)
-    for member, surface in enumerate(types.surface):
-        if layout.group[member] == PITCH_GROUP:
-            set_named(surface, member == s, type_in_pitch(types.config, surface) if member == s else -1, t)
+    second_index = sole_pitch_surface_at_fault(types, layout)
+    for surface_index, surface in enumerate(types.surface):
+        if layout.group[surface_index] == PITCH_GROUP:
+            set_isolation_status(
+                surface,
+                surface_index == second_index,
+                pitch_fault_type(types.config, surface) if surface_index == second_index else -1,
+                t,
+            )
 
 
 @kernel
-def sole_fault_in_pitch(types, layout):
+def sole_pitch_surface_at_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = verdict.surface_at_fault(types, layout) if types.pair.alarmed[PITCH_GROUP] else NO_SURFACE
+    s = verdict.surface_at_fault(types, layout) if types.pair.group_has_alarm[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not any_constant_type_remains(types.surface[s]):
         return NO_SURFACE
-    if evidence_is_long_enough(types.config, types.surface[s]):
-        store_first_fault(types, s)
+    if has_enough_evidence(types.config, types.surface[s]):
+        store_first_fault_sets(types, s)
     return s
 
 
 @kernel
-def decide_pairs(types, conclusion, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_finding`:
-    `isolated` is the one named first, the law acts on all. conclusion: that of the frame before."""
-    outside = decide_roll_and_yaw(types, layout, t)
-    decide_pitch(types, layout, t)
-    earliest = NO_SURFACE
+def decide_pair_isolation(types, conclusion, layout, t):
+    """Name surfaces and types plane by plane; t s. Returns the finding for
+    `conclusion.record_isolation_finding`: `isolated` is the one named first, the law acts on all. conclusion:
+    that of the frame before."""
+    lateral_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
+    decide_pitch_isolation(types, layout, t)
+    first_isolated = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        status, first = surface.status, types.surface[max(earliest, 0)].status
-        if status.named and (earliest < 0 or status.named_at_s < first.named_at_s):
-            earliest = s
-    isolated, isolated_at_s, kind, type_at_s = first_fault_finding(
-        types, conclusion, layout, earliest, outside, t
+        status, first_status = surface.status, types.surface[max(first_isolated, 0)].status
+        if status.is_isolated and (first_isolated < 0 or status.isolated_at_s < first_status.isolated_at_s):
+            first_isolated = s
+    isolated, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
+        types, conclusion, layout, first_isolated, lateral_outside_class, t
     )
-    lead, lead_kind = choose_accommodation(types, layout)
-    return isolated, isolated_at_s, kind, type_at_s, lead, lead_kind
+    accommodated_surface, accommodation_mode = choose_pair_accommodation(types, layout)
+    return isolated, isolated_at_s, fault_type, type_decided_at_s, accommodated_surface, accommodation_mode
 
 
 @kernel
-def first_fault_finding(types, conclusion, layout, s, outside, t):
+def first_fault_finding(types, conclusion, layout, s, lateral_outside_class, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
         status = types.surface[s].status
-        isolated = verdict.estimator_of_fault(layout, s, status.type)
-        return isolated, status.named_at_s, status.type, status.type_at_s
-    isolated = state.UNANTICIPATED if outside else state.NOT_ISOLATED
-    isolated_at_s = t if isolated != conclusion.isolated else conclusion.isolated_at_s
-    return isolated, isolated_at_s, -1, conclusion.type_at_s
+        isolated = verdict.estimator_of_fault(layout, s, status.fault_type)
+        return isolated, status.isolated_at_s, status.fault_type, status.type_decided_at_s
+    isolated = state.UNANTICIPATED if lateral_outside_class else state.NOT_ISOLATED
+    isolated_at_s = t if isolated != conclusion.isolated_estimator else conclusion.isolated_at_s
+    return isolated, isolated_at_s, -1, conclusion.type_decided_at_s
 
 
 @kernel
-def is_named_in_pitch(types, layout):
+def is_pitch_surface_isolated(types, layout):
     """Whether a surface of pitch is named."""
     for s, surface in enumerate(types.surface):
-        if layout.group[s] == PITCH_GROUP and surface.status.named:
+        if layout.group[s] == PITCH_GROUP and surface.status.is_isolated:
             return True
     return False
 
 
 @kernel
-def law_acts_on(types, layout, s):
+def is_accommodated(types, layout, s):
     """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
-    if types.surface[s].status.named:
+    if types.surface[s].status.is_isolated:
         return True
     if (
         layout.group[s] != PITCH_GROUP
-        or is_named_in_pitch(types, layout)
-        or not types.pair.alarmed[PITCH_GROUP]
+        or is_pitch_surface_isolated(types, layout)
+        or not types.pair.group_has_alarm[PITCH_GROUP]
     ):
         return False
-    likeliest = verdict.sole_surface(types.surface, True)
-    return s == (likeliest if likeliest >= 0 else layout.main[PITCH])
+    most_likely_surface = verdict.sole_possible_surface(types.surface, True)
+    return s == (most_likely_surface if most_likely_surface >= 0 else layout.main[PITCH])
 
 
 @kernel
-def choose_accommodation(types, layout):
+def choose_pair_accommodation(types, layout):
     """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
     is done about it: a replaced elevator leads before all others."""
-    lead, lead_kind = NO_SURFACE, -1
+    accommodated_surface, accommodation_mode = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
-        verdict.set_mode(surface, -1)
-        if law_acts_on(types, layout, s):
-            at_fault = surface.status.named == 1 or can_be_at_fault(surface)
-            mode = verdict.accommodation_mode(surface) if at_fault else SUBTRACT_OFFSET
-            if verdict.fault_is_present(types.config, surface, mode, at_fault):
-                verdict.set_mode(surface, mode)
-                replaced = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
-                if lead == NO_SURFACE or replaced:
-                    lead, lead_kind = s, mode
-    return lead, lead_kind
+        verdict.set_accommodation_mode(surface, -1)
+        if is_accommodated(types, layout, s):
+            is_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
+            mode = verdict.choose_accommodation_mode(surface) if is_at_fault else SUBTRACT_OFFSET
+            if verdict.is_fault_present(types.config, surface, mode, is_at_fault):
+                verdict.set_accommodation_mode(surface, mode)
+                is_replaced_elevator = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
+                if accommodated_surface == NO_SURFACE or is_replaced_elevator:
+                    accommodated_surface, accommodation_mode = s, mode
+    return accommodated_surface, accommodation_mode

@@ -31,194 +31,273 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.state import PITCH_GROUP
-from beaver_ftc.diagnosis.types import contract, table
-from beaver_ftc.diagnosis.types.contract import (
+from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
-    OBSERVATION,
-    REST_AGREES,
-    REST_EXCLUDES,
+    OBSERVATION_RECORD,
+    REST_EXCLUDES_TYPE,
+    REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
+    exclude_type,
+    intersect_feasible_set,
+    observe_position,
+    reset_feasible_sets,
+    reset_observation,
+    set_feasible_set,
+    set_is_anomalous,
+    shift_observations,
+    table,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 
-BLOCK_S = (
+BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
 )
-RUNAWAY_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
+DEFAULT_ACTUATOR_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
-def _rows() -> tuple[FaultType, ...]:
+def _load_ordered_types() -> tuple[FaultType, ...]:
     """Those of a constant parameter first, then by rank: a type's number is its place."""
-    names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
-    rows = [row for name in names for row in import_module(name).TYPES]
-    return tuple(sorted(rows, key=lambda row: (not row.constant, row.rank, row.name)))
+    module_names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
+    rows = [row for name in module_names for row in import_module(name).TYPES]
+    return tuple(sorted(rows, key=lambda row: (not row.has_constant_parameter, row.sort_rank, row.name)))
 
 
-TYPES = _rows()
+TYPES = _load_ordered_types()
 N_TYPES = len(TYPES)
-N_CONSTANT = sum(row.constant for row in TYPES)
-NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
-WORDS: tuple[str, ...] = tuple(row.words or row.name for row in TYPES)
-FIRST_OF_NAME = tuple(NAMES.index(name) for name in NAMES)  # the first type of the same name
+N_CONSTANT_TYPES = sum(row.has_constant_parameter for row in TYPES)
+TYPE_NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
+TYPE_DESCRIPTIONS: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
+FIRST_TYPE_OF_NAME = tuple(TYPE_NAMES.index(name) for name in TYPE_NAMES)  # the first type of the same name
 
 
-def _column(name: str) -> np.ndarray:
+def _type_column(name: str) -> np.ndarray:
     """A column of whole numbers or flags of the table, by type."""
     return np.array([int(getattr(row, name)) for row in TYPES])
 
 
-def _parts(name: str) -> dict[int, Kernel]:
+def _kernels_by_type(name: str) -> dict[int, Kernel]:
     """This part of each type that has it."""
-    parts = {kind: getattr(row, name) for kind, row in enumerate(TYPES)}
-    return {kind: part for kind, part in parts.items() if part is not None}
+    parts = {type_index: getattr(row, name) for type_index, row in enumerate(TYPES)}
+    return {type_index: part for type_index, part in parts.items() if part is not None}
 
 
-def _looks_like(row: FaultType, other: FaultType) -> bool:
-    return other.name in row.mistaken_for
+def _looks_like(fault_type: FaultType, other_type: FaultType) -> bool:
+    return other_type.name in fault_type.can_look_like
 
 
-# The columns that verdict.py reads; contract.py says what they are.
-ACCOMMODATION, DIRECTION, AT_REST = (_column(name) for name in ("accommodation", "direction", "at_rest"))
-SHOWS_WITHIN, HALF_CYCLES = _column("shows_within"), _column("half_cycles")
-FOLLOWS_COMMAND = _column("follows_command")
-MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
-MISTAKEN_FOR = np.array([[_looks_like(row, other) for other in TYPES] for row in TYPES])
-SERVES_TYPE = np.array(
-    [[mode == row.accommodation or mode in row.also for row in TYPES] for mode in range(4)]
+# The columns that verdict.py reads; `FaultType` says what they are.
+ACCOMMODATION_MODES, STOP_DIRECTIONS, EVIDENCE_AT_REST = (
+    _type_column(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
+)
+SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
+    _type_column("shows_within_half_cycles"),
+    _type_column("half_cycles_before_isolating_others"),
+)
+ERROR_DEPENDS_ON_COMMAND = _type_column("error_depends_on_command")
+MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
+CAN_LOOK_LIKE = np.array(
+    [[_looks_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]
+)
+MODE_SERVES_TYPE = np.array(
+    [
+        [mode == row.accommodation_mode or mode in row.other_accommodation_modes for row in TYPES]
+        for mode in range(4)
+    ]
 )
 # Types that give the deflection error of a surface, in the order in which they are used.
-ERROR_ORDER = np.array(sorted(_parts("expected_error"), key=lambda kind: TYPES[kind].error_rank), dtype=int)
-LIMIT_TYPE = np.array([NAMES.index(row.limit) if row.limit else -1 for row in TYPES])
+DEFLECTION_ERROR_ORDER = np.array(
+    sorted(
+        _kernels_by_type("deflection_error"), key=lambda type_index: TYPES[type_index].deflection_error_rank
+    ),
+    dtype=int,
+)
+LIMIT_TYPE_INDEX = np.array(
+    [TYPE_NAMES.index(row.limit_type_name) if row.limit_type_name else -1 for row in TYPES]
+)
 
 
-def kind_of(name: str, *, constant: bool = True, direction: int = 0) -> int:
-    """The number of a type, by its name in the table; direction: the stop to which it runs, if it does."""
-    sought = (name, constant, direction)
-    return [(row.name, row.constant, row.direction) for row in TYPES].index(sought)
+def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direction: int = 0) -> int:
+    """The number of a type, by its name in the table; stop_direction: of the stop to which it runs."""
+    sought_key = (name, has_constant_parameter, stop_direction)
+    return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought_key)
 
 
-def _compiled(name: str, arguments: str, lines: list[str], space: dict[str, Any]) -> Kernel:
-    """A kernel whose body is `lines`, in which `part_3` is a part of type 3.
+def _compile_kernel(name: str, arguments: str, body_lines: list[str], namespace: dict[str, Any]) -> Kernel:
+    """A kernel whose body is `body_lines`, in which `part_3` is a part of type 3.
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
     """
-    source = "\n    ".join([f"def {name}({arguments}):", *lines])
-    exec(compile(source, __file__, "exec"), space)
-    return kernel(space[name])
+    source = "\n    ".join([f"def {name}({arguments}):", *body_lines])
+    exec(compile(source, __file__, "exec"), namespace)
+    return kernel(namespace[name])
 
 
-def _call(kind: int, arguments: str) -> str:
-    """The call of a part of type `kind`; the argument of that name is its number."""
-    given = (str(kind) if argument == "kind" else argument for argument in arguments.split(", "))
-    return f"part_{kind}({', '.join(given)})"
+def _call_expression(type_index: int, arguments: str) -> str:
+    """The call of a part of type `type_index`; the argument of that name is its number."""
+    call_arguments = (
+        str(type_index) if argument == "type_index" else argument for argument in arguments.split(", ")
+    )
+    return f"part_{type_index}({', '.join(call_arguments)})"
 
 
-def _space(parts: dict[int, Kernel], **further: Any) -> dict[str, Any]:
+def _kernel_namespace(parts: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
     """The names that a kernel which calls these parts needs."""
-    return {"__name__": __name__, **{f"part_{kind}": part for kind, part in parts.items()}, **further}
+    return {
+        "__name__": __name__,
+        **{f"part_{type_index}": part for type_index, part in parts.items()},
+        **other_names,
+    }
 
 
-def _call_each(name: str, arguments: str, then: Kernel | None = None) -> Kernel:
-    """A kernel that calls this part of every type; then(surface, kind, interval): with what that returns."""
-    parts = _parts(name)
-    taken = ", ".join(argument for argument in arguments.split(", ") if argument != "kind")
-    calls = {kind: _call(kind, arguments) for kind in parts}
-    lines = [f"then(surface, {kind}, {call})" if then else call for kind, call in calls.items()]
-    return _compiled(f"{name}_each", taken, [*lines, "return"], _space(parts, then=then))
+def _kernel_calling_each_type(part_name: str, arguments: str, result_kernel: Kernel | None = None) -> Kernel:
+    """A kernel that calls this part of every type; result_kernel(surface, type_index, interval): called with
+    what that returns."""
+    part_kernels = _kernels_by_type(part_name)
+    parameters = ", ".join(argument for argument in arguments.split(", ") if argument != "type_index")
+    call_expressions = {type_index: _call_expression(type_index, arguments) for type_index in part_kernels}
+    body_lines = [
+        f"result_kernel(surface, {type_index}, {call})" if result_kernel else call
+        for type_index, call in call_expressions.items()
+    ]
+    return _compile_kernel(
+        f"{part_name}_each",
+        parameters,
+        [*body_lines, "return"],
+        _kernel_namespace(part_kernels, result_kernel=result_kernel),
+    )
 
 
-def _call_one(name: str, arguments: str, otherwise: Any) -> Kernel:
-    """A kernel that returns what this part of the type `kind` returns; `otherwise` for a type without it."""
-    parts = _parts(name)
-    lines = [f"if kind == {kind}: return {_call(kind, arguments)}" for kind in parts]
-    taken = arguments if "kind" in arguments.split(", ") else f"{arguments}, kind"
-    return _compiled(f"{name}_of", taken, [*lines, "return otherwise"], _space(parts, otherwise=otherwise))
+def _kernel_calling_one_type(part_name: str, arguments: str, default: Any) -> Kernel:
+    """A kernel that returns what this part of the type `type_index` returns; `default` for a type without
+    it."""
+    part_kernels = _kernels_by_type(part_name)
+    body_lines = [
+        f"if type_index == {type_index}: return {_call_expression(type_index, arguments)}"
+        for type_index in part_kernels
+    ]
+    parameters = arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
+    return _compile_kernel(
+        f"{part_name}_of",
+        parameters,
+        [*body_lines, "return default"],
+        _kernel_namespace(part_kernels, default=default),
+    )
 
 
-_FRAME = "config, surface, kind, k"
-begin_each = _call_each("begin", "surface, kind")
-fill_each = _call_each("whole_range", "surface", contract.replace_set)
-on_frame_each = _call_each("on_frame", "config, surface, kind")
-on_skipped_frame_each = _call_each("on_skipped_frame", _FRAME)
-judge_each = _call_each("judge", _FRAME, contract.intersect_set)
-on_release_each = _call_each("on_release", _FRAME)
-restore_each = _call_each("restored", "surface, kind", contract.replace_set)
-propagate_release_each = _call_each("propagate_release", "config, surface, kind")
-has_shown = _call_one("has_shown", "surface", True)
-differs = _call_one("differs", "surface, direction", False)
-deflection = _call_one("deflection", _FRAME, EMPTY_SET)
-expected_error = _call_one("expected_error", "surface, kind", np.nan)
+_FRAME_ARGUMENTS = "config, surface, type_index, k"
+reset_memory_each = _kernel_calling_each_type("reset_memory", "surface, type_index")
+set_parameter_range_each = _kernel_calling_each_type("parameter_range", "surface", set_feasible_set)
+on_every_frame_each = _kernel_calling_each_type("on_every_frame", "config, surface, type_index")
+on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_ARGUMENTS)
+intersect_consistent_interval_each = _kernel_calling_each_type(
+    "consistent_interval", _FRAME_ARGUMENTS, intersect_feasible_set
+)
+on_possible_release_each = _kernel_calling_each_type("on_possible_release", _FRAME_ARGUMENTS)
+set_feasible_set_after_frame_each = _kernel_calling_each_type(
+    "feasible_set_after_frame", "surface, type_index", set_feasible_set
+)
+propagate_release_each = _kernel_calling_each_type("propagate_release", "config, surface, type_index")
+has_shown = _kernel_calling_one_type("has_shown", "surface", True)
+motion_rules_out = _kernel_calling_one_type("motion_rules_out", "surface, stop_direction", False)
+possible_deflection = _kernel_calling_one_type("possible_deflection", _FRAME_ARGUMENTS, EMPTY_SET)
+deflection_error_under_type = _kernel_calling_one_type("deflection_error", "surface, type_index", np.nan)
 
-MAX_BLOCK = 256  # frames of a block
-N_KEPT_BLOCKS = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
+MAX_FRAMES_PER_BLOCK = 256  # frames of a block
+N_COMMAND_BLOCKS_KEPT = (
+    3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
+)
 
 # Commands to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
-COMMANDS = record(
-    given=(N_KEPT_BLOCKS, MAX_BLOCK), low=N_KEPT_BLOCKS, high=N_KEPT_BLOCKS,
-    least=2, greatest=2,  # where a healthy surface was within it
-    G_least=float, G_most=float,  # its effectiveness within the elapsed frame or block
+COMMANDS_RECORD = record(
+    command_history=(N_COMMAND_BLOCKS_KEPT, MAX_FRAMES_PER_BLOCK), min_command=N_COMMAND_BLOCKS_KEPT,
+    max_command=N_COMMAND_BLOCKS_KEPT,
+    min_healthy_position=2, max_healthy_position=2,  # where a healthy surface was within it
+    min_effectiveness=float, max_effectiveness=float,  # its effectiveness within the elapsed frame or block
 )  # fmt: skip
 
 # Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
 # to zero.
-ACTUATOR = record(
-    travel_low=float, travel_high=float, reach_low=float, reach_high=float, least_runaway_rate=float,
-    approach=float, step=float, slowest_step=float,
+ACTUATOR_RECORD = record(
+    travel_low=float, travel_high=float, reachable_low=float, reachable_high=float, min_runaway_rate=float,
+    lag_share_per_substep=float, max_motion_per_substep=float, min_motion_per_substep=float,
 )  # fmt: skip
 
-# The set of each type's parameter: contract.py.
-FEASIBLE = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+# The set of each type's parameter: types/__init__.py.
+FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
 # those since a stop could last hide something; the first, and where the surface was in it.
-EVIDENCE = record(
-    frames=int, rest_frames=int, unhidden_frames=int, started_at=int, start_low=float, start_high=float
+EVIDENCE_RECORD = record(
+    n_anomalous_frames=int,
+    n_rest_frames=int,
+    n_frames_since_stop_could_hide=int,
+    first_anomalous_frame=int,
+    first_position_low=float,
+    first_position_high=float,
 )
 
 # Whether the surface may be the one at fault by itself, and what decides whether it can be (verdict.py);
-# whether it is named, of which type, -1 if open, and since when, s: pairs.py.
-STATUS = record(is_candidate=int, decided_by=int, named=int, named_at_s=float, type=int, type_at_s=float)
+# whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
+STATUS_RECORD = record(
+    is_candidate=int,
+    decision_basis=int,
+    is_isolated=int,
+    isolated_at_s=float,
+    fault_type=int,
+    type_decided_at_s=float,
+)
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
-ACCOMMODATED = record(mode=int, frames_absent=int)
+ACCOMMODATION_RECORD = record(mode=int, n_frames_absent=int)
 
 # Where a surface can be that a type has held and released, rad: table/held_surface.py.
-RELEASE = record(
-    low=(2, N_TYPES), high=(2, N_TYPES), released=(int, N_TYPES),
-    held_low=N_TYPES, held_high=N_TYPES,  # where it is held by then
+RELEASE_RECORD = record(
+    return_low=(2, N_TYPES), return_high=(2, N_TYPES), has_released=(int, N_TYPES),
+    held_position_min=N_TYPES, held_position_max=N_TYPES,  # where it is held by then
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
-FIRST_FAULT_SETS = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+FIRST_FAULT_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
-TYPES_CONFIG = record(
-    whole=int, instants=int, released_returns=int, half_cycle_frames=int, abrupt=int,
-    has_surface_errors=int, length=int, block_s=float,
+TYPES_CONFIG_RECORD = record(
+    is_single_instant=int, n_substeps=int, returns_via_actuator=int, slowest_half_cycle_frames=int,
+    abrupt=int,
+    has_surface_errors=int, frames_per_block=int, block_duration_s=float,
     dt=float,
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-FAULT_PAIR = record(enabled=int, alarmed=(int, 2), no_lateral_pair=int, first=int, frames_since_change=int)
+FAULT_PAIR_RECORD = record(
+    enabled=int,
+    group_has_alarm=(int, 2),
+    lateral_outside_class=int,
+    first_fault_surface=int,
+    n_frames_since_exclusion=int,
+)
 
 # Blocks of frames.
-FRAME_BLOCK = record(filled=int, innovation=3, bound=3, noise=3)
+FRAME_BLOCK_RECORD = record(
+    n_frames=int, mean_innovation=3, mean_innovation_bound=3, gyro_change_bound_at_start=3
+)
 
 
 @lru_cache
 def surface_dtype() -> np.dtype:
-    """One surface's records: configuration, observations (contract.py), the memories of the types, and
+    """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
     what is concluded. refuted: its estimator is excluded (verdict.py)."""
-    own = {row.record: row.memory for row in TYPES if row.memory}
+    own = {row.record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
-        actuator=ACTUATOR, commands=COMMANDS, elapsed=OBSERVATION, judged=OBSERVATION, earlier=OBSERVATION,
-        evidence=EVIDENCE, feasible=FEASIBLE, release=RELEASE, **own,
-        estimator_excluded=int, status=STATUS, accommodation=ACCOMMODATED, known=FIRST_FAULT_SETS,
+        actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
+        judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
+        evidence=EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD, **own,
+        estimator_excluded=int, status=STATUS_RECORD, accommodation=ACCOMMODATION_RECORD,
+        first_fault_sets=FIRST_FAULT_SETS_RECORD,
     )  # fmt: skip
 
 
@@ -226,208 +305,269 @@ def surface_dtype() -> np.dtype:
 def types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
     return record(
-        config=TYPES_CONFIG, frame=int, pair=FAULT_PAIR, block=FRAME_BLOCK, surface=(surface_dtype(), n)
+        config=TYPES_CONFIG_RECORD,
+        frame_index=int,
+        pair=FAULT_PAIR_RECORD,
+        block=FRAME_BLOCK_RECORD,
+        surface=(surface_dtype(), n),
     )
 
 
 def configure_types(
-    types: np.void, layout: np.void, actuators: np.void, scenario: Scenario, travel: np.ndarray
+    types: np.void, layout: np.void, prediction_actuators: np.void, scenario: Scenario, travel: np.ndarray
 ) -> None:
     """Fill the configuration of the types and the actuator of each surface; travel (2, n) rad: the stops."""
-    config, shared, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
-    shared["length"] = block = ceil(BLOCK_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
-    shared["whole"], shared["block_s"] = scenario.substeps == 1 and block == 1, block * dt
-    shared["half_cycle_frames"] = ceil(pi / config.slowest_oscillation_rad_s / (block * dt))
-    shared["instants"], shared["released_returns"], shared["dt"] = scenario.substeps, actuators["real"], dt
-    shared["abrupt"] = config.fault_profile == "abrupt"
-    types["pair"]["first"], types["pair"]["enabled"] = -1, config.pairs
-    surfaces, instant_s = scenario.airframe.surfaces, dt / scenario.substeps
-    for s, (name, place, low, high) in enumerate(zip(surfaces, types["surface"], *travel, strict=True)):
-        rate_deg_s, actuator = getattr(scenario.actuators, name).rate_limit_deg_s, place["actuator"]
+    config, types_config, dt = scenario.fdi, types["config"], 1.0 / scenario.rate_hz
+    types_config["frames_per_block"] = frames_per_block = (
+        ceil(BLOCK_DURATION_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
+    )
+    types_config["is_single_instant"], types_config["block_duration_s"] = (
+        scenario.substeps == 1 and frames_per_block == 1,
+        frames_per_block * dt,
+    )
+    types_config["slowest_half_cycle_frames"] = ceil(
+        pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
+    )
+    types_config["n_substeps"], types_config["returns_via_actuator"], types_config["dt"] = (
+        scenario.substeps,
+        prediction_actuators["real"],
+        dt,
+    )
+    types_config["abrupt"] = config.fault_profile == "abrupt"
+    types["pair"]["first_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
+    surfaces, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
+    for s, (surface_name, surface, low, high) in enumerate(
+        zip(surfaces, types["surface"], *travel, strict=True)
+    ):
+        rate_deg_s, actuator = getattr(scenario.actuators, surface_name).rate_limit_deg_s, surface["actuator"]
         actuator["travel_low"], actuator["travel_high"] = low, high
-        actuator["reach_low"], actuator["reach_high"] = min(low, 0.0), max(high, 0.0)
-        actuator["approach"], actuator["step"] = actuators["approach"][s], actuators["step"][s]
-        actuator["least_runaway_rate"] = 0.5 * (radians(rate_deg_s) or RUNAWAY_RATE_RAD_S)
-        actuator["slowest_step"] = min(radians(config.slowest_rate_deg_s) * instant_s, actuator["step"])
-        place["status"]["is_candidate"] = not config.pairs or layout["group"][s] == PITCH_GROUP
-        place["accommodation"]["mode"] = place["status"]["type"] = -1
+        actuator["reachable_low"], actuator["reachable_high"] = min(low, 0.0), max(high, 0.0)
+        actuator["lag_share_per_substep"], actuator["max_motion_per_substep"] = (
+            prediction_actuators["approach"][s],
+            prediction_actuators["step"][s],
+        )
+        actuator["min_runaway_rate"] = 0.5 * (radians(rate_deg_s) or DEFAULT_ACTUATOR_RATE_RAD_S)
+        actuator["min_motion_per_substep"] = min(
+            radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
+        )
+        surface["status"]["is_candidate"] = not config.pairs or layout["group"][s] == PITCH_GROUP
+        surface["accommodation"]["mode"] = surface["status"]["fault_type"] = -1
 
 
 @kernel
 def restart_types(types):
     """Nothing is known of any surface yet."""
     for surface in types.surface:
-        restart_surface(surface)
+        restart_surface_types(surface)
 
 
 @kernel
-def restart_surface(surface):
+def restart_surface_types(surface):
     """Nothing is known of this surface yet."""
-    contract.begin_sets(surface)
-    fill_each(surface)
-    contract.begin_observation(surface)
-    surface.evidence.started_at = -1
-    surface.evidence.frames = surface.evidence.rest_frames = surface.evidence.unhidden_frames = 0
-    begin_each(surface)
+    reset_feasible_sets(surface)
+    set_parameter_range_each(surface)
+    reset_observation(surface)
+    surface.evidence.first_anomalous_frame = -1
+    surface.evidence.n_anomalous_frames = surface.evidence.n_rest_frames = (
+        surface.evidence.n_frames_since_stop_could_hide
+    ) = 0
+    reset_memory_each(surface)
 
 
 @kernel
-def record_commands(types, commanded, means):
-    """Add a frame to the orders of the surfaces: commanded (n,) rad; positions of healthy surfaces and their
-    least and greatest effectiveness within it: means of a `belief.means_dtype`.
+def record_commands(types, commanded_rad, frame_means):
+    """Add a frame to the commands of the surfaces: commanded_rad (n,); positions of healthy surfaces and
+    their least and greatest effectiveness within it: frame_means of a `model_prediction.frame_means_dtype`.
     """
-    length = types.config.length
+    frames_per_block = types.config.frames_per_block
     for s, surface in enumerate(types.surface):
         commands = surface.commands
-        if types.block.filled == 0:
-            for age in range(N_KEPT_BLOCKS - 1, 0, -1):
-                commands.given[age, :length] = commands.given[age - 1, :length]
-                commands.low[age], commands.high[age] = commands.low[age - 1], commands.high[age - 1]
-            commands.low[0], commands.high[0] = np.inf, -np.inf
-            commands.least[1], commands.greatest[1] = commands.least[0], commands.greatest[0]
-            commands.least[0], commands.greatest[0] = np.inf, -np.inf
-            commands.G_least, commands.G_most = np.inf, -np.inf
-        order = min(max(commanded[s], surface.actuator.travel_low), surface.actuator.travel_high)
-        commands.given[0, types.block.filled] = order
-        commands.low[0], commands.high[0] = min(commands.low[0], order), max(commands.high[0], order)
-        commands.least[0] = min(commands.least[0], means.u_least[s])
-        commands.greatest[0] = max(commands.greatest[0], means.u_most[s])
-        commands.G_least = min(commands.G_least, means.G_least[s])
-        commands.G_most = max(commands.G_most, means.G_most[s])
+        if types.block.n_frames == 0:
+            for age in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
+                commands.command_history[age, :frames_per_block] = commands.command_history[
+                    age - 1, :frames_per_block
+                ]
+                commands.min_command[age], commands.max_command[age] = (
+                    commands.min_command[age - 1],
+                    commands.max_command[age - 1],
+                )
+            commands.min_command[0], commands.max_command[0] = np.inf, -np.inf
+            commands.min_healthy_position[1], commands.max_healthy_position[1] = (
+                commands.min_healthy_position[0],
+                commands.max_healthy_position[0],
+            )
+            commands.min_healthy_position[0], commands.max_healthy_position[0] = np.inf, -np.inf
+            commands.min_effectiveness, commands.max_effectiveness = np.inf, -np.inf
+        limited_command = min(
+            max(commanded_rad[s], surface.actuator.travel_low), surface.actuator.travel_high
+        )
+        commands.command_history[0, types.block.n_frames] = limited_command
+        commands.min_command[0], commands.max_command[0] = (
+            min(commands.min_command[0], limited_command),
+            max(commands.max_command[0], limited_command),
+        )
+        commands.min_healthy_position[0] = min(commands.min_healthy_position[0], frame_means.u_min[s])
+        commands.max_healthy_position[0] = max(commands.max_healthy_position[0], frame_means.u_max[s])
+        commands.min_effectiveness = min(commands.min_effectiveness, frame_means.G_min[s])
+        commands.max_effectiveness = max(commands.max_effectiveness, frame_means.G_max[s])
 
 
 @kernel
-def observe_frame(types, layout, estimators, innovation, bound):
+def infer_surface_positions(types, layout, estimators, innovation, bound):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
     bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    anomalous = not isolation.is_healthy(innovation, bound)
+    is_anomalous = not isolation.is_healthy(innovation, bound)
     for s, surface in enumerate(types.surface):
-        contract.shift_observations(surface)
-        contract.set_anomalous(surface, anomalous)
+        shift_observations(surface)
+        set_is_anomalous(surface, is_anomalous)
         fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        effect = fie.block_effect if types.config.length > 1 else fie.effect
-        contract.locate_surface(types.config, surface, fie, axis, innovation, bound, effect)
+        effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.effect
+        observe_position(types.config, surface, fie, axis, innovation, bound, effect)
 
 
 @kernel
-def count_evidence(surface):
-    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
-    surface.evidence.frames += 1
-    surface.evidence.unhidden_frames += 1
+def count_anomalous_frame(surface):
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing
+    (`judge_previous_frame`)."""
+    surface.evidence.n_anomalous_frames += 1
+    surface.evidence.n_frames_since_stop_could_hide += 1
 
 
 @kernel
-def judge_surface(config, surface, k):
+def narrow_feasible_sets(config, surface, k):
     """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
-    evidence, seen = surface.evidence, surface.judged
-    if seen.low > seen.high:
+    evidence, observation = surface.evidence, surface.judged_observation
+    if observation.position_low > observation.position_high:
         return
-    if evidence.started_at < 0:
-        evidence.started_at, evidence.start_low, evidence.start_high = k, seen.low, seen.high
-    judge_each(config, surface, k)
+    if evidence.first_anomalous_frame < 0:
+        evidence.first_anomalous_frame, evidence.first_position_low, evidence.first_position_high = (
+            k,
+            observation.position_low,
+            observation.position_high,
+        )
+    intersect_consistent_interval_each(config, surface, k)
 
 
 @kernel
-def judge_frame(types):
+def judge_previous_frame(types):
     """Judge the frame before the elapsed one."""
-    config, k = types.config, types.frame - 1
+    config, k = types.config, types.frame_index - 1
     for s, surface in enumerate(types.surface):
-        on_frame_each(config, surface)
-        if config.released_returns and types.frame > 0:
-            on_release_each(config, surface, k)
-        if config.abrupt and surface.accommodation.mode == GIVE_UP and not surface.judged.anomalous:
-            count_rest(types, s)
-        elif surface.judged.anomalous and (
-            config.whole or (surface.earlier.anomalous and surface.elapsed.anomalous)
+        on_every_frame_each(config, surface)
+        if config.returns_via_actuator and types.frame_index > 0:
+            on_possible_release_each(config, surface, k)
+        if (
+            config.abrupt
+            and surface.accommodation.mode == GIVE_UP
+            and not surface.judged_observation.is_anomalous
         ):
-            count_evidence(surface)
-            judge_surface(config, surface, k)
+            count_rest_as_evidence(types, s)
+        elif surface.judged_observation.is_anomalous and (
+            config.is_single_instant
+            or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
+        ):
+            count_anomalous_frame(surface)
+            narrow_feasible_sets(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
-        if config.released_returns and types.frame > 0:
-            restore_each(surface)
+        if config.returns_via_actuator and types.frame_index > 0:
+            set_feasible_set_after_frame_each(surface)
             propagate_release_each(config, surface)
-        if surface.judged.stop_hides[0] or surface.judged.stop_hides[1]:
-            surface.evidence.unhidden_frames = 0
-    types.frame += 1
+        if (
+            surface.judged_observation.stop_can_hide_deflection[0]
+            or surface.judged_observation.stop_can_hide_deflection[1]
+        ):
+            surface.evidence.n_frames_since_stop_could_hide = 0
+    types.frame_index += 1
 
 
 @kernel
-def examine_frame(types, layout, estimators, innovation, bound):
+def observe_and_judge_frame(types, layout, estimators, innovation, bound):
     """Observe the elapsed frame, or the block that it completes, and judge the one before."""
-    if types.config.length > 1:
-        examine_block(types, layout, estimators, innovation, bound)
+    if types.config.frames_per_block > 1:
+        observe_and_judge_block(types, layout, estimators, innovation, bound)
         return
-    observe_frame(types, layout, estimators, innovation, bound.frame)
-    judge_frame(types)
+    infer_surface_positions(types, layout, estimators, innovation, bound.frame_innovation_bound)
+    judge_previous_frame(types)
 
 
 @kernel
-def begin_block(types, layout, estimators, noise_before):
-    """Begin a block with the elapsed frame; noise_before (3,): as it began."""
+def begin_frame_block(types, layout, estimators, gyro_change_bound_before):
+    """Begin a block with the elapsed frame; gyro_change_bound_before (3,) rad/s: as it began."""
     block = types.block
-    block.innovation[:], block.bound[:] = 0.0, 0.0
-    block.noise[:] = noise_before
-    for e in layout.position_estimator:
-        isolation.clear_mean_effect(estimators[e].block_effect)
+    block.mean_innovation[:], block.mean_innovation_bound[:] = 0.0, 0.0
+    block.gyro_change_bound_at_start[:] = gyro_change_bound_before
+    for estimator_index in layout.position_estimator:
+        isolation.clear_mean_effect(estimators[estimator_index].block_mean_effect)
 
 
 @kernel
-def add_to_block(types, layout, estimators, innovation, eta_bar):
+def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
     """Add the elapsed frame to the means over the block."""
-    block, share = types.block, 1.0 / types.config.length
+    block, frame_share = types.block, 1.0 / types.config.frames_per_block
     for i in range(3):
-        block.innovation[i] += share * innovation[i]
-        block.bound[i] += share * eta_bar[i]
-    for e in layout.position_estimator:
-        isolation.add_to_mean_effect(estimators[e].block_effect, estimators[e].effect, share)
+        block.mean_innovation[i] += frame_share * innovation[i]
+        block.mean_innovation_bound[i] += frame_share * eta_bar[i]
+    for estimator_index in layout.position_estimator:
+        isolation.add_to_mean_effect(
+            estimators[estimator_index].block_mean_effect, estimators[estimator_index].effect, frame_share
+        )
 
 
 @kernel
-def examine_block(types, layout, estimators, innovation, bound):
+def observe_and_judge_block(types, layout, estimators, innovation, bound):
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
-    if block.filled == 0:
-        begin_block(types, layout, estimators, bound.noise_before)
-    add_to_block(types, layout, estimators, innovation, bound.eta_bar)
-    block.filled += 1
-    if block.filled < config.length:
+    if block.n_frames == 0:
+        begin_frame_block(types, layout, estimators, bound.gyro_change_bound_before)
+    add_frame_to_block(types, layout, estimators, innovation, bound.eta_bar)
+    block.n_frames += 1
+    if block.n_frames < config.frames_per_block:
         return
-    block.filled = 0
+    block.n_frames = 0
     for i in range(3):
-        block.bound[i] += (block.noise[i] + bound.noise[i]) / config.block_s
-    observe_frame(types, layout, estimators, block.innovation, block.bound)
-    judge_frame(types)
+        block.mean_innovation_bound[i] += (
+            block.gyro_change_bound_at_start[i] + bound.gyro_change_bound[i]
+        ) / config.block_duration_s
+    infer_surface_positions(types, layout, estimators, block.mean_innovation, block.mean_innovation_bound)
+    judge_previous_frame(types)
 
 
 @kernel
-def count_rest(types, s):
+def count_rest_as_evidence(types, surface_index):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
 
     That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
     fault that is declared to stay: of one that may go, the quiet may be that of health.
     """
-    surface = types.surface[s]
-    if not agrees_with_rest(surface):
+    surface = types.surface[surface_index]
+    if not agrees_with_rest_position(surface):
         return
-    for i, other in enumerate(types.surface):
-        if i == s or (surface.status.is_candidate and other.status.is_candidate):
-            count_evidence(other)
-    surface.evidence.rest_frames += 1
-    if surface.evidence.rest_frames > types.config.half_cycle_frames and not types.config.has_surface_errors:
-        for kind in range(N_TYPES):
-            if AT_REST[kind] == REST_EXCLUDES:
-                contract.exclude_type(surface, kind)
+    for other_index, other_surface in enumerate(types.surface):
+        if other_index == surface_index or (
+            surface.status.is_candidate and other_surface.status.is_candidate
+        ):
+            count_anomalous_frame(other_surface)
+    surface.evidence.n_rest_frames += 1
+    if (
+        surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
+        and not types.config.has_surface_errors
+    ):
+        for type_index in range(N_TYPES):
+            if EVIDENCE_AT_REST[type_index] == REST_EXCLUDES_TYPE:
+                exclude_type(surface, type_index)
 
 
 @kernel
-def agrees_with_rest(surface):
+def agrees_with_rest_position(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
-    for kind in range(N_TYPES):
-        low, high = surface.feasible.low[kind], surface.feasible.high[kind]
-        apart = surface.judged.low > high or surface.judged.high < low
-        if AT_REST[kind] == REST_AGREES and apart:
+    for type_index in range(N_TYPES):
+        low, high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
+        is_disjoint = (
+            surface.judged_observation.position_low > high or surface.judged_observation.position_high < low
+        )
+        if EVIDENCE_AT_REST[type_index] == REST_POSITION_IS_PARAMETER and is_disjoint:
             return False
     return True

@@ -20,386 +20,485 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.types.contract import (
+from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
-    REST_EXCLUDES,
-    REST_HIDES,
+    REST_EXCLUDES_TYPE,
+    REST_HIDES_TYPE,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     UNLIMITED_SET,
     WAIT_FOR_SURFACE,
+    DeflectionRelation,
     FaultType,
     feasible_set,
-    observed_error_of,
-    set_middle,
-    set_middle_of,
-    within_travel,
+    feasible_set_midpoint,
+    limit_to_travel,
+    parameter_estimate,
+    read_deflection_error,
 )
 
 
 @kernel
 def consistent_effectiveness(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
-    low, high = surface.judged.low, surface.judged.high
+    low, high = surface.judged_observation.position_low, surface.judged_observation.position_high
     return isolation.consistent_parameters(
-        0.5 * (low + high), 0.5 * (high - low), surface.judged.command, 0.0, 1.0
+        0.5 * (low + high), 0.5 * (high - low), surface.judged_observation.healthy_position, 0.0, 1.0
     )
 
 
 @kernel
 def effectiveness_range(surface):
-    """Of 1 + theta: between nothing and all may be left."""
+    """Return the range of 1 + theta: 0 to 1."""
     return 0.0, 1.0
 
 
 @kernel
-def judge_loss(config, surface, kind, k):
+def consistent_loss_interval(config, surface, type_index, k):
     """The effectiveness that explains this frame."""
     return consistent_effectiveness(surface)
 
 
 @kernel
-def loss_deflection(config, surface, kind, k):
+def loss_deflection(config, surface, type_index, k):
     """The command times what can be left."""
-    low, high, u = surface.feasible.low[kind], surface.feasible.high[kind], surface.elapsed.command
-    return min(low * u, high * u), max(low * u, high * u)
+    low, high, healthy_position = (
+        surface.feasible_sets.low[type_index],
+        surface.feasible_sets.high[type_index],
+        surface.last_observation.healthy_position,
+    )
+    return min(low * healthy_position, high * healthy_position), max(
+        low * healthy_position, high * healthy_position
+    )
 
 
 @kernel
-def judge_varying_loss(config, surface, kind, k):
+def consistent_varying_loss_interval(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     low, high = consistent_effectiveness(surface)
-    swung = config.length > 1 and surface.commands.least[1] < 0.0 < surface.commands.greatest[1]
-    return EMPTY_SET if low > high and not swung else UNLIMITED_SET
+    command_changed_sign = (
+        config.frames_per_block > 1
+        and surface.commands.min_healthy_position[1] < 0.0 < surface.commands.max_healthy_position[1]
+    )
+    return EMPTY_SET if low > high and not command_changed_sign else UNLIMITED_SET
 
 
-def loss_estimate(fdi: np.void, s: int, kind: int) -> float | None:
+def loss_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
     """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
-    return set_middle_of(fdi, s, kind) - 1.0 if fdi["types"]["pair"]["enabled"] else fitted_loss(fdi, s, kind)
+    return (
+        parameter_estimate(fdi, s, type_index) - 1.0
+        if fdi["types"]["pair"]["enabled"]
+        else loss_estimated_by_isolation(fdi, s, type_index)
+    )
 
 
-def fitted_loss(fdi: np.void, s: int, kind: int) -> float:
+def loss_estimated_by_isolation(fdi: np.void, s: int, type_index: int) -> float:
     """theta as the estimator of a loss has it."""
     estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_estimator"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
-def loss_interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:
-    """Of theta."""
-    low, high = feasible_set(fdi, s, kind)
-    return low - 1.0, high - 1.0
+def loss_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
+    """Return the interval of theta, or None."""
+    effectiveness_low, effectiveness_high = feasible_set(fdi, s, type_index)
+    return effectiveness_low - 1.0, effectiveness_high - 1.0
 
 
+LOSS_RELATION = DeflectionRelation(gain=1.0, theta_is_share=True, theta_range=lambda low, high: (-1.0, 0.0))
 LOSS = FaultType(
-    name="loss_of_effectiveness", constant=True, rank=1,
-    whole_range=effectiveness_range, judge=judge_loss, deflection=loss_deflection,
-    accommodation=SCALE_COMMAND, limit="float", estimate=loss_estimate, interval=loss_interval,
+    name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
+    parameter_range=effectiveness_range, consistent_interval=consistent_loss_interval,
+    possible_deflection=loss_deflection,
+    accommodation_mode=SCALE_COMMAND, limit_type_name="float", deflection_relation=LOSS_RELATION,
+    estimate=loss_estimate,
+    estimate_interval=loss_interval,
 )  # fmt: skip
 VARYING_LOSS = FaultType(
-    name="loss_of_effectiveness", words="loss_of_effectiveness that varies", constant=False, rank=1,
-    judge=judge_varying_loss, half_cycles=2, accommodation=SCALE_COMMAND, estimate=fitted_loss,
+    name="loss_of_effectiveness", description="loss_of_effectiveness that varies",
+    has_constant_parameter=False, sort_rank=1,
+    consistent_interval=consistent_varying_loss_interval, half_cycles_before_isolating_others=2,
+    accommodation_mode=SCALE_COMMAND, deflection_relation=LOSS_RELATION,
+    estimate=loss_estimated_by_isolation,
 )  # fmt: skip
 
 
-RUNAWAY_RATE_RATIO = 1.8  # times the least pace of a runaway, half of the rate limit at which it runs
+MIN_RUNAWAY_RATE_RATIO = 1.8  # times the least rate of a runaway, half of the rate limit at which it runs
 
 
 @kernel
-def judged_offset(surface):
-    """How far off its command the surface was in the judged frame, (low, high) rad: unlimited at a stop.
+def consistent_offset_interval(surface):
+    """Return the deflection error of the surface in the judged frame, (low, high) rad: unlimited at a stop.
 
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    low, high, u, commands = surface.judged.low, surface.judged.high, surface.judged.command, surface.commands
+    low, high, healthy_position, commands = (
+        surface.judged_observation.position_low,
+        surface.judged_observation.position_high,
+        surface.judged_observation.healthy_position,
+        surface.commands,
+    )
     if high < surface.actuator.travel_low or low > surface.actuator.travel_high:
         return isolation.EMPTY_SET
-    least, greatest = low - max(u - commands.least[1], 0.0), high + max(commands.greatest[1] - u, 0.0)
-    off_low = low - u if least > surface.actuator.travel_low else -np.inf
-    return off_low, high - u if greatest < surface.actuator.travel_high else np.inf
+    lowest_position, highest_position = (
+        low - max(healthy_position - commands.min_healthy_position[1], 0.0),
+        high + max(commands.max_healthy_position[1] - healthy_position, 0.0),
+    )
+    offset_low = low - healthy_position if lowest_position > surface.actuator.travel_low else -np.inf
+    return offset_low, high - healthy_position if highest_position < surface.actuator.travel_high else np.inf
 
 
 @kernel
-def judge_bias(config, surface, kind, k):
+def consistent_bias_interval(config, surface, type_index, k):
     """The offsets that explain this frame."""
-    return judged_offset(surface)
+    return consistent_offset_interval(surface)
 
 
 @kernel
-def bias_error(surface, kind):
+def bias_deflection_error(surface, type_index):
     """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
-    low, high = surface.feasible.low[kind], surface.feasible.high[kind]
-    return set_middle(surface, kind) if high - low < np.inf else np.inf
+    low, high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
+    return feasible_set_midpoint(surface, type_index) if high - low < np.inf else np.inf
 
 
 @kernel
-def bias_deflection(config, surface, kind, k):
+def bias_deflection(config, surface, type_index, k):
     """The command and the offset, cut off by the stops."""
-    low = limited_deflection(surface, surface.feasible.low[kind], surface.commands.least[0])
-    return low, limited_deflection(surface, surface.feasible.high[kind], surface.commands.greatest[0])
+    low = mean_deflection_with_offset(
+        surface, surface.feasible_sets.low[type_index], surface.commands.min_healthy_position[0]
+    )
+    return low, mean_deflection_with_offset(
+        surface, surface.feasible_sets.high[type_index], surface.commands.max_healthy_position[0]
+    )
 
 
 @kernel
-def limited_deflection(surface, off, extreme):
-    """Where an offset (rad) takes a surface in the mean; if a stop is met at an instant, at the `extreme`."""
-    commands, actuator, mean = surface.commands, surface.actuator, surface.elapsed.command + off
-    met = commands.least[0] + off < actuator.travel_low or commands.greatest[0] + off > actuator.travel_high
-    return within_travel(surface, extreme + off) if met else mean
+def mean_deflection_with_offset(surface, offset_rad, extreme_healthy_position):
+    """Return the mean deflection with an offset (rad); if a stop is met at an instant, that at
+    `extreme_healthy_position`."""
+    commands, actuator, mean_deflection = (
+        surface.commands,
+        surface.actuator,
+        surface.last_observation.healthy_position + offset_rad,
+    )
+    meets_stop = (
+        commands.min_healthy_position[0] + offset_rad < actuator.travel_low
+        or commands.max_healthy_position[0] + offset_rad > actuator.travel_high
+    )
+    return limit_to_travel(surface, extreme_healthy_position + offset_rad) if meets_stop else mean_deflection
 
 
-def bias_interval(fdi: np.void, s: int, kind: int) -> tuple[float, float] | None:
-    """Of the offset, rad; None while one end is open."""
-    low, high = feasible_set(fdi, s, kind)
+def bias_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
+    """Return the interval of the offset, rad; None while one end is open."""
+    low, high = feasible_set(fdi, s, type_index)
     return (low, high) if np.isfinite(low) and np.isfinite(high) else None
 
 
 @kernel
-def begin_growing_bias(surface, kind):
+def reset_growing_bias_memory(surface, type_index):
     """It has not grown yet."""
-    grown = surface.growing_bias
-    grown.up = grown.down = 0.0
-    grown.ran[:] = 0
-    clear_offset_range(grown)
+    memory = surface.growing_bias
+    memory.min_growth_up = memory.min_growth_down = 0.0
+    memory.has_run_to_stop[:] = 0
+    clear_offset_interval(memory)
 
 
 @kernel
-def clear_offset_range(grown):
+def clear_offset_interval(memory):
     """Its offset is not known."""
-    grown.least, grown.greatest = -np.inf, np.inf
+    memory.offset_low, memory.offset_high = -np.inf, np.inf
 
 
 @kernel
-def growth_per_frame(config, surface):
-    """How far one that is slower than a runaway moves from one judged frame to the next, rad at most."""
-    return RUNAWAY_RATE_RATIO * surface.actuator.least_runaway_rate * config.block_s
+def max_growth_per_frame(config, surface):
+    """Return the largest motion between judged frames of an offset slower than a runaway, rad."""
+    return MIN_RUNAWAY_RATE_RATIO * surface.actuator.min_runaway_rate * config.block_duration_s
 
 
 @kernel
-def widen_offset_range(config, surface, kind):
+def widen_offset_interval(config, surface, type_index):
     """Widen the interval of the offset by what one that is slower than a runaway moves in a frame."""
-    way = growth_per_frame(config, surface)
-    surface.growing_bias.least -= way
-    surface.growing_bias.greatest += way
+    max_growth = max_growth_per_frame(config, surface)
+    surface.growing_bias.offset_low -= max_growth
+    surface.growing_bias.offset_high += max_growth
 
 
 @kernel
-def skip_growing_bias(config, surface, kind, k):
+def forget_bias_offset_interval(config, surface, type_index, k):
     """The fault may have gone, and begin again with any offset."""
-    clear_offset_range(surface.growing_bias)
+    clear_offset_interval(surface.growing_bias)
 
 
 @kernel
-def compare_with_growth(config, surface, least, greatest):
-    """Hold an offset between least and greatest (rad) against what a slower one can be. A mean over several
-    instants may be that of the last of them."""
-    grown = surface.growing_bias
-    if greatest < grown.least:
-        grown.ran[0] = 1
-    if least > grown.greatest:
-        grown.ran[1] = 1
-    spare = 0.0 if config.whole else growth_per_frame(config, surface)
-    grown.least, grown.greatest = max(grown.least, least - spare), min(grown.greatest, greatest + spare)
+def detect_run_to_stop(config, surface, min_offset, max_offset):
+    """Hold an offset between min_offset and max_offset (rad) against what a slower one can be. A mean over
+    several instants may be that of the last of them."""
+    memory = surface.growing_bias
+    if max_offset < memory.offset_low:
+        memory.has_run_to_stop[0] = 1
+    if min_offset > memory.offset_high:
+        memory.has_run_to_stop[1] = 1
+    max_growth = 0.0 if config.is_single_instant else max_growth_per_frame(config, surface)
+    memory.offset_low, memory.offset_high = (
+        max(memory.offset_low, min_offset - max_growth),
+        min(memory.offset_high, max_offset + max_growth),
+    )
 
 
 @kernel
-def judge_growing_bias(config, surface, kind, k):
+def growing_bias_consistent_set(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
-    least, greatest = judged_offset(surface)
-    if least <= greatest:
-        compare_with_growth(config, surface, least, greatest)
-    if np.isinf(least) or np.isinf(greatest):
+    min_offset, max_offset = consistent_offset_interval(surface)
+    if min_offset <= max_offset:
+        detect_run_to_stop(config, surface, min_offset, max_offset)
+    if np.isinf(min_offset) or np.isinf(max_offset):
         return UNLIMITED_SET
-    grown = surface.growing_bias
-    grown.up, grown.down = max(grown.up, least), min(grown.down, greatest)
-    above, below = grown.up > 0.0, grown.down < 0.0
-    shrinks = (above and greatest < grown.up) or (below and least > grown.down)
-    return EMPTY_SET if least > greatest or (above and below) or shrinks else UNLIMITED_SET
+    memory = surface.growing_bias
+    memory.min_growth_up, memory.min_growth_down = (
+        max(memory.min_growth_up, min_offset),
+        min(memory.min_growth_down, max_offset),
+    )
+    has_grown_up, has_grown_down = memory.min_growth_up > 0.0, memory.min_growth_down < 0.0
+    shrinks = (has_grown_up and max_offset < memory.min_growth_up) or (
+        has_grown_down and min_offset > memory.min_growth_down
+    )
+    return (
+        EMPTY_SET
+        if min_offset > max_offset or (has_grown_up and has_grown_down) or shrinks
+        else UNLIMITED_SET
+    )
 
 
 @kernel
-def ran_to_stop(surface, direction):
+def has_run_to_stop(surface, direction):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
     if direction == 0:
         return False
-    return surface.growing_bias.ran[1 if direction > 0 else 0] == 1
+    return surface.growing_bias.has_run_to_stop[1 if direction > 0 else 0] == 1
 
 
-def last_offset(fdi: np.void, s: int, kind: int) -> float | None:
+def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Offset in the last frame, rad."""
-    return observed_error_of(fdi["types"]["surface"][s])
+    return read_deflection_error(fdi["types"]["surface"][s])
 
 
 BIAS = FaultType(
-    name="bias", constant=True, rank=6,
-    judge=judge_bias, deflection=bias_deflection,
-    accommodation=SUBTRACT_OFFSET, expected_error=bias_error, error_rank=2, estimate=set_middle_of,
-    interval=bias_interval,
+    name="bias", has_constant_parameter=True, sort_rank=6,
+    consistent_interval=consistent_bias_interval, possible_deflection=bias_deflection,
+    accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_rank=2,
+    deflection_relation=DeflectionRelation(
+        1.0, theta_is_share=False, theta_range=lambda low, high: (low - high, high - low)
+    ),
+    excluding_comparison="offset", estimate=parameter_estimate,
+    estimate_interval=bias_interval,
 )  # fmt: skip
 GROWING_BIAS = FaultType(
-    name="bias", words="bias that grows", constant=False, rank=4,
-    begin=begin_growing_bias, on_frame=widen_offset_range, judge=judge_growing_bias,
-    on_skipped_frame=skip_growing_bias,
-    record="growing_bias",
-    memory=record(
-        up=float, down=float,  # how far it has certainly grown, rad
+    name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
+    reset_memory=reset_growing_bias_memory, on_every_frame=widen_offset_interval,
+    consistent_interval=growing_bias_consistent_set,
+    on_skipped_frame=forget_bias_offset_interval,
+    record_name="growing_bias",
+    memory_dtype=record(
+        min_growth_up=float, min_growth_down=float,  # how far it has certainly grown, rad
         # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
-        least=float, greatest=float, ran=(int, 2),
+        offset_low=float, offset_high=float, has_run_to_stop=(int, 2),
     ),
     # an offset that grows ends as good as constant, with any commands
-    follows_command=False,
+    error_depends_on_command=False,
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
-    mistaken_for=("loss_of_effectiveness", "stuck", "float", "hardover"), differs=ran_to_stop,
-    accommodation=SUBTRACT_OFFSET, estimate=last_offset,
+    can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"), motion_rules_out=has_run_to_stop,
+    accommodation_mode=SUBTRACT_OFFSET, excluding_comparison="growing offset", estimate=last_offset_rad,
 )  # fmt: skip
 
 
-HALF_CYCLES_THAT_SHOW = 3
+MIN_HALF_CYCLES_TO_SHOW = 3
 
 
 @kernel
-def begin_oscillation(surface, kind):
+def reset_oscillation_memory(surface, type_index):
     """No half-cycle has been seen."""
-    surface.oscillatory.half_cycles = surface.oscillatory.sign = 0
+    surface.oscillatory.n_half_cycles = surface.oscillatory.error_sign = 0
 
 
 @kernel
-def add_squared_error(config, surface, kind):
+def add_squared_deflection_error(config, surface, type_index):
     """Sum the squares of the deflection error."""
-    error = 0.5 * (surface.judged.low + surface.judged.high) - surface.judged.command
-    surface.oscillatory.square += error**2
+    error = (
+        0.5 * (surface.judged_observation.position_low + surface.judged_observation.position_high)
+        - surface.judged_observation.healthy_position
+    )
+    surface.oscillatory.half_cycle_error_square_sum += error**2
 
 
 @kernel
-def judge_oscillation(config, surface, kind, k):
+def consistent_oscillation_interval(config, surface, type_index, k):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
     At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
     keeps its sign.
     """
-    swing = surface.oscillatory
-    low, high = surface.judged.low - surface.judged.command, surface.judged.high - surface.judged.command
-    sign = 1 if low > 0.0 else (-1 if high < 0.0 else 0)
-    if sign == 0 or (not config.whole and surface.judged.stop_hides[0 if sign > 0 else 1]):
-        swing.steady_since = k + 1
+    memory = surface.oscillatory
+    error_low, error_high = (
+        surface.judged_observation.position_low - surface.judged_observation.healthy_position,
+        surface.judged_observation.position_high - surface.judged_observation.healthy_position,
+    )
+    error_sign = 1 if error_low > 0.0 else (-1 if error_high < 0.0 else 0)
+    if error_sign == 0 or (
+        not config.is_single_instant
+        and surface.judged_observation.stop_can_hide_deflection[0 if error_sign > 0 else 1]
+    ):
+        memory.sign_since_frame = k + 1
         return UNLIMITED_SET
-    if sign != swing.sign:
-        end_half_cycle(swing, k)
-        swing.sign, swing.steady_since = sign, k
-    return EMPTY_SET if k - swing.steady_since > config.half_cycle_frames else UNLIMITED_SET
+    if error_sign != memory.error_sign:
+        end_oscillation_half_cycle(memory, k)
+        memory.error_sign, memory.sign_since_frame = error_sign, k
+    return EMPTY_SET if k - memory.sign_since_frame > config.slowest_half_cycle_frames else UNLIMITED_SET
 
 
 @kernel
-def end_half_cycle(swing, k):
+def end_oscillation_half_cycle(memory, k):
     """A half-cycle ends here; the first one is cut off at its beginning and does not count."""
-    if swing.sign != 0:
-        if swing.half_cycles == 0:
-            swing.first_end = k
+    if memory.error_sign != 0:
+        if memory.n_half_cycles == 0:
+            memory.first_half_cycle_end_frame = k
         else:
-            swing.squares += swing.square
-        swing.last_end = k
-        swing.half_cycles += 1
-        swing.square = 0.0
+            memory.earlier_error_square_sum += memory.half_cycle_error_square_sum
+        memory.last_half_cycle_end_frame = k
+        memory.n_half_cycles += 1
+        memory.half_cycle_error_square_sum = 0.0
 
 
 @kernel
-def skip_oscillation(config, surface, kind, k):
+def skip_oscillation_frame(config, surface, type_index, k):
     """In a frame that is not judged it may have swung to the other side, unseen."""
-    surface.oscillatory.steady_since = k + 1
+    surface.oscillatory.sign_since_frame = k + 1
 
 
 @kernel
 def oscillation_has_shown(surface):
     """Whether it has swung for two half-cycles and more."""
-    return surface.oscillatory.half_cycles >= HALF_CYCLES_THAT_SHOW
+    return surface.oscillatory.n_half_cycles >= MIN_HALF_CYCLES_TO_SHOW
 
 
-def amplitude(fdi: np.void, s: int, kind: int) -> float | None:
+def oscillation_amplitude_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Amplitude, rad."""
-    swing = fdi["types"]["surface"][s]["oscillatory"]
-    return float(sqrt(2.0 * swing["squares"] / (swing["last_end"] - swing["first_end"])))
+    memory = fdi["types"]["surface"][s]["oscillatory"]
+    return float(
+        sqrt(
+            2.0
+            * memory["earlier_error_square_sum"]
+            / (memory["last_half_cycle_end_frame"] - memory["first_half_cycle_end_frame"])
+        )
+    )
 
 
-def oscillation_frequency_rad_s(fdi: np.void, s: int, kind: int) -> float | None:
+def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float | None:
     """From the half-cycles counted."""
-    swing = fdi["types"]["surface"][s]["oscillatory"]
-    half_cycles, frames = int(swing["half_cycles"]) - 1, int(swing["last_end"] - swing["first_end"])
-    return half_cycles * pi / (float(fdi["types"]["config"]["block_s"]) * frames)
+    memory = fdi["types"]["surface"][s]["oscillatory"]
+    n_half_cycles, n_frames = (
+        int(memory["n_half_cycles"]) - 1,
+        int(memory["last_half_cycle_end_frame"] - memory["first_half_cycle_end_frame"]),
+    )
+    return n_half_cycles * pi / (float(fdi["types"]["config"]["block_duration_s"]) * n_frames)
 
 
 OSCILLATORY = FaultType(
-    name="oscillatory", constant=False, rank=2,
-    begin=begin_oscillation, on_frame=add_squared_error, judge=judge_oscillation,
-    on_skipped_frame=skip_oscillation, record="oscillatory",
-    memory=record(
-        sign=int, steady_since=int,
-        half_cycles=int, first_end=int, last_end=int,  # ends of half-cycles, frames
-        square=float, squares=float,  # of the deflection error, rad2: this half-cycle, those before
+    name="oscillatory", has_constant_parameter=False, sort_rank=2,
+    reset_memory=reset_oscillation_memory, on_every_frame=add_squared_deflection_error,
+    consistent_interval=consistent_oscillation_interval,
+    on_skipped_frame=skip_oscillation_frame, record_name="oscillatory",
+    memory_dtype=record(
+        error_sign=int, sign_since_frame=int,
+        n_half_cycles=int, first_half_cycle_end_frame=int, last_half_cycle_end_frame=int,
+        # ends of half-cycles, frames
+        # of the deflection error, rad2: this half-cycle, those before
+        half_cycle_error_square_sum=float, earlier_error_square_sum=float,
     ),
-    has_shown=oscillation_has_shown, shows_within=2, at_rest=REST_EXCLUDES, mistaken_for=("rate_limit",),
-    accommodation=SUBTRACT_OFFSET, estimate=amplitude, frequency_rad_s=oscillation_frequency_rad_s,
+    has_shown=oscillation_has_shown, shows_within_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
+    can_look_like=("rate_limit",),
+    accommodation_mode=SUBTRACT_OFFSET, excluding_comparison="swing", estimate=oscillation_amplitude_rad,
+    frequency_rad_s=oscillation_frequency_rad_s,
 )  # fmt: skip
 
 
 @kernel
-def begin_rate_limit(surface, kind):
+def reset_rate_limit_memory(surface, type_index):
     """No frame has been seen, and none before it."""
-    surface.rate_limit.at = -2
+    surface.rate_limit.last_known_frame = -2
 
 
 @kernel
-def judge_rate_limit(config, surface, kind, k):
+def consistent_rate_limit_interval(config, surface, type_index, k):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    low, high, run = surface.judged.low, surface.judged.high, surface.rate_limit
-    sign, retreats = side_of_command(config, surface), False
-    if sign == 0 or sign != run.sign or k != run.at + 1:
-        run.low, run.high = low, high
+    low, high, memory = (
+        surface.judged_observation.position_low,
+        surface.judged_observation.position_high,
+        surface.rate_limit,
+    )
+    side, moves_away = side_of_all_commands(config, surface), False
+    if side == 0 or side != memory.side_of_command or k != memory.last_known_frame + 1:
+        memory.position_low, memory.position_high = low, high
     else:
-        retreats = (sign > 0 and low > run.high) or (sign < 0 and high < run.low)
-        narrow_by_least_rate(config, surface, run, sign)
-    run.low, run.high = max(run.low, low), min(run.high, high)
-    run.sign, run.at = sign, k
-    return EMPTY_SET if retreats else UNLIMITED_SET
+        moves_away = (side > 0 and low > memory.position_high) or (side < 0 and high < memory.position_low)
+        narrow_position_by_min_rate(config, surface, memory, side)
+    memory.position_low, memory.position_high = max(memory.position_low, low), min(memory.position_high, high)
+    memory.side_of_command, memory.last_known_frame = side, k
+    return EMPTY_SET if moves_away else UNLIMITED_SET
 
 
 @kernel
-def narrow_by_least_rate(config, surface, run, sign):
+def narrow_position_by_min_rate(config, surface, memory, side):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    least = config.instants * config.length * surface.actuator.slowest_step
-    close = surface.actuator.slowest_step / surface.actuator.approach
-    lowest, highest = command_range(config, surface)
-    if sign > 0:
-        run.high = min(run.high, max(run.high - least, highest + close))
-    elif sign < 0:
-        run.low = max(run.low, min(run.low + least, lowest - close))
+    min_motion = config.n_substeps * config.frames_per_block * surface.actuator.min_motion_per_substep
+    lag_distance = surface.actuator.min_motion_per_substep / surface.actuator.lag_share_per_substep
+    min_command, max_command = command_range(config, surface)
+    if side > 0:
+        memory.position_high = min(
+            memory.position_high, max(memory.position_high - min_motion, max_command + lag_distance)
+        )
+    elif side < 0:
+        memory.position_low = max(
+            memory.position_low, min(memory.position_low + min_motion, min_command - lag_distance)
+        )
 
 
 @kernel
 def command_range(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     commands = surface.commands
-    newest = 2 if config.whole else 1
-    return min(commands.low[2], commands.low[newest]), max(commands.high[2], commands.high[newest])
+    newest_age = 2 if config.is_single_instant else 1
+    return min(commands.min_command[2], commands.min_command[newest_age]), max(
+        commands.max_command[2], commands.max_command[newest_age]
+    )
 
 
 @kernel
-def side_of_command(config, surface):
+def side_of_all_commands(config, surface):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
-    lowest, highest = command_range(config, surface)
-    return 1 if surface.judged.low > highest else (-1 if surface.judged.high < lowest else 0)
+    min_command, max_command = command_range(config, surface)
+    return (
+        1
+        if surface.judged_observation.position_low > max_command
+        else (-1 if surface.judged_observation.position_high < min_command else 0)
+    )
 
 
 RATE_LIMIT = FaultType(
-    name="rate_limit", constant=False, rank=3,
-    begin=begin_rate_limit, judge=judge_rate_limit, record="rate_limit",
-    memory=record(
-        low=float, high=float,  # where it can be while it stands on one side of its command, rad
-        sign=int, at=int,  # which side, and the last frame of which that is known
+    name="rate_limit", has_constant_parameter=False, sort_rank=3,
+    reset_memory=reset_rate_limit_memory, consistent_interval=consistent_rate_limit_interval,
+    record_name="rate_limit",
+    memory_dtype=record(
+        # where it can be while it stands on one side of its command, rad
+        position_low=float, position_high=float,
+        side_of_command=int, last_known_frame=int,  # which side, and the last frame of which that is known
     ),
     # a slow surface that has not been seen to creep looks as if it stood still
-    at_rest=REST_HIDES, mistaken_for=("stuck", "float", "hardover"), accommodation=WAIT_FOR_SURFACE,
+    evidence_at_rest=REST_HIDES_TYPE, can_look_like=("stuck", "float", "hardover"),
+    accommodation_mode=WAIT_FOR_SURFACE,
+    excluding_comparison="approach",
 )  # fmt: skip
 TYPES = LOSS, VARYING_LOSS, BIAS, GROWING_BIAS, OSCILLATORY, RATE_LIMIT

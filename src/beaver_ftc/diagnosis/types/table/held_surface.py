@@ -27,196 +27,274 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import nearer
-from beaver_ftc.diagnosis.types.contract import (
+from beaver_ftc.diagnosis.types import (
     EMPTY_SET,
     GIVE_UP,
-    REST_AGREES,
+    REST_POSITION_IS_PARAMETER,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
     UNLIMITED_SET,
+    DeflectionRelation,
     FaultType,
     feasible_set,
-    set_middle,
-    set_middle_of,
-    within_travel,
+    feasible_set_midpoint,
+    limit_to_travel,
+    parameter_estimate,
 )
 
 EARLIER_RELEASE, LATER_RELEASE = 0, 1
-HELD, RETURNING, REFUTED = range(3)
+STATUS_HELD, STATUS_RETURNING, STATUS_REFUTED = range(3)
 # A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.
-RETURNED_WITHIN_RAD = 1e-14
+RETURN_TOLERANCE_RAD = 1e-14
 
 
 @kernel
-def clear_releases(surface, which, kind):
+def clear_releases(surface, release_slot, type_index):
     """No release of this type is possible: the empty interval."""
-    surface.release.low[which, kind], surface.release.high[which, kind] = np.inf, -np.inf
+    (
+        surface.release.return_low[release_slot, type_index],
+        surface.release.return_high[release_slot, type_index],
+    ) = np.inf, -np.inf
 
 
 @kernel
-def has_release(surface, which, kind):
+def has_release(surface, release_slot, type_index):
     """Whether a release of this type is possible."""
-    return surface.release.low[which, kind] <= surface.release.high[which, kind]
+    return (
+        surface.release.return_low[release_slot, type_index]
+        <= surface.release.return_high[release_slot, type_index]
+    )
 
 
 @kernel
-def start_releases(surface, kind):
+def reset_releases(surface, type_index):
     """Allow a release before the alarm, from anywhere in the travel."""
-    clear_releases(surface, EARLIER_RELEASE, kind)
-    surface.release.low[LATER_RELEASE, kind] = surface.actuator.travel_low
-    surface.release.high[LATER_RELEASE, kind] = surface.actuator.travel_high
-    clear_held_range(surface, kind)
+    clear_releases(surface, EARLIER_RELEASE, type_index)
+    surface.release.return_low[LATER_RELEASE, type_index] = surface.actuator.travel_low
+    surface.release.return_high[LATER_RELEASE, type_index] = surface.actuator.travel_high
+    clear_held_interval(surface, type_index)
 
 
 @kernel
-def clear_held_range(surface, kind):
+def clear_held_interval(surface, type_index):
     """This type does not hold the surface in the judged frame: the empty interval."""
-    surface.release.held_low[kind], surface.release.held_high[kind] = np.inf, -np.inf
+    surface.release.held_position_min[type_index], surface.release.held_position_max[type_index] = (
+        np.inf,
+        -np.inf,
+    )
 
 
 @kernel
-def mean_return_position(config, surface, held, side=0):
-    """Mean position over the judged frame of a surface released at `held` (rad), its position at the end of
-    the frame, and the possible error of the mean where the effectiveness changes meanwhile.
+def mean_return_position(config, surface, start_position, release_side=0):
+    """Mean position over the judged frame of a surface released at `start_position` (rad), its position at
+    the end of the frame, and the possible error of the mean where the effectiveness changes meanwhile.
 
-    The release is at the beginning of the frame; with a side, at any instant of it: the least mean if
-    side < 0, else the greatest.
+    The release is at the beginning of the frame; with a release_side, at any instant of it: the least mean if
+    release_side < 0, else the greatest.
     """
-    total, count, a, least, greatest = 0.0, 0, held, held, held
-    for k in range(config.length):
-        order = surface.commands.given[1, k]
-        for _ in range(config.instants):
-            total += a
-            count += 1
-            least, greatest = min(least, a), max(greatest, a)
-            a = nearer(a, order, surface.actuator.approach, surface.actuator.step)
-            if side != 0:
-                a = min(a, held) if side < 0 else max(a, held)
-    return total / count, a, surface.judged.effectiveness_variation * (greatest - least)
+    position_sum, n_positions, position, min_position, max_position = (
+        0.0,
+        0,
+        start_position,
+        start_position,
+        start_position,
+    )
+    for k in range(config.frames_per_block):
+        command = surface.commands.command_history[1, k]
+        for _ in range(config.n_substeps):
+            position_sum += position
+            n_positions += 1
+            min_position, max_position = min(min_position, position), max(max_position, position)
+            position = nearer(
+                position,
+                command,
+                surface.actuator.lag_share_per_substep,
+                surface.actuator.max_motion_per_substep,
+            )
+            if release_side != 0:
+                position = (
+                    min(position, start_position) if release_side < 0 else max(position, start_position)
+                )
+    return (
+        position_sum / n_positions,
+        position,
+        surface.judged_observation.effectiveness_variation * (max_position - min_position),
+    )
 
 
 @kernel
-def block_release_explains(config, surface, kind):
+def block_release_explains(config, surface, type_index):
     """Whether a release at an instant of the judged block explains the block."""
-    held_low, held_high = surface.release.held_low[kind], surface.release.held_high[kind]
-    if config.length == 1 or held_low > held_high:
+    held_position_min, held_position_max = (
+        surface.release.held_position_min[type_index],
+        surface.release.held_position_max[type_index],
+    )
+    if config.frames_per_block == 1 or held_position_min > held_position_max:
         return False
-    low, _, low_room = mean_return_position(config, surface, held_low, -1)
-    high, _, high_room = mean_return_position(config, surface, held_high, 1)
-    return low - low_room <= surface.judged.high and high + high_room >= surface.judged.low
+    low, _, low_tolerance = mean_return_position(config, surface, held_position_min, -1)
+    high, _, high_tolerance = mean_return_position(config, surface, held_position_max, 1)
+    return (
+        low - low_tolerance <= surface.judged_observation.position_high
+        and high + high_tolerance >= surface.judged_observation.position_low
+    )
 
 
 @kernel
-def return_explains(config, surface, kind):
+def return_explains(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
-    left = block_release_explains(config, surface, kind)
-    if not left:
-        clear_held_range(surface, kind)
-    for which in (EARLIER_RELEASE, LATER_RELEASE):
-        if has_release(surface, which, kind):
-            if narrow_return(config, surface, which, kind):
-                left = True
+    is_explained = block_release_explains(config, surface, type_index)
+    if not is_explained:
+        clear_held_interval(surface, type_index)
+    for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
+        if has_release(surface, release_slot, type_index):
+            if narrow_return_interval(config, surface, release_slot, type_index):
+                is_explained = True
             else:
-                clear_releases(surface, which, kind)
-    return left
+                clear_releases(surface, release_slot, type_index)
+    return is_explained
 
 
 @kernel
-def narrow_return(config, surface, which, kind):
+def narrow_return_interval(config, surface, release_slot, type_index):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
     The mean over the frame rises with where the return began, and by no more than that.
     """
-    held = surface.release
-    low, _, low_room = mean_return_position(config, surface, held.low[which, kind])
-    high, _, high_room = mean_return_position(config, surface, held.high[which, kind])
-    room, command = max(low_room, high_room), surface.judged.command
-    if max(abs(low - room - command), abs(high + room - command)) <= RETURNED_WITHIN_RAD:
+    release = surface.release
+    mean_from_low, _, low_tolerance = mean_return_position(
+        config, surface, release.return_low[release_slot, type_index]
+    )
+    mean_from_high, _, high_tolerance = mean_return_position(
+        config, surface, release.return_high[release_slot, type_index]
+    )
+    tolerance, healthy_position = (
+        max(low_tolerance, high_tolerance),
+        surface.judged_observation.healthy_position,
+    )
+    if (
+        max(
+            abs(mean_from_low - tolerance - healthy_position),
+            abs(mean_from_high + tolerance - healthy_position),
+        )
+        <= RETURN_TOLERANCE_RAD
+    ):
         return False
-    if low - room > surface.judged.high or high + room < surface.judged.low:
+    if (
+        mean_from_low - tolerance > surface.judged_observation.position_high
+        or mean_from_high + tolerance < surface.judged_observation.position_low
+    ):
         return False
-    least = held.low[which, kind] + max(surface.judged.low - low - room, 0.0)
-    greatest = held.high[which, kind] - max(high - room - surface.judged.high, 0.0)
-    set_release_interval(held, which, kind, least, greatest)
+    narrowed_low = release.return_low[release_slot, type_index] + max(
+        surface.judged_observation.position_low - mean_from_low - tolerance, 0.0
+    )
+    narrowed_high = release.return_high[release_slot, type_index] - max(
+        mean_from_high - tolerance - surface.judged_observation.position_high, 0.0
+    )
+    set_release_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
     return True
 
 
 @kernel
-def promote_later_releases(surface, kind):
+def promote_later_releases(surface, type_index):
     """Take the later releases for the earlier ones, when no earlier one is possible any more."""
-    held = surface.release
-    held.low[EARLIER_RELEASE, kind], held.high[EARLIER_RELEASE, kind] = (
-        held.low[LATER_RELEASE, kind],
-        held.high[LATER_RELEASE, kind],
+    release = surface.release
+    release.return_low[EARLIER_RELEASE, type_index], release.return_high[EARLIER_RELEASE, type_index] = (
+        release.return_low[LATER_RELEASE, type_index],
+        release.return_high[LATER_RELEASE, type_index],
     )
-    clear_releases(surface, LATER_RELEASE, kind)
+    clear_releases(surface, LATER_RELEASE, type_index)
 
 
 @kernel
-def set_release_interval(held, which, kind, low, high):
+def set_release_interval(release, release_slot, type_index, low, high):
     """Replace the interval of a return by [low, high]; rounding may have swapped ends that meet."""
-    held.low[which, kind], held.high[which, kind] = min(low, high), max(low, high)
+    release.return_low[release_slot, type_index], release.return_high[release_slot, type_index] = (
+        min(low, high),
+        max(low, high),
+    )
 
 
 @kernel
-def hold_status(config, surface, kind, least, greatest):
-    """Whether a type holds the surface between least and greatest (rad) in the judged frame: HELD; or has
-    released it, and the actuator may be bringing it back: RETURNING; or neither explains it: REFUTED."""
-    returning = config.released_returns and return_explains(config, surface, kind)
-    released = surface.release.released
-    if least <= surface.judged.high and greatest >= surface.judged.low and not released[kind]:
-        return HELD
-    if not returning:
-        return REFUTED
-    released[kind] = 1
-    return RETURNING
+def hold_status_in_frame(config, surface, type_index, held_position_min, held_position_max):
+    """Whether a type holds the surface between these positions (rad) in the judged frame: STATUS_HELD; or has
+    released it, and the actuator may be bringing it back: STATUS_RETURNING; or neither explains it:
+    STATUS_REFUTED."""
+    is_return_possible = config.returns_via_actuator and return_explains(config, surface, type_index)
+    has_released = surface.release.has_released
+    if (
+        held_position_min <= surface.judged_observation.position_high
+        and held_position_max >= surface.judged_observation.position_low
+        and not has_released[type_index]
+    ):
+        return STATUS_HELD
+    if not is_return_possible:
+        return STATUS_REFUTED
+    has_released[type_index] = 1
+    return STATUS_RETURNING
 
 
 @kernel
-def hold_or_return_explains(config, surface, kind, least, greatest):
+def held_or_returning_set(config, surface, type_index, held_position_min, held_position_max):
     """The parameters that explain the judged frame: all if the surface is held there or returns from there,
     none otherwise."""
-    return EMPTY_SET if hold_status(config, surface, kind, least, greatest) == REFUTED else UNLIMITED_SET
+    return (
+        EMPTY_SET
+        if hold_status_in_frame(config, surface, type_index, held_position_min, held_position_max)
+        == STATUS_REFUTED
+        else UNLIMITED_SET
+    )
 
 
 @kernel
 def position_at_frame_start(config, surface, k):
-    """Where the surface can have been as the judged frame began, (low, high) rad, and which frame shows it.
+    """Return the possible position at the start of the judged frame, (low, high) rad, and the frame that
+    shows it.
 
     With several JSBSim frames in one of ours the release may have been within it: the frame before is used.
     """
-    if config.whole:
-        return surface.judged.low, surface.judged.high, k
-    return surface.earlier.low, surface.earlier.high, k - 1
+    if config.is_single_instant:
+        return surface.judged_observation.position_low, surface.judged_observation.position_high, k
+    return surface.earlier_observation.position_low, surface.earlier_observation.position_high, k - 1
 
 
 @kernel
-def add_release(surface, kind, low, high):
+def add_release(surface, type_index, low, high):
     """Add a release from between low and high (rad), where a type may hold the surface, if low <= high."""
-    held = surface.release
-    clear_held_range(surface, kind)
-    if low <= high and not held.released[kind]:
-        held.held_low[kind], held.held_high[kind] = low, high
-        held.low[LATER_RELEASE, kind] = min(held.low[LATER_RELEASE, kind], low)
-        held.high[LATER_RELEASE, kind] = max(held.high[LATER_RELEASE, kind], high)
+    release = surface.release
+    clear_held_interval(surface, type_index)
+    if low <= high and not release.has_released[type_index]:
+        release.held_position_min[type_index], release.held_position_max[type_index] = low, high
+        release.return_low[LATER_RELEASE, type_index] = min(
+            release.return_low[LATER_RELEASE, type_index], low
+        )
+        release.return_high[LATER_RELEASE, type_index] = max(
+            release.return_high[LATER_RELEASE, type_index], high
+        )
 
 
 @kernel
-def propagate_returns(config, surface, kind):
+def propagate_returns(config, surface, type_index):
     """Carry the intervals of returns to the next frame; a surface that looks healthy may be held again."""
-    held = surface.release
-    if not surface.judged.anomalous:
-        held.released[kind] = 0
-    for which in (EARLIER_RELEASE, LATER_RELEASE):
-        if has_release(surface, which, kind):
-            _, low, _ = mean_return_position(config, surface, held.low[which, kind])
-            _, high, _ = mean_return_position(config, surface, held.high[which, kind])
-            set_release_interval(held, which, kind, low, high)
-    if config.length > 1 and held.held_low[kind] <= held.held_high[kind]:
-        _, low, _ = mean_return_position(config, surface, held.held_low[kind], -1)
-        _, high, _ = mean_return_position(config, surface, held.held_high[kind], 1)
-        held.low[LATER_RELEASE, kind] = min(held.low[LATER_RELEASE, kind], low)
-        held.high[LATER_RELEASE, kind] = max(held.high[LATER_RELEASE, kind], high)
+    release = surface.release
+    if not surface.judged_observation.is_anomalous:
+        release.has_released[type_index] = 0
+    for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
+        if has_release(surface, release_slot, type_index):
+            _, low, _ = mean_return_position(config, surface, release.return_low[release_slot, type_index])
+            _, high, _ = mean_return_position(config, surface, release.return_high[release_slot, type_index])
+            set_release_interval(release, release_slot, type_index, low, high)
+    if (
+        config.frames_per_block > 1
+        and release.held_position_min[type_index] <= release.held_position_max[type_index]
+    ):
+        _, low, _ = mean_return_position(config, surface, release.held_position_min[type_index], -1)
+        _, high, _ = mean_return_position(config, surface, release.held_position_max[type_index], 1)
+        release.return_low[LATER_RELEASE, type_index] = min(
+            release.return_low[LATER_RELEASE, type_index], low
+        )
+        release.return_high[LATER_RELEASE, type_index] = max(
+            release.return_high[LATER_RELEASE, type_index], high
+        )
 
 
 @kernel
@@ -226,213 +304,267 @@ def travel_range(surface):
 
 
 @kernel
-def begin_stuck(surface, kind):
+def reset_stuck_memory(surface, type_index):
     """It may be anywhere in its travel."""
-    surface.stuck.kept_low[:], surface.stuck.kept_high[:] = travel_range(surface)
-    start_releases(surface, kind)
+    surface.stuck.feasible_low_before_release[:], surface.stuck.feasible_high_before_release[:] = (
+        travel_range(surface)
+    )
+    reset_releases(surface, type_index)
 
 
 @kernel
-def judge_stuck(config, surface, kind, k):
+def consistent_stuck_interval(config, surface, type_index, k):
     """It stays where it is."""
-    status = hold_status(config, surface, kind, surface.feasible.low[kind], surface.feasible.high[kind])
-    if status == HELD:
-        return surface.judged.low, surface.judged.high
-    return EMPTY_SET if status == REFUTED else UNLIMITED_SET
+    status = hold_status_in_frame(
+        config,
+        surface,
+        type_index,
+        surface.feasible_sets.low[type_index],
+        surface.feasible_sets.high[type_index],
+    )
+    if status == STATUS_HELD:
+        return surface.judged_observation.position_low, surface.judged_observation.position_high
+    return EMPTY_SET if status == STATUS_REFUTED else UNLIMITED_SET
 
 
 @kernel
-def on_release_stuck(config, surface, kind, k):
+def add_stuck_release(config, surface, type_index, k):
     """It may be released where it is jammed."""
-    promote_kept_sets(surface, kind)
+    promote_sets_before_release(surface, type_index)
     low, high, _ = position_at_frame_start(config, surface, k)
-    add_release(surface, kind, max(low, surface.feasible.low[kind]), min(high, surface.feasible.high[kind]))
+    add_release(
+        surface,
+        type_index,
+        max(low, surface.feasible_sets.low[type_index]),
+        min(high, surface.feasible_sets.high[type_index]),
+    )
 
 
 @kernel
-def promote_kept_sets(surface, kind):
+def promote_sets_before_release(surface, type_index):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
-    jam = surface.stuck
-    if not has_release(surface, EARLIER_RELEASE, kind):
-        jam.kept_low[EARLIER_RELEASE], jam.kept_high[EARLIER_RELEASE] = (
-            jam.kept_low[LATER_RELEASE],
-            jam.kept_high[LATER_RELEASE],
+    memory = surface.stuck
+    if not has_release(surface, EARLIER_RELEASE, type_index):
+        (
+            memory.feasible_low_before_release[EARLIER_RELEASE],
+            memory.feasible_high_before_release[EARLIER_RELEASE],
+        ) = (
+            memory.feasible_low_before_release[LATER_RELEASE],
+            memory.feasible_high_before_release[LATER_RELEASE],
         )
-        jam.kept_low[LATER_RELEASE], jam.kept_high[LATER_RELEASE] = (
-            surface.feasible.low[kind],
-            surface.feasible.high[kind],
+        (
+            memory.feasible_low_before_release[LATER_RELEASE],
+            memory.feasible_high_before_release[LATER_RELEASE],
+        ) = (
+            surface.feasible_sets.low[type_index],
+            surface.feasible_sets.high[type_index],
         )
-        promote_later_releases(surface, kind)
+        promote_later_releases(surface, type_index)
 
 
 @kernel
-def restored_set(surface, kind):
-    """Where the surface looks healthy the jam may take hold again: its set as it was before the earliest
-    release still possible."""
-    if not surface.judged.anomalous:
-        for which in (EARLIER_RELEASE, LATER_RELEASE):
-            if has_release(surface, which, kind):
-                return surface.stuck.kept_low[which], surface.stuck.kept_high[which]
-    return surface.feasible.low[kind], surface.feasible.high[kind]
+def stuck_set_after_frame(surface, type_index):
+    """Return the set of a jam that may begin again where the surface looks healthy: its set as it was before
+    the earliest release still possible."""
+    if not surface.judged_observation.is_anomalous:
+        for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
+            if has_release(surface, release_slot, type_index):
+                return surface.stuck.feasible_low_before_release[
+                    release_slot
+                ], surface.stuck.feasible_high_before_release[release_slot]
+    return surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
 
 
 @kernel
-def stuck_deflection(config, surface, kind, k):
-    """Where it is jammed."""
-    return surface.feasible.low[kind], surface.feasible.high[kind]
+def stuck_deflection(config, surface, type_index, k):
+    """Return the interval of the jammed position, rad."""
+    return surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
 
 
 @kernel
-def judge_float(config, surface, kind, k):
+def consistent_float_interval(config, surface, type_index, k):
     """It is at neutral, or at the stop that is nearest to it."""
-    neutral = within_travel(surface, 0.0)
-    return hold_or_return_explains(config, surface, kind, neutral, neutral)
+    neutral = limit_to_travel(surface, 0.0)
+    return held_or_returning_set(config, surface, type_index, neutral, neutral)
 
 
 @kernel
-def on_release_float(config, surface, kind, k):
+def add_float_release(config, surface, type_index, k):
     """It may be released at neutral."""
     low, high, _ = position_at_frame_start(config, surface, k)
-    neutral = within_travel(surface, 0.0)
-    add_release(surface, kind, max(low, neutral), min(high, neutral))
+    neutral = limit_to_travel(surface, 0.0)
+    add_release(surface, type_index, max(low, neutral), min(high, neutral))
 
 
 @kernel
-def float_deflection(config, surface, kind, k):
+def float_deflection(config, surface, type_index, k):
     """At neutral."""
-    neutral = within_travel(surface, 0.0)
+    neutral = limit_to_travel(surface, 0.0)
     return neutral, neutral
 
 
-def neutral_deflection(fdi: np.void, s: int, kind: int) -> float | None:
+def neutral_position_rad(travel_low: float, travel_high: float) -> float:
+    """Neutral, or the stop that is nearest to it, rad."""
+    return min(max(0.0, travel_low), travel_high)
+
+
+def neutral_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Deflection, rad."""
     surface = fdi["types"]["surface"][s]
-    return float(min(max(0.0, surface["actuator"]["travel_low"]), surface["actuator"]["travel_high"]))
+    return float(neutral_position_rad(surface["actuator"]["travel_low"], surface["actuator"]["travel_high"]))
 
 
 @kernel
-def stuck_error(surface, kind):
+def stuck_deflection_error(surface, type_index):
     """Off its command, rad, by the middle of where it can be jammed."""
-    return set_middle(surface, kind) - surface.elapsed.command
+    return feasible_set_midpoint(surface, type_index) - surface.last_observation.healthy_position
 
 
 @kernel
-def float_error(surface, kind):
+def float_deflection_error(surface, type_index):
     """Off its command, rad: at neutral."""
-    return within_travel(surface, 0.0) - surface.elapsed.command
+    return limit_to_travel(surface, 0.0) - surface.last_observation.healthy_position
 
 
 STUCK = FaultType(
-    name="stuck", constant=True, rank=2,
-    whole_range=travel_range, begin=begin_stuck, judge=judge_stuck, restored=restored_set,
-    record="stuck", memory=record(kept_low=2, kept_high=2),  # rad; EARLIER and LATER
-    on_release=on_release_stuck, propagate_release=propagate_returns, deflection=stuck_deflection,
-    at_rest=REST_AGREES,
-    accommodation=GIVE_UP, expected_error=stuck_error, error_rank=3, estimate=set_middle_of,
-    interval=feasible_set,
+    name="stuck", has_constant_parameter=True, sort_rank=2,
+    parameter_range=travel_range, reset_memory=reset_stuck_memory,
+    consistent_interval=consistent_stuck_interval, feasible_set_after_frame=stuck_set_after_frame,
+    # rad; EARLIER and LATER
+    record_name="stuck", memory_dtype=record(feasible_low_before_release=2, feasible_high_before_release=2),
+    on_possible_release=add_stuck_release, propagate_release=propagate_returns,
+    possible_deflection=stuck_deflection,
+    evidence_at_rest=REST_POSITION_IS_PARAMETER,
+    accommodation_mode=GIVE_UP, deflection_error=stuck_deflection_error, deflection_error_rank=3,
+    deflection_relation=DeflectionRelation(
+        0.0, theta_is_share=False, theta_range=lambda low, high: (low, high)
+    ),
+    estimate=parameter_estimate, estimate_interval=feasible_set,
 )  # fmt: skip
 FLOAT = FaultType(
-    name="float", constant=True, rank=3,
-    begin=start_releases, judge=judge_float, on_release=on_release_float, propagate_release=propagate_returns,
-    deflection=float_deflection,
-    accommodation=SUBTRACT_OFFSET, also=(GIVE_UP, SCALE_COMMAND), expected_error=float_error, error_rank=1,
-    estimate=neutral_deflection,
+    name="float", has_constant_parameter=True, sort_rank=3,
+    reset_memory=reset_releases, consistent_interval=consistent_float_interval,
+    on_possible_release=add_float_release, propagate_release=propagate_returns,
+    possible_deflection=float_deflection,
+    accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
+    deflection_error=float_deflection_error,
+    deflection_error_rank=1,
+    deflection_relation=DeflectionRelation(
+        0.0, theta_is_share=False, theta_range=lambda low, high: (neutral_position_rad(low, high),) * 2
+    ),
+    estimate=neutral_deflection_rad,
 )  # fmt: skip
 
 
 @kernel
-def runaway_travel(config, surface, k):
+def min_runaway_travel(config, surface, k):
     """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
-    elapsed = k - surface.evidence.started_at
-    if config.length > 1:
-        elapsed = max(elapsed - 1, 0)
-    return surface.actuator.least_runaway_rate * config.block_s * elapsed
+    elapsed_frames = k - surface.evidence.first_anomalous_frame
+    if config.frames_per_block > 1:
+        elapsed_frames = max(elapsed_frames - 1, 0)
+    return surface.actuator.min_runaway_rate * config.block_duration_s * elapsed_frames
 
 
 @kernel
-def least_upward_deflection(config, surface, k):
-    """How far up a runaway has come by a frame, at least: rad, the stop at most."""
-    if surface.evidence.started_at < 0:
+def min_runaway_up_deflection(config, surface, k):
+    """Return the least upward deflection of a runaway by a frame, rad; the stop at most."""
+    if surface.evidence.first_anomalous_frame < 0:
         return surface.actuator.travel_low
-    return min(surface.actuator.travel_high, surface.evidence.start_low + runaway_travel(config, surface, k))
+    return min(
+        surface.actuator.travel_high,
+        surface.evidence.first_position_low + min_runaway_travel(config, surface, k),
+    )
 
 
 @kernel
-def least_downward_deflection(config, surface, k):
-    """How far down one has come: rad, the stop at most."""
-    if surface.evidence.started_at < 0:
+def max_runaway_down_deflection(config, surface, k):
+    """Return the least downward deflection of a runaway by a frame, rad; the stop at most."""
+    if surface.evidence.first_anomalous_frame < 0:
         return surface.actuator.travel_high
-    return max(surface.actuator.travel_low, surface.evidence.start_high - runaway_travel(config, surface, k))
+    return max(
+        surface.actuator.travel_low,
+        surface.evidence.first_position_high - min_runaway_travel(config, surface, k),
+    )
 
 
 @kernel
-def judge_hardover_up(config, surface, kind, k):
+def consistent_hardover_up_interval(config, surface, type_index, k):
     """It is beyond where its least rate takes it, or at the stop."""
-    return hold_or_return_explains(
-        config, surface, kind, least_upward_deflection(config, surface, k), surface.actuator.travel_high
+    return held_or_returning_set(
+        config,
+        surface,
+        type_index,
+        min_runaway_up_deflection(config, surface, k),
+        surface.actuator.travel_high,
     )
 
 
 @kernel
-def judge_hardover_down(config, surface, kind, k):
+def consistent_hardover_down_interval(config, surface, type_index, k):
     """The same downwards."""
-    return hold_or_return_explains(
-        config, surface, kind, surface.actuator.travel_low, least_downward_deflection(config, surface, k)
+    return held_or_returning_set(
+        config,
+        surface,
+        type_index,
+        surface.actuator.travel_low,
+        max_runaway_down_deflection(config, surface, k),
     )
 
 
 @kernel
-def on_release_hardover_up(config, surface, kind, k):
+def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    low, high, shown = position_at_frame_start(config, surface, k)
-    low = max(low, least_upward_deflection(config, surface, shown))
-    if not config.whole and low <= high:
+    low, high, shown_frame = position_at_frame_start(config, surface, k)
+    low = max(low, min_runaway_up_deflection(config, surface, shown_frame))
+    if not config.is_single_instant and low <= high:
         high = surface.actuator.travel_high
-    add_release(surface, kind, low, high)
+    add_release(surface, type_index, low, high)
 
 
 @kernel
-def on_release_hardover_down(config, surface, kind, k):
+def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
-    low, high, shown = position_at_frame_start(config, surface, k)
-    high = min(high, least_downward_deflection(config, surface, shown))
-    if not config.whole and low <= high:
+    low, high, shown_frame = position_at_frame_start(config, surface, k)
+    high = min(high, max_runaway_down_deflection(config, surface, shown_frame))
+    if not config.is_single_instant and low <= high:
         low = surface.actuator.travel_low
-    add_release(surface, kind, low, high)
+    add_release(surface, type_index, low, high)
 
 
 @kernel
-def hardover_up_deflection(config, surface, kind, k):
+def hardover_up_deflection(config, surface, type_index, k):
     """Between its least way and the stop."""
-    return least_upward_deflection(config, surface, k), surface.actuator.travel_high
+    return min_runaway_up_deflection(config, surface, k), surface.actuator.travel_high
 
 
 @kernel
-def hardover_down_deflection(config, surface, kind, k):
+def hardover_down_deflection(config, surface, type_index, k):
     """The same downwards."""
-    return surface.actuator.travel_low, least_downward_deflection(config, surface, k)
+    return surface.actuator.travel_low, max_runaway_down_deflection(config, surface, k)
 
 
-def upper_stop_rad(fdi: np.void, s: int, kind: int) -> float | None:
+def upper_stop_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Deflection, rad."""
     return float(fdi["types"]["surface"][s]["actuator"]["travel_high"])
 
 
-def lower_stop_rad(fdi: np.void, s: int, kind: int) -> float | None:
+def lower_stop_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Deflection, rad."""
     return float(fdi["types"]["surface"][s]["actuator"]["travel_low"])
 
 
 HARDOVER_UP = FaultType(
-    name="hardover", words="hardover up", constant=True, rank=4,
-    begin=start_releases, judge=judge_hardover_up, on_release=on_release_hardover_up,
-    propagate_release=propagate_returns, deflection=hardover_up_deflection, direction=1,
-    accommodation=GIVE_UP, estimate=upper_stop_rad,
+    name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
+    reset_memory=reset_releases, consistent_interval=consistent_hardover_up_interval,
+    on_possible_release=add_hardover_up_release,
+    propagate_release=propagate_returns, possible_deflection=hardover_up_deflection, stop_direction=1,
+    accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=upper_stop_deflection_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
-    name="hardover", words="hardover down", constant=True, rank=5,
-    begin=start_releases, judge=judge_hardover_down, on_release=on_release_hardover_down,
-    propagate_release=propagate_returns, deflection=hardover_down_deflection, direction=-1,
-    accommodation=GIVE_UP, estimate=lower_stop_rad,
+    name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
+    reset_memory=reset_releases, consistent_interval=consistent_hardover_down_interval,
+    on_possible_release=add_hardover_down_release,
+    propagate_release=propagate_returns, possible_deflection=hardover_down_deflection, stop_direction=-1,
+    accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=lower_stop_deflection_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.air import Dryden, rotation_lengths
+from beaver_ftc.design import Dryden, rotation_lengths
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
@@ -18,7 +18,7 @@ from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.schema import load as load_given
 from flying import declared_in, scenario
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 MEMORY_S = 0.05  # over which the whitening filter compares, about
 FT = 0.3048
 
@@ -26,7 +26,7 @@ FT = 0.3048
 def air_of(turbulence="light"):
     """The record as before a flight."""
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    gusts.configure_gusts(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
+    gusts.configure_gust_estimate(record, declared_in(Bounds(turbulence=turbulence), load()), MASS)
     return record
 
 
@@ -45,7 +45,7 @@ class Flown:
         nodes = [loop.plant.node(f"atmosphere/{axis}-turb-rad_sec") for axis in "pqr"]
         heading = loop.plant.node("attitude/psi-rad")
         accelerations = [loop.plant.node(f"accelerations/a-pilot-{axis}-ft_sec2") for axis in "xyz"]
-        record = loop.frames["fdi"]["statistical"]["air"][0]
+        record = loop.frames["fdi"]["statistical"]["gust"][0]
         rows = []
         loop.fly_frames(1, 0)
         for _ in range(loop.n_frames - 1):
@@ -54,7 +54,7 @@ class Flown:
             true = turn.T @ [node.get_double_value() for node in nodes]
             felt = [FT * node.get_double_value() for node in accelerations]
             V = loop.frames["measured"]["y"][0][2]
-            seen, force = record["memory"]["gust"], record["memory"]["force"]
+            seen, force = record["memory"]["air_rotation_in_level_axes"], record["memory"]["specific_force"]
             rows.append([*seen, *true, V, heading.get_double_value(), *force, *felt])
         rows = np.array(rows)
         self.seen, self.true = rows[:, 0:3], rows[:, 3:6]
@@ -89,8 +89,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 ):
     flown = _flown(turbulence, airspeed_mps, seed)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.UNMEASURED_SHARES[1]
-    assert left[2] < gusts.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[2]
     assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
@@ -99,8 +99,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 def test_and_at_other_rates_and_between_jsbsims_frames(keys):
     flown = Flown("light", duration_s=20, seed=3, **keys)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.UNMEASURED_SHARES[1]
-    assert left[2] < gusts.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[2]
 
 
 def test_a_steady_wind_is_not_taken_for_a_gust():
@@ -148,18 +148,21 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
         )
     )
     statistical = loop.frames["fdi"]["statistical"][0]
-    assert statistical["air"]["output"]["uses_accelerometers"] == 1
+    assert statistical["gust"]["output"]["uses_accelerometers"] == 1
     if forces != "felt":
-        gusts.stop_accelerometers(statistical["air"])
+        gusts.stop_accelerometers(statistical["gust"])
     if forces == "claimed":
-        statistical["air"]["output"]["measures_gust"], statistical["air"]["memory"]["unmeasured_share"] = (
+        (
+            statistical["gust"]["output"]["is_gust_measured"],
+            statistical["gust"]["memory"]["unmeasured_intensity_share"],
+        ) = (
             1,
-            gusts.UNMEASURED_SHARES,
+            gusts.MIN_UNMEASURED_INTENSITY_SHARES,
         )
     for _ in loop.chunks():
         pass
-    assert bool(statistical["alarm"]["closest"] > 0.2) is (forces == "claimed")
-    seen = float(np.abs(statistical["air"]["output"]["acceleration"]).max())
+    assert bool(statistical["alarm"]["max_score_over_alarm_level"] > 0.2) is (forces == "claimed")
+    seen = float(np.abs(statistical["gust"]["output"]["gust_acceleration"]).max())
     assert (seen == 0.0) is (forces == "nobody's")
     assert (seen > 0.05) is (forces == "claimed")
 
@@ -180,15 +183,15 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
     axis at every frequency, and where it is slow by no more than itself."""
     fdi = {"statistical": {}, "bounds": {"turbulence": "light"}}
     statistical = Loop(load_given({"aircraft": "./trainer", "fdi": fdi})).frames["fdi"]["statistical"][0]
-    long, record = statistical["block"][2], statistical["air"]
-    lengths = rotation_lengths(float(record["config"]["span"]))
+    long, record = statistical["block"][2], statistical["gust"]
+    lengths = rotation_lengths(float(record["config"]["wing_span"]))
     omega = np.geomspace(1e-4, 1e2, 50)  # rad/m
     for g in range(3):
         true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
         reckoned = (
-            long["drift_scale"]
+            long["drift_intensity_scale"]
             * gusts.low_frequency_power_ratio(record, g)
-            / (1.0 / long["return_length"] ** 2 + omega**2)
+            / (1.0 / long["correlation_length"] ** 2 + omega**2)
         )
         assert (reckoned >= true * (1.0 - 1e-9)).all()
         assert reckoned[0] == pytest.approx(true[0], rel=1e-3)
@@ -207,9 +210,9 @@ def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_t
         assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
     record = flown.record
     assert (
-        np.abs(record["output"]["coarse_acceleration"]).max()
+        np.abs(record["output"]["coarse_gust_acceleration"]).max()
         > 0.0
-        == np.abs(record["output"]["acceleration"]).max()
+        == np.abs(record["output"]["gust_acceleration"]).max()
     )
 
 
@@ -250,5 +253,5 @@ def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
     across = np.abs(np.cos(flown.heading)) < 0.5
     assert across.sum() > 400
     left = flown.intensity((flown.true - flown.seen)[across])
-    assert left[1] < gusts.UNMEASURED_SHARES[1]
-    assert left[2] < gusts.UNMEASURED_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_INTENSITY_SHARES[2]

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection.filters import effect_extremes, parity_effect_extremes
-from beaver_ftc.diagnosis.expectation import add_instant_to_sums, begin_sums, fill_frame_means
+from beaver_ftc.diagnosis.detection.filters import fault_acceleration_range, fault_parity_range
+from beaver_ftc.diagnosis.model_prediction import add_instant_to_sums, begin_frame_sums, fill_frame_means
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
@@ -16,24 +16,26 @@ from beaver_ftc.scenario.schema import Scenario
 @kernel
 def first(frames):
     fdi = frames[0].fdi
-    begin_sums(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type, frames[0].measured)
+    begin_frame_sums(
+        frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frames[0].measured
+    )
 
 
 @kernel
 def another(frames):
     fdi = frames[0].fdi
-    add_instant_to_sums(frames[0].belief, fdi.bound, fdi.layout, fdi.config.every_type)
+    add_instant_to_sums(frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types)
 
 
 @kernel
 def over(frames):
-    fill_frame_means(frames[0].belief, frames[0].fdi.bound)
+    fill_frame_means(frames[0].prediction, frames[0].fdi.bound)
 
 
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return effect_extremes(fie, 0), parity_effect_extremes(fie)
+    return fault_acceleration_range(fie, 0), fault_parity_range(fie)
 
 
 def record(substeps):
@@ -41,14 +43,14 @@ def record(substeps):
 
 
 def fill(frame, rng):
-    belief = frame["belief"]
+    prediction = frame["prediction"]
     for name in ("f", "G", "u"):
-        belief[name] = rng.uniform(-1, 1, belief[name].shape)
+        prediction[name] = rng.uniform(-1, 1, prediction[name].shape)
     frame["fdi"]["bound"]["eta_bar_now"] = rng.uniform(0, 1, 3)
     return (
-        belief["f"].copy(),
-        belief["G"].copy(),
-        belief["u"].copy(),
+        prediction["f"].copy(),
+        prediction["G"].copy(),
+        prediction["u"].copy(),
         frame["fdi"]["bound"]["eta_bar_now"].copy(),
     )
 
@@ -63,7 +65,7 @@ def test_what_is_believed_is_the_mean_over_the_instants(substeps):
         another(frames)
     over(frames)
     believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
-    assert frames[0]["belief"]["means"]["acceleration"] == pytest.approx(believed)
+    assert frames[0]["prediction"]["frame_means"]["acceleration"] == pytest.approx(believed)
     assert frames[0]["fdi"]["bound"]["eta_bar"] == pytest.approx(
         np.mean([bound for *_, bound in seen], axis=0)
     )
@@ -77,12 +79,15 @@ shares = st.floats(-1, 0)
 def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, moment0, moment, theta0, theta):
     """The first instant under the old command and the old fault, the others under the new ones."""
     frames = record(n)
-    belief, fie = frames[0]["belief"], frames[0]["fdi"]["isolation"]["estimator"][0]
-    belief["sums"]["Gu_first"][0, 0], belief["sums"]["Gu"][0, 0] = moment0, moment0 + (n - 1) * moment
+    prediction, fie = frames[0]["prediction"], frames[0]["fdi"]["isolation"]["estimator"][0]
+    prediction["sums"]["first_instant_Gu"][0, 0], prediction["sums"]["Gu"][0, 0] = (
+        moment0,
+        moment0 + (n - 1) * moment,
+    )
     over(frames)
-    fie["effect"]["Z"][0], fie["effect"]["spread"][0] = (
-        belief["means"]["Gu"][0, 0],
-        belief["means"]["Gu_spread"][0, 0],
+    fie["effect"]["regressor"][0], fie["effect"]["error_bound"][0] = (
+        prediction["frame_means"]["Gu"][0, 0],
+        prediction["frame_means"]["Gu_spread"][0, 0],
     )
     fie["parity_direction"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
@@ -95,4 +100,4 @@ def test_one_instant_leaves_no_room():
     fill(frames[0], np.random.default_rng(0))
     first(frames)
     over(frames)
-    assert (frames[0]["belief"]["means"]["Gu_spread"] == 0.0).all()
+    assert (frames[0]["prediction"]["frame_means"]["Gu_spread"] == 0.0).all()

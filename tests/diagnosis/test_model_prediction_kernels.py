@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis import expectation as beliefs
+from beaver_ftc.diagnosis import model_prediction
 from beaver_ftc.diagnosis.bounds import bound_dtype
 from beaver_ftc.scenario.schema import Scenario
 from telling import apart
@@ -13,27 +13,27 @@ from telling import apart
 def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     """A reading that is off changes the moment of a command now, and what is foreseen of it a frame later."""
     rng, n = np.random.default_rng(instants), 4
-    belief = np.zeros(1, beliefs.belief_dtype(n))[0]
+    prediction = np.zeros(1, model_prediction.prediction_dtype(n))[0]
     bound = np.zeros(1, bound_dtype(n))[0]
-    belief["share"] = 1.0 / instants
+    prediction["frame_share_per_instant"] = 1.0 / instants
     G, u = rng.uniform(0.5, 2.0, (5, 3, n)), rng.uniform(-0.3, 0.3, (5, n))
     for k in range(5):
-        belief["sums"]["G"], belief["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
-        beliefs.fill_frame_means(belief, bound)
-        beliefs.predict_control_effect(belief["means"])
-        assert belief["means"]["Gu"] == pytest.approx(G[k] * u[k])
+        prediction["sums"]["G"], prediction["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
+        model_prediction.fill_frame_means(prediction, bound)
+        model_prediction.predict_control_effect(prediction["frame_means"])
+        assert prediction["frame_means"]["Gu"] == pytest.approx(G[k] * u[k])
         if k > 0:
-            assert belief["means"]["G_predicted"] == pytest.approx(G[k - 1])
-            assert belief["means"]["Gu_predicted"] == pytest.approx(G[k - 1] * u[k])
+            assert prediction["frame_means"]["previous_G"] == pytest.approx(G[k - 1])
+            assert prediction["frame_means"]["Gu_with_previous_G"] == pytest.approx(G[k - 1] * u[k])
 
 
 def test_of_the_first_frame_nothing_is_foreseen():
-    belief = np.zeros(1, beliefs.belief_dtype(2))[0]
-    belief["share"] = 1.0
-    belief["sums"]["G"][:, 0] = belief["sums"]["Gu"][:, 0] = 1.0
-    beliefs.fill_frame_means(belief, np.zeros(1, bound_dtype(2))[0])
-    beliefs.predict_control_effect(belief["means"])
-    assert not belief["means"]["Gu_predicted"].any()
+    prediction = np.zeros(1, model_prediction.prediction_dtype(2))[0]
+    prediction["frame_share_per_instant"] = 1.0
+    prediction["sums"]["G"][:, 0] = prediction["sums"]["Gu"][:, 0] = 1.0
+    model_prediction.fill_frame_means(prediction, np.zeros(1, bound_dtype(2))[0])
+    model_prediction.predict_control_effect(prediction["frame_means"])
+    assert not prediction["frame_means"]["Gu_with_previous_G"].any()
 
 
 def test_actuators_are_believed_an_instant_at_a_time():
@@ -46,13 +46,13 @@ def test_actuators_are_believed_an_instant_at_a_time():
     scenario = Scenario.model_validate(given)
     travel = np.array([[-0.5, -0.4, -0.3, -0.1], [0.55, 0.45, 0.35, 1.0]])
     apart(travel=travel)
-    record = np.zeros(1, beliefs.belief_dtype(4))[0]
-    beliefs.configure(record, scenario, travel)
+    record = np.zeros(1, model_prediction.prediction_dtype(4))[0]
+    model_prediction.configure_prediction(record, scenario, travel)
     actuators = record["actuators"]
-    assert (record["share"], bool(actuators["real"])) == (0.25, True)
+    assert (record["frame_share_per_instant"], bool(actuators["real"])) == (0.25, True)
     assert (actuators["low"].tolist(), actuators["high"].tolist()) == tuple(travel.tolist())
     assert actuators["approach"] == pytest.approx([1 - np.exp(-0.1), 1 - np.exp(-0.175), 1.0, 1.0])
     assert actuators["step"] == pytest.approx([np.radians(0.3), np.inf, np.radians(0.2), np.inf])
-    ideal = np.zeros(1, beliefs.belief_dtype(4))[0]
-    beliefs.configure(ideal, Scenario.model_validate({"name": "x"}), travel)
-    assert (ideal["share"], bool(ideal["actuators"]["real"])) == (1.0, False)
+    ideal = np.zeros(1, model_prediction.prediction_dtype(4))[0]
+    model_prediction.configure_prediction(ideal, Scenario.model_validate({"name": "x"}), travel)
+    assert (ideal["frame_share_per_instant"], bool(ideal["actuators"]["real"])) == (1.0, False)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.air import SCALE_FT, Dryden
+from beaver_ftc.design import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.bounds import gust_effect, model_error_deviation, variances_of
+from beaver_ftc.diagnosis.bounds import air_rotation_effect, declared_errors_for_plugin, model_error_std
 from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -51,7 +51,7 @@ def test_errors_of_the_model_add_by_their_squares(design):
         term = AIRCRAFT.moments[k]
         more = 1.0 + 0.3 * np.sign(design["moments"]["value"][0][k])
         apart.append(acceleration(design, Y, U, {term.name: more}) - here)
-    found = model_error_deviation(design, Y, U, air_data, tolerance, deflection)
+    found = model_error_std(design, Y, U, air_data, tolerance, deflection)
     assert found == pytest.approx(np.sqrt(np.square(apart).sum(axis=0)), rel=1e-9)
     assert (found > 1e-3).all()
 
@@ -59,14 +59,16 @@ def test_errors_of_the_model_add_by_their_squares(design):
 def test_an_error_of_an_air_datum_moves_the_model_by_it_alone(design):
     for i in (0, 1, 3):
         air_data = 0.04 * Y[:N_AIR_DATA] * (np.arange(N_AIR_DATA) == i)
-        found = model_error_deviation(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
+        found = model_error_std(design, Y, U, air_data, np.zeros(len(AIRCRAFT.moments)), 0.0)
         off = Y.copy()
         off[i] *= 1.04
         assert found == pytest.approx(np.abs(acceleration(design, off, U) - acceleration(design, Y, U)))
 
 
 def declared(design, **bounds):
-    return variances_of(declared_in(Bounds.model_validate(bounds), AIRCRAFT), Actuators(), design, Y, U)
+    return declared_errors_for_plugin(
+        declared_in(Bounds.model_validate(bounds), AIRCRAFT), Actuators(), design, Y, U
+    )
 
 
 def test_of_an_air_datum_noise_bias_and_rounding_count(design):
@@ -97,7 +99,7 @@ def test_deflections_inertia_and_the_air_are_told_in_si(design):
 
 def test_a_tolerance_is_a_share_of_each_coefficient(design):
     bounds = Bounds.model_validate({"coefficients": 0.1})
-    told = variances_of(declared_in(bounds, AIRCRAFT), Actuators(), design, Y, U)
+    told = declared_errors_for_plugin(declared_in(bounds, AIRCRAFT), Actuators(), design, Y, U)
     assert told.coefficients == pytest.approx([0.1 * abs(term.value) for term in AIRCRAFT.moments])
 
 
@@ -128,4 +130,4 @@ def test_rotating_air_shows_by_a_central_difference():
         def f(self, x, y):
             return A @ x + x**2 + 1e6 * x**3
 
-    assert gust_effect(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)
+    assert air_rotation_effect(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)

@@ -11,13 +11,13 @@ from statistics_of import Statistical, put
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record, fill_table, regressors, response
-from beaver_ftc.diagnosis import bounds, conclusion, expectation, gusts, isolation, schemes
+from beaver_ftc.diagnosis import bounds, conclusion, gusts, isolation, model_prediction, schemes
 from beaver_ftc.diagnosis.bounds import error_map_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE
 from beaver_ftc.diagnosis.gusts import GUST_RECORD
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.state import (
     LOSS,
     NOT_ISOLATED,
@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE_DETECTOR,
     plugin_verdict_dtype,
 )
-from beaver_ftc.diagnosis.types.contract import WAIT_FOR_SURFACE
+from beaver_ftc.diagnosis.types import WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame
 
 AIRCRAFT = load()
@@ -37,7 +37,7 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    fill(record, span=SPAN, gravity=9.8, moving=1, measures_gust=1)
+    fill(record, wing_span=SPAN, gravity=9.8, is_turbulent=1, is_gust_measured=1)
     return fill(record, **fields)
 
 
@@ -57,26 +57,29 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
     y_then[:2], y_now[:2] = rng.uniform(-0.1, 0.2, (2, 2))
     y_now[2] = 47.0
     gusts.start_gust_estimate(record, y_then, then)
-    assert record["memory"]["velocity"] == pytest.approx(through_air(y_then, then))
+    assert record["memory"]["air_relative_velocity"] == pytest.approx(through_air(y_then, then))
     assert record["memory"]["heading"] == then[2]
-    assert not record["memory"]["gust"].any()
-    record["memory"]["gust"], record["memory"]["force"] = (0.0, 0.02, -0.03), rng.normal(size=3)
+    assert not record["memory"]["air_rotation_in_level_axes"].any()
+    record["memory"]["air_rotation_in_level_axes"], record["memory"]["specific_force"] = (
+        (0.0, 0.02, -0.03),
+        rng.normal(size=3),
+    )
     level = Rotation.from_euler("ZYX", [0.0, then[1], then[0]])
     expected = through_air(y_then, then) + dt * (
-        level.apply(record["memory"]["force"]) + np.array([0.0, 0.0, 9.8])
+        level.apply(record["memory"]["specific_force"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    gusts.update_gust(record, y_now, now, dt)
+    gusts.update_gust_rotation(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
     yawing = -0.03 * np.exp(-dt / tau_r) + change[1] / (47.0 * tau_r)
-    assert record["memory"]["gust"] == pytest.approx([0.0, pitching, yawing])
-    assert record["memory"]["velocity"] == pytest.approx(through_air(y_now, now))
+    assert record["memory"]["air_rotation_in_level_axes"] == pytest.approx([0.0, pitching, yawing])
+    assert record["memory"]["air_relative_velocity"] == pytest.approx(through_air(y_now, now))
 
 
 def test_the_specific_force_is_that_of_the_terms():
-    record, out = new_air(area_per_mass=0.01), np.zeros(3)
+    record, out = new_air(wing_area_per_mass=0.01), np.zeros(3)
     fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     gusts.fill_specific_force(record, X, Y, U, out)
     of = {
@@ -91,15 +94,17 @@ def test_the_specific_force_is_that_of_the_terms():
 
 
 def test_the_gusts_of_a_frame_are_summed_over_its_instants():
-    record, design = new_air(area_per_mass=0.01), design_record().view(np.recarray)[0]
+    record, design = new_air(wing_area_per_mass=0.01), design_record().view(np.recarray)[0]
     gusts.start_gust_estimate(record, Y, np.zeros(3))
-    record["memory"]["gust"] = 0.0, 0.02, -0.03
+    record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
     gusts.fill_gust_effect(record, design, X, Y, U)
-    first = record["output"]["acceleration"].copy()
+    first = record["output"]["gust_acceleration"].copy()
     gusts.begin_gust_sums(record, V, 0.01)
-    gusts.accumulate_gust_substep(record, design, X, Y, U, np.zeros(3), 0.01)
-    assert record["memory"]["acceleration_sum"] == pytest.approx(first + record["output"]["acceleration"])
-    assert np.abs(record["output"]["acceleration"] - first).max() > 1e-5
+    gusts.add_instant_to_gust(record, design, X, Y, U, np.zeros(3), 0.01)
+    assert record["memory"]["gust_angular_acceleration_sum"] == pytest.approx(
+        first + record["output"]["gust_acceleration"]
+    )
+    assert np.abs(record["output"]["gust_acceleration"] - first).max() > 1e-5
 
 
 @pytest.mark.parametrize("swings", [0, 1])
@@ -109,42 +114,49 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     It is reckoned with in the frame in which they turn and in the next, whatever the instants of either.
     """
     rng = np.random.default_rng(7)
-    record = new_air(axes_turn_fast=swings, turning_share=0.4, rolling_length=30.0)
-    record["output"]["damping"], record["output"]["axes"], record["memory"]["axes_rate"] = rng.normal(
-        size=(3, 3, 3)
+    record = new_air(
+        has_fast_axes_turn=swings, unmeasured_share_by_past_turns=0.4, rolling_gust_correlation_length=30.0
     )
-    record["memory"]["unmeasured_share"], record["memory"]["intensity"] = (1.0, 0.2, 0.7), (1e-3, 2e-3, 3e-3)
+    (
+        record["output"]["rate_damping"],
+        record["output"]["gust_axes_in_body"],
+        record["memory"]["gust_axes_rate"],
+    ) = rng.normal(size=(3, 3, 3))
+    record["memory"]["unmeasured_intensity_share"], record["memory"]["gust_drift_intensity"] = (
+        (1.0, 0.2, 0.7),
+        (1e-3, 2e-3, 3e-3),
+    )
     axes, swing = (
-        record["output"]["damping"] @ record["output"]["axes"],
-        record["output"]["damping"] @ record["memory"]["axes_rate"],
+        record["output"]["rate_damping"] @ record["output"]["gust_axes_in_body"],
+        record["output"]["rate_damping"] @ record["memory"]["gust_axes_rate"],
     )
     expected = axes @ np.diag([1e-3, 4e-4, 3e-3]) @ axes.T  # of the yawing one no more than all of it
     lags = 30.0 / V, 0.0, 3.0 * SPAN / (np.pi * V)
     turned = 0.5 * np.square(lags) * [1e-3, 0.0, 0.4 * 3e-3]
-    found = [[gusts.unmeasured_gust_drift(record, V, i, j) for j in range(3)] for i in range(3)]
+    found = [[gusts.unmeasured_gust_drift_intensity(record, V, i, j) for j in range(3)] for i in range(3)]
     assert np.array(found) == pytest.approx(V * expected, rel=1e-12)
     once = swings * DT * V * swing @ np.diag(turned) @ swing.T
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
             gusts.add_axes_turn_variance(record, V, DT)
-        gusts.average_gust_frame(record, 1.0)
-        assert record["output"]["turn_variance"] == pytest.approx(leap * once, rel=1e-12)
+        gusts.fill_frame_mean_gust(record, 1.0)
+        assert record["output"]["axes_turn_variance"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
-    record, rate = new_air(turbulence_length=500.0), 0.3
+    record, rate = new_air(turbulence_scale_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert gusts.share_lost_by_turning(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
+    assert gusts.unmeasured_share_of_turn(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
     """By corners: theta at either end at each instant, by the sign of what it multiplies."""
-    low, high = filters.interval_limits(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
+    low, high = filters.residual_interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
     assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
     assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert filters.norm_limits(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert filters.norm_limits(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
+    assert filters.norm_bound_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
+    assert filters.norm_bound_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
 
 
 def test_the_published_bound_and_the_turning_earth():
@@ -188,17 +200,17 @@ def test_the_turning_earth_moves_no_aircraft_more_whatever_its_inertia(constants
 
 
 def test_filters_of_bounds_are_those_of_residuals():
-    assert filters.bound_step(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
-    assert filters.noise_step(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
+    assert filters.advance_residual_bound(0.3, 0.2, 0.9, 0.1) == pytest.approx(0.27 + 0.02)
+    assert filters.advance_gyro_error_bound(0.3, 0.2, 0.9) == pytest.approx(0.27 + 0.02)
 
 
 def new_map(**fields):
     record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
-    record["n_boxes"], record["n_levels"], record["n_ages"], record["outside"] = 2, 3, 2, 7
-    record["low"], record["high"] = -1e6, 1e6
-    record["low"][0, 0], record["high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
-    record["low"][1, 5], record["high"][1, 5] = 30.0, 60.0  # the outer one by airspeed
-    record["share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
+    record["n_boxes"], record["n_levels"], record["n_time_rows"], record["is_outside_all_boxes"] = 2, 3, 2, 7
+    record["box_low"], record["box_high"] = -1e6, 1e6
+    record["box_low"][0, 0], record["box_high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
+    record["box_low"][1, 5], record["box_high"][1, 5] = 30.0, 60.0  # the outer one by airspeed
+    record["travel_share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
     record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
     record["error"] = np.arange(record["error"].size).reshape(record["error"].shape) / 1000.0
     return fill(record, **fields)
@@ -213,20 +225,22 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.travel_level(new_map(), np.array(u)) == level
-    assert bounds.travel_level(new_map(whole=1), np.array(u)) == 2
+    assert bounds.map_level_for_positions(new_map(), np.array(u)) == level
+    assert bounds.map_level_for_positions(new_map(several_surfaces_anywhere=1), np.array(u)) == 2
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert bounds.travel_level(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert bounds.travel_level(up_only, np.array([0, 0, 0, 0.25])) == 0
-    assert bounds.travel_level(up_only, np.array([0, 0, 0, 0.0])) == 0  # at rest at an end it uses none
+    assert bounds.map_level_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.map_level_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert (
+        bounds.map_level_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
+    )  # at rest at an end it uses none
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.time_row(new_map(time_s=time_s)) == age
+    assert bounds.error_map_time_row(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -245,27 +259,32 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     y[2] = airspeed
     bounds.add_map_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
-    expected = record["error"][age, box, 1] if box is not None else bounds.UNKNOWN_RAD_S2
+    expected = record["error"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert out == pytest.approx(0.5 + expected)
-    assert record["now"] == pytest.approx(np.full(3, expected))
-    assert record["outside"] == (box is None)
-    assert record["place"][:7] == pytest.approx([roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2])
+    assert record["error_now"] == pytest.approx(np.full(3, expected))
+    assert record["is_outside_all_boxes"] == (box is None)
+    assert record["coordinates"][:7] == pytest.approx(
+        [roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2]
+    )
 
 
 def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fitted():
     """Those of wrightFlyer1903 are 2000 rad/s2 off at an angle of attack of -0.5 rad: a bound of half as much
     excluded the true fault there."""
-    assert bounds.UNKNOWN_RAD_S2 > 100.0 * 2000.0
+    assert bounds.UNMAPPED_ERROR_RAD_S2 > 100.0 * 2000.0
 
 
 def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["tests"]["share"], record["noise"]["walk_intensity"] = 0.25, 2.0
-    record["noise"]["jitter"], record["noise"]["deflection"] = (0.1, 0.2, 0.3), (0.01, 0.02, 0.03)
+    record["test_config"]["frame_share_per_instant"], record["noise"]["relative_walk_intensity"] = 0.25, 2.0
+    record["noise"]["input_noise_variance"], record["noise"]["deflection_error_effect_bound"] = (
+        (0.1, 0.2, 0.3),
+        (0.01, 0.02, 0.03),
+    )
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n"], block["axis"][: len(axes)], block["drift_scale"] = len(axes), axes, 1.0
-    record["block"][2]["drift_scale"], record["block"][2]["return_length"] = 4.0, 90.0
+        block["n_axes"], block["axis"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
+    record["block"][2]["drift_intensity_scale"], record["block"][2]["correlation_length"] = 4.0, 90.0
     put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
 
@@ -274,43 +293,48 @@ def new_detector(**fields):
 def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi, record, design = new_detector()
     rng = np.random.default_rng(1)
-    record["air"]["output"]["moving"] = moving
-    record["air"]["output"]["damping"], record["air"]["output"]["axes"] = rng.normal(size=(2, 3, 3))
-    record["air"]["memory"]["unmeasured_share"], record["air"]["memory"]["intensity"] = (
+    record["gust"]["output"]["is_turbulent"] = moving
+    record["gust"]["output"]["rate_damping"], record["gust"]["output"]["gust_axes_in_body"] = rng.normal(
+        size=(2, 3, 3)
+    )
+    (
+        record["gust"]["memory"]["unmeasured_intensity_share"],
+        record["gust"]["memory"]["gust_drift_intensity"],
+    ) = (
         (1.0, 0.2, 0.3),
         (1e-3, 2e-3, 3e-3),
     )
     (
-        record["air"]["config"]["coarse"],
-        record["air"]["config"]["rolling_length"],
-        record["air"]["config"]["span"],
+        record["gust"]["config"]["only_coarse_estimate"],
+        record["gust"]["config"]["rolling_gust_correlation_length"],
+        record["gust"]["config"]["wing_span"],
     ) = moving, 20.0, 5.0 * np.pi
-    fdi["bound"]["constant"], fdi["bound"]["inertia"] = (0.02, 0.0, 0.04), 0.1
+    fdi["bound"]["constant_bound"], fdi["bound"]["inertia_coupling"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
     bounds.add_published_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
     bounded += [0.01, 0.02, 0.03]
-    assert record["noise"]["bounded"] == pytest.approx(bounded)
-    turned = record["air"]["output"]["damping"] @ record["air"]["output"]["axes"]
+    assert record["noise"]["uncertainty_bound"] == pytest.approx(bounded)
+    turned = record["gust"]["output"]["rate_damping"] @ record["gust"]["output"]["gust_axes_in_body"]
     usual, slow = (1e-3, 4e-4, 9e-4), (4e-3, 16e-4, 36e-4 * 0.75**2)  # stronger; 20, 20 and 15 m
     for block, intensity in zip(record["block"], (usual, usual, slow), strict=True):
-        axes = block["axis"][: block["n"]]
+        axes = block["axis"][: block["n_axes"]]
         unseen = moving * V * turned @ np.diag(intensity) @ turned.T
         drift = unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
-        assert block["drift"][: len(axes), : len(axes)] == pytest.approx(drift)
-        assert block["jitter"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
-    assert record["block"]["keep"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])
+        assert block["drift_intensity"][: len(axes), : len(axes)] == pytest.approx(drift)
+        assert block["model_noise_variance"][: len(axes)] == pytest.approx(np.array([0.1, 0.2, 0.3])[axes])
+    assert record["block"]["drift_decay_factor"] == pytest.approx([1.0, 1.0, np.exp(-DT * V / 90.0)])
 
 
 def test_where_nothing_is_bounded_a_little_is_reckoned_with():
-    fdi, record, design = new_detector(deflection=0.0)
+    fdi, record, design = new_detector(deflection_error_effect_bound=0.0)
     Statistical.drifts(record, fdi, design, np.zeros(3), Y)
-    assert record["block"][0]["drift"][0, 0] == pytest.approx(2.0 * 1e-6)
+    assert record["block"][0]["drift_intensity"][0, 0] == pytest.approx(2.0 * 1e-6)
 
 
 def test_regressors_are_what_each_coefficient_multiplies():
     """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
-    fdi, record, design = new_detector(share=1.0, has_tolerances=1)
+    fdi, record, design = new_detector(frame_share_per_instant=1.0, has_regressors=1)
     record["block"]["regressor"] = 9.0
     x = np.zeros(3)
     Statistical.prepare(record, fdi, design, x, Y, U)
@@ -322,13 +346,13 @@ def test_regressors_are_what_each_coefficient_multiplies():
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         of_it = value[np.isin(axis, axes)]
         assert of_it @ block["regressor"][: of_it.size, : len(axes)] == pytest.approx(total[list(axes)])
-    terms = np.zeros_like(record["noise"]["terms"])
+    terms = np.zeros_like(record["noise"]["coefficient_regressor"])
     regressors(design["moments"], design["moments"]["power"], U, terms)
-    assert record["noise"]["terms"] == pytest.approx(terms)
+    assert record["noise"]["coefficient_regressor"] == pytest.approx(terms)
 
 
 def test_instants_inside_a_frame_add_to_the_mean():
-    fdi, record, design = new_detector(has_tolerances=1)
+    fdi, record, design = new_detector(has_regressors=1)
     Statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
@@ -341,48 +365,48 @@ def test_instants_inside_a_frame_add_to_the_mean():
 @pytest.mark.parametrize("offsets_count", [0, 1])
 def test_what_is_known_of_a_fault_is_expected(offsets_count):
     rng = np.random.default_rng(2)
-    belief = np.zeros(1, belief_dtype(4)).view(np.recarray)[0]
-    mean = belief["means"]
+    prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
+    mean = prediction["frame_means"]
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
     mean["acceleration"] = rng.normal(size=3)
     effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
-    expectation.predict_acceleration(belief, 0, effectiveness, offset, offsets_count)
-    assert (belief["expected"] == mean["acceleration"]).all()
-    expectation.predict_acceleration(belief, 1, effectiveness, offset, offsets_count)
+    model_prediction.predict_acceleration(prediction, 0, effectiveness, offset, offsets_count)
+    assert (prediction["acceleration_with_known_faults"] == mean["acceleration"]).all()
+    model_prediction.predict_acceleration(prediction, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
     expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
-    assert belief["expected"] == pytest.approx(expected)
-    belief["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
-    expectation.form_innovation(belief, x, 0.5)
+    assert prediction["acceleration_with_known_faults"] == pytest.approx(expected)
+    prediction["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
+    model_prediction.form_innovation(prediction, x, 0.5)
     innovation = np.array([0.4, -0.2, 0.0]) - expected
-    assert belief["innovation_after_known_faults"] == pytest.approx(innovation)
+    assert prediction["innovation_after_known_faults"] == pytest.approx(innovation)
 
 
 def take(fdi, given, t):
     """A frame's verdict of a plug-in, as the frame of the loop takes it."""
     on(conclusion.record_plugin_verdict, fdi, given, t)
-    isolation.take_plugin_estimate(fdi["isolation"], fdi["verdict"]["isolated"], given["theta"])
+    isolation.copy_plugin_estimate(fdi["isolation"], fdi["verdict"]["isolated_estimator"], given["theta"])
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
     fdi, given = new_fdi(), np.zeros(1, plugin_verdict_dtype(4)).view(np.recarray)[0]
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
-    given["isolated"], given["axis"], given["theta"], given["estimates"] = 2, 1, -0.3, 1
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
+    given["isolated"], given["axis"], given["theta"], given["has_effectiveness"] = 2, 1, -0.3, 1
     given["effectiveness"] = 0.5
     take(fdi, given, 3.0)
-    assert (fdi["verdict"]["detected"], fdi["verdict"]["isolated"]) == (0, NOT_ISOLATED)
+    assert (fdi["verdict"]["detected"], fdi["verdict"]["isolated_estimator"]) == (0, NOT_ISOLATED)
     given["detected"] = 1
     take(fdi, given, 4.0)
     found = fdi["verdict"]
     assert (found["detected"], found["detected_at_s"], found["detected_axis"]) == (1, 4.0, 1)
-    assert (found["isolated"], found["isolated_at_s"], found["estimates"]) == (2, 4.0, 1)
+    assert (found["isolated_estimator"], found["isolated_at_s"], found["has_effectiveness"]) == (2, 4.0, 1)
     assert fdi["isolation"]["estimator"]["theta"][2] == pytest.approx([-0.3] * 3)
     assert found["effectiveness"] == pytest.approx([0.5] * 4)
     take(fdi, given, 5.0)
     assert (found["detected_at_s"], found["isolated_at_s"]) == (4.0, 4.0)
     given["isolated"] = NOT_ISOLATED
     take(fdi, given, 6.0)
-    assert (found["isolated"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
+    assert (found["isolated_estimator"], found["isolated_at_s"]) == (NOT_ISOLATED, 6.0)
     given["isolated"], given["theta"] = 0, -0.7  # the first is as good as any
     take(fdi, given, 7.0)
     assert fdi["isolation"]["estimator"]["theta"][0] == pytest.approx([-0.7] * 3)
@@ -400,16 +424,16 @@ def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():
 def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi = new_fdi()
     (
-        fdi["statistical"]["tests"]["enabled"],
+        fdi["statistical"]["test_config"]["enabled"],
         fdi["config"]["authority"],
-        fdi["statistical"]["alarm"]["score"],
+        fdi["statistical"]["alarm"]["score_over_alarm_level"],
     ) = (
         enabled,
         authority,
         score,
     )
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
-    likely = conclusion.uses_statistical_estimates(fdi["statistical"]["tests"], authority)
+    likely = conclusion.uses_statistical_estimates(fdi["statistical"]["test_config"], authority)
     alarm = fdi["statistical"]["alarm"]
     found = schemes.built_in_statistic(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
@@ -427,49 +451,58 @@ def unknown_acceleration(fdi):
 def test_the_estimate_is_that_of_whoever_counts():
     fdi = new_fdi()
     (
-        fdi["verdict"]["isolated"],
+        fdi["verdict"]["isolated_estimator"],
         fdi["isolation"]["estimator"]["surface"][5],
         fdi["layout"]["dominant_axis"][2],
     ) = 5, 2, 1
     fdi["isolation"]["estimator"]["theta"][5] = -0.1, -0.2, -0.3
     block = fdi["statistical"]["block"][0]
-    block["n_hypotheses"], block["n"], block["axis"][0] = 1, 1, 1
+    block["n_hypotheses"], block["n_axes"], block["axis"][0] = 1, 1, 1
     hypothesis = block["hypothesis"][0]
-    hypothesis["kind"], hypothesis["surface"], hypothesis["theta"], hypothesis["information"] = (
+    (
+        hypothesis["kind"],
+        hypothesis["surface"],
+        hypothesis["theta_estimate"],
+        hypothesis["theta_information"],
+    ) = (
         LOSS,
         2,
         -0.6,
         1.0,
     )
     assert on(conclusion.isolated_surface, fdi) == 2
-    assert frame.isolated_theta(fdi, 2) == -0.2
-    fdi["fdae"]["network"]["output"], block["residual_state"] = 0.3, (0, 0, 0.7, 0)
+    assert frame.estimated_theta_of_isolated_loss(fdi, 2) == -0.2
+    fdi["fdae"]["network"]["output"], block["residual_filter_state"] = 0.3, (0, 0, 0.7, 0)
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["detected"] = 1
     assert unknown_acceleration(fdi) == pytest.approx([0.3] * 3)
-    fdi["statistical"]["tests"]["enabled"] = 1
-    assert frame.isolated_theta(fdi, 2) == -0.6
+    fdi["statistical"]["test_config"]["enabled"] = 1
+    assert frame.estimated_theta_of_isolated_loss(fdi, 2) == -0.6
     assert unknown_acceleration(fdi)[1] == 0.7
-    fdi["verdict"]["lead"], fdi["verdict"]["lead_kind"] = 2, WAIT_FOR_SURFACE
+    fdi["verdict"]["accommodated_surface"], fdi["verdict"]["accommodation_mode"] = 2, WAIT_FOR_SURFACE
     assert unknown_acceleration(fdi) == [0.0] * 3
-    fdi["verdict"]["isolated"] = NOT_ISOLATED
+    fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
     assert on(conclusion.isolated_surface, fdi) == -1
 
 
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
-    record = new_air(acceleration_sum=(0.4, -0.8, 1.2))
-    gusts.average_gust_frame(record, share)
-    assert record["output"]["mean"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
+    record = new_air(gust_angular_acceleration_sum=(0.4, -0.8, 1.2))
+    gusts.fill_frame_mean_gust(record, share)
+    assert record["output"]["mean_gust_acceleration"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
-    block = np.zeros(1, block_dtype(USUAL_SIZE.rates)).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["output"]["turn_variance"], block["drift_scale"], block["P_dd"] = rng.normal(size=(3, 3)), 1.7, 0.3
-    block["n"], block["axis"] = 2, (0, 2)
-    statistical.add_turn_variance(record, block)
+    record["output"]["axes_turn_variance"], block["drift_intensity_scale"], block["P_dd"] = (
+        rng.normal(size=(3, 3)),
+        1.7,
+        0.3,
+    )
+    block["n_axes"], block["axis"] = 2, (0, 2)
+    statistical.add_turn_to_drift_covariance(record, block)
     assert block["P_dd"] == pytest.approx(
-        0.3 + 1.7 * record["output"]["turn_variance"][np.ix_((0, 2), (0, 2))]
+        0.3 + 1.7 * record["output"]["axes_turn_variance"][np.ix_((0, 2), (0, 2))]
     )

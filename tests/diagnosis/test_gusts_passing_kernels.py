@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.air import Dryden
+from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import bounds, gusts
 from beaver_ftc.diagnosis import bounds as admitting
 from beaver_ftc.diagnosis.bounds import declared_errors_dtype
@@ -22,12 +22,20 @@ def record_of(dtype):
 
 def in_moving_air():
     record = record_of(gusts.GUST_RECORD)
-    record["output"]["measures_gust"], record["config"]["max_gust"], record["config"]["decay_rate"] = (
+    (
+        record["output"]["is_gust_measured"],
+        record["config"]["max_gust_velocity"],
+        record["config"]["gust_velocity_decay_rate"],
+    ) = (
         1,
         30.0,
         0.02,
     )
-    record["memory"]["velocity"], record["memory"]["gust_velocity"], record["memory"]["initial_share"] = (
+    (
+        record["memory"]["air_relative_velocity"],
+        record["memory"]["gust_velocity"],
+        record["memory"]["initial_gust_variance_share"],
+    ) = (
         (44.0, 1.5, 3.0),
         (5.0, -2.0, 0.7),
         0.8,
@@ -37,52 +45,56 @@ def in_moving_air():
 
 def test_the_speed_is_that_through_the_air_without_the_gust():
     record, dt = in_moving_air(), 0.5
-    gusts.update_speed(record, 45.0, 1.1, 3.3, 44.1, dt)  # the gust has changed by 1.0, -0.4, 0.3
+    gusts.update_gust_velocity_and_speed(
+        record, 45.0, 1.1, 3.3, 44.1, dt
+    )  # the gust has changed by 1.0, -0.4, 0.3
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
     assert record["memory"]["gust_velocity"] == pytest.approx(blown)
-    assert record["output"]["speed"] == pytest.approx(np.linalg.norm(blown + np.array([44.0, 1.5, 3.0])))
-    assert record["memory"]["initial_share"] == pytest.approx(0.8 * kept**2)
+    assert record["output"]["speed_relative_to_mean_air"] == pytest.approx(
+        np.linalg.norm(blown + np.array([44.0, 1.5, 3.0]))
+    )
+    assert record["memory"]["initial_gust_variance_share"] == pytest.approx(0.8 * kept**2)
 
 
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
-    record["config"]["max_gust"] = 2.0
-    gusts.update_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
+    record["config"]["max_gust_velocity"] = 2.0
+    gusts.update_gust_velocity_and_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
     assert record["memory"]["gust_velocity"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
     record = in_moving_air()
-    record["output"]["measures_gust"] = 0
-    gusts.update_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
-    assert record["output"]["speed"] == 44.1
-    assert gusts.unmeasured_share(record, 1) == 0.0
+    record["output"]["is_gust_measured"] = 0
+    gusts.update_gust_velocity_and_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
+    assert record["output"]["speed_relative_to_mean_air"] == 44.1
+    assert gusts.total_unmeasured_share(record, 1) == 0.0
 
 
 @pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
 def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further):
     record = in_moving_air()
     (
-        record["memory"]["unmeasured_share"],
-        record["memory"]["start_share"],
-        record["memory"]["turning_share"],
+        record["memory"]["unmeasured_intensity_share"],
+        record["memory"]["unmeasured_share_by_start"],
+        record["memory"]["unmeasured_share_by_past_turns"],
     ) = (
         (1.0, 0.003, 0.03),
         0.02,
         0.05,
     )
     (
-        record["output"]["speed"],
-        record["config"]["speed_variance"],
-        record["config"]["gust_variance"],
-        record["config"]["error_gain"],
+        record["output"]["speed_relative_to_mean_air"],
+        record["config"]["speed_error_variance"],
+        record["config"]["gust_velocity_variance"],
+        record["config"]["unmeasured_share_per_speed_variance"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert gusts.unmeasured_share(record, g) == pytest.approx(
-        record["memory"]["unmeasured_share"][g] + off + further
+    assert gusts.total_unmeasured_share(record, g) == pytest.approx(
+        record["memory"]["unmeasured_intensity_share"][g] + off + further
     )
-    assert gusts.unmeasured_share(record, 0) == 1.0
+    assert gusts.total_unmeasured_share(record, 0) == 1.0
 
 
 def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
@@ -91,7 +103,9 @@ def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
     e, tau, level = 1e-3, 0.37, 6.6
     s = 1j * np.geomspace(1e-3, 1e3, 20001)
     error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert gusts.speed_error_share(level) / (0.5 * level) ** 2 == pytest.approx(error.max() / e**2, rel=2e-3)
+    assert gusts.unmeasured_share_per_speed_variance(level) / (0.5 * level) ** 2 == pytest.approx(
+        error.max() / e**2, rel=2e-3
+    )
 
 
 @pytest.mark.parametrize("turbulence", ["light", "moderate", "severe"])
@@ -102,28 +116,28 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(gusts.GUST_RECORD)
-    record["config"]["intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
-    record["config"]["intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
-    record["config"]["altitude_error"], record["config"]["altitude_slope"] = 0.7, 0.02
+    record["config"]["drift_intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["config"]["drift_intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
+    record["config"]["altitude_error_bound"], record["config"]["altitude_error_share"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    gusts.set_gust_intensity(record, reading)
+    gusts.set_gust_drift_intensity(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
     by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
-    assert record["memory"]["intensity"] == pytest.approx(by_gusts)
+    assert record["memory"]["gust_drift_intensity"] == pytest.approx(by_gusts)
 
     declared_errors = record_of(declared_errors_dtype(4))
-    declared_errors["gust_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).rotation_limit_rad_s(
-        SPAN_M
-    )
-    declared_errors["gust_low"] = admitting.GUST_LIMIT_SIGMA * Dryden(turbulence).low_rotation_limit_rad_s(
-        SPAN_M
-    )
-    declared_errors["altitude_off"], declared_errors["altitude_slope"] = 0.7, 0.02
-    bounds.set_gust_bound(declared_errors, reading)
+    declared_errors["air_rotation_bound_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(
+        turbulence
+    ).rotation_limit_rad_s(SPAN_M)
+    declared_errors["air_rotation_bound_at_1_m"] = admitting.GUST_LIMIT_SIGMA * Dryden(
+        turbulence
+    ).low_rotation_limit_rad_s(SPAN_M)
+    declared_errors["altitude_error_bound_m"], declared_errors["altitude_error_share"] = 0.7, 0.02
+    bounds.set_air_rotation_bound(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
-    assert declared_errors["gust"] == pytest.approx(6.0 * sigma)
+    assert declared_errors["air_rotation_bound"] == pytest.approx(6.0 * sigma)
 
 
 def test_below_2000_ft_the_lateral_gust_and_the_layer_between_are_weaker_than_reckoned_with():
@@ -142,17 +156,19 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
     kept = []
     for turbulence in ("light", "severe"):
         record = record_of(gusts.GUST_RECORD)
-        record["output"]["moving"] = record["output"]["measures_gust"] = record["output"][
+        record["output"]["is_turbulent"] = record["output"]["is_gust_measured"] = record["output"][
             "uses_accelerometers"
         ] = 1
         gusts.configure_speed_error(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
         sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
         b = (
-            2.0 * record["config"]["decay_rate"] ** 3 * sigma**2 / V_L
+            2.0 * record["config"]["gust_velocity_decay_rate"] ** 3 * sigma**2 / V_L
         ) ** 0.5 / 2.0  # a^3 = 2 b^2 V / (L sigma^2)
         assert b == pytest.approx(2.0 * 7.292e-5 * 45.0 + 0.3 * 0.03, rel=1e-3)
-        a = record["config"]["decay_rate"]
-        assert record["config"]["speed_variance"] == pytest.approx(sigma**2 * a / (a + V_L) + (b / a) ** 2)
-        assert record["config"]["speed_variance"] < 0.5 * sigma**2
-        kept.append(float(record["config"]["decay_rate"]))
+        a = record["config"]["gust_velocity_decay_rate"]
+        assert record["config"]["speed_error_variance"] == pytest.approx(
+            sigma**2 * a / (a + V_L) + (b / a) ** 2
+        )
+        assert record["config"]["speed_error_variance"] < 0.5 * sigma**2
+        kept.append(float(record["config"]["gust_velocity_decay_rate"]))
     assert kept[1] < kept[0]

@@ -24,10 +24,10 @@ FILL = {
     "free response": ((3,), lambda out: model.both_responses(design(), X, Y, out, np.full((3, 4), 9.0))),
     "control effectiveness": ((3, 4), lambda out: model.both_responses(design(), X, Y, np.full(3, 9.0), out)),
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
-    "level axes": ((3, 3), lambda out: gusts.fill_level_axes(0.3, 0.2, out)),
+    "level axes": ((3, 3), lambda out: gusts.fill_level_to_body_rotation(0.3, 0.2, out)),
     "quaternion": ((4,), lambda out: redundancy.fill_quaternion(0.3, 0.2, 0.1, out)),
     "turned": ((4,), lambda out: redundancy.advance_quaternion(Q, X, 0.02, out)),
-    "turned back": ((3,), lambda out: redundancy.rotate_to_new_axes(X, 0.02, V, out)),
+    "turned back": ((3,), lambda out: redundancy.rotate_to_turned_axes(X, 0.02, V, out)),
 }
 
 
@@ -47,28 +47,52 @@ def test_the_drift_of_the_detectors_blocks(moving):
     for before in (0.0, 9.0):
         fdi = new_fdi()
         record = fdi["statistical"]
-        record["air"]["output"]["moving"], record["noise"]["deflection"] = moving, 0.01
+        record["gust"]["output"]["is_turbulent"], record["noise"]["deflection_error_effect_bound"] = (
+            moving,
+            0.01,
+        )
         (
-            record["air"]["output"]["damping"],
-            record["air"]["memory"]["intensity"],
-            record["air"]["memory"]["unmeasured_share"],
+            record["gust"]["output"]["rate_damping"],
+            record["gust"]["memory"]["gust_drift_intensity"],
+            record["gust"]["memory"]["unmeasured_intensity_share"],
         ) = np.eye(3), 1e-3, 0.5
-        record["air"]["output"]["axes"] = np.arange(9.0).reshape(3, 3)
+        record["gust"]["output"]["gust_axes_in_body"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
-            block["n"], block["axis"][: len(axes)], block["drift_scale"] = len(axes), axes, 1.0
-        record["noise"]["bounded"] = record["block"]["drift"] = record["block"]["jitter"] = before
-        fdi["bound"]["constant"] = 0.02
+            block["n_axes"], block["axis"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
+        record["noise"]["uncertainty_bound"] = record["block"]["drift_intensity"] = record["block"][
+            "model_noise_variance"
+        ] = before
+        fdi["bound"]["constant_bound"] = 0.02
         Statistical.drifts(record, fdi, design(), X, Y)
-        found.append([record["noise"]["bounded"].tolist(), record["block"]["drift"][0, 0, 0].tolist()])
-        found[-1] += [record["block"]["drift"][1].tolist(), record["block"]["jitter"][1].tolist()]
+        found.append(
+            [
+                record["noise"]["uncertainty_bound"].tolist(),
+                record["block"]["drift_intensity"][0, 0, 0].tolist(),
+            ]
+        )
+        found[-1] += [
+            record["block"]["drift_intensity"][1].tolist(),
+            record["block"]["model_noise_variance"][1].tolist(),
+        ]
     assert found[0] == found[1]
 
 
 def test_the_gusts_effect():
-    found, filled = [], ("force", "rotation", "acceleration", "coarse_acceleration", "damping")
+    found, filled = (
+        [],
+        (
+            "specific_force",
+            "air_rotation_in_body_axes",
+            "gust_acceleration",
+            "coarse_gust_acceleration",
+            "rate_damping",
+        ),
+    )
     for before in (0.0, 9.0):
         record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-        fill(record, span=14.0, axes=np.eye(3), gust=(0.0, 0.02, -0.03))
+        fill(
+            record, wing_span=14.0, gust_axes_in_body=np.eye(3), air_rotation_in_level_axes=(0.0, 0.02, -0.03)
+        )
         fill(record, **dict.fromkeys((*filled, "scratch"), before))
         gusts.fill_gust_effect(record, design(), X, Y, U)
         found.append([holder(record, name)[name].tolist() for name in filled])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.context import SIGNALS
 from beaver_ftc.design.model import design_record, inertia_coefficients
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis.bounds import declared_errors_dtype
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import load as scenario
+from beaver_ftc.scenario.sensors import SIGNALS
 from flying import declared_in
 
 AIRCRAFT = load()
@@ -23,8 +23,8 @@ def coefficients(mass):
 
 def test_no_inertia_within_its_tolerance_changes_a_coefficient_by_more():
     rng, nominal = np.random.default_rng(1), coefficients(AIRCRAFT.mass)
-    names = bound_kernels._INERTIA
-    slack = bound_kernels.inertia_coefficient_errors(0.1, AIRCRAFT.mass)
+    names = bound_kernels._INERTIA_NAMES
+    slack = bound_kernels.max_inertia_coefficient_errors(0.1, AIRCRAFT.mass)
     largest = np.zeros(12)
     for k in range(400):
         share = rng.uniform(-0.1, 0.1, 4) if k % 2 else 0.1 * rng.choice([-1.0, 1.0], 4)
@@ -35,7 +35,7 @@ def test_no_inertia_within_its_tolerance_changes_a_coefficient_by_more():
         assert (apart <= slack * (1.0 + 1e-12)).all()
         largest = np.maximum(largest, apart)
     assert largest == pytest.approx(slack)  # at one of the sixteen corners
-    assert not bound_kernels.inertia_coefficient_errors(0.0, AIRCRAFT.mass).any()
+    assert not bound_kernels.max_inertia_coefficient_errors(0.0, AIRCRAFT.mass).any()
     with pytest.raises(ValueError, match="read-only"):
         slack[0] = 0.0
 
@@ -51,16 +51,18 @@ def admit(**bounds):
 
 def test_every_declared_bound_stands_in_the_record():
     record = admit(inertia=0.05, deflection_deg=0.5, coefficients={"Cm_alpha": 0.2}, sensors="ideal")
-    assert record["inertia"] == pytest.approx(bound_kernels.inertia_coefficient_errors(0.05, AIRCRAFT.mass))
-    assert record["deflection"] == pytest.approx(np.radians(0.5))
+    assert record["inertia_tolerance"] == pytest.approx(
+        bound_kernels.max_inertia_coefficient_errors(0.05, AIRCRAFT.mass)
+    )
+    assert record["deflection_error_bound"] == pytest.approx(np.radians(0.5))
     (index,) = [i for i, term in enumerate(AIRCRAFT.moments) if term.name == "Cm_alpha"]
-    assert record["tolerance"][index] == pytest.approx(0.2 * abs(AIRCRAFT.moments[index].value))
-    assert np.count_nonzero(record["tolerance"]) == 1
-    assert record["any"]
-    assert not record["offset"].any()
+    assert record["coefficient_tolerance"][index] == pytest.approx(0.2 * abs(AIRCRAFT.moments[index].value))
+    assert np.count_nonzero(record["coefficient_tolerance"]) == 1
+    assert record["has_declared_errors"]
+    assert not record["signal_error_offset"].any()
     everything = admit(coefficients=0.1)
     values = np.array([term.value for term in AIRCRAFT.moments])
-    assert everything["tolerance"][: values.size] == pytest.approx(0.1 * np.abs(values))
+    assert everything["coefficient_tolerance"][: values.size] == pytest.approx(0.1 * np.abs(values))
 
 
 @pytest.mark.parametrize(
@@ -74,8 +76,8 @@ def test_every_declared_bound_stands_in_the_record():
     ],
 )
 def test_any_bound_at_all_is_noted(bounds):
-    assert admit(**bounds)["any"]
-    assert not admit()["any"]
+    assert admit(**bounds)["has_declared_errors"]
+    assert not admit()["has_declared_errors"]
 
 
 def test_a_reading_is_off_by_four_sigma_its_bias_and_half_a_step():
@@ -86,10 +88,12 @@ def test_a_reading_is_off_by_four_sigma_its_bias_and_half_a_step():
     record = admit(sensors=sensors)
     names = list(SIGNALS)
     q, V = names.index("q"), names.index("V")
-    assert record["offset"][q] == pytest.approx(np.radians(4.0 * 0.02 + 0.1 + 0.02))
-    assert record["steady"] == pytest.approx([0.0, np.radians(0.1), 0.0])
-    assert record["slope"][V] == pytest.approx(0.01)
-    assert np.count_nonzero(record["offset"]) == np.count_nonzero(record["slope"]) == 1
+    assert record["signal_error_offset"][q] == pytest.approx(np.radians(4.0 * 0.02 + 0.1 + 0.02))
+    assert record["constant_gyro_error_bound"] == pytest.approx([0.0, np.radians(0.1), 0.0])
+    assert record["signal_error_slope"][V] == pytest.approx(0.01)
+    assert (
+        np.count_nonzero(record["signal_error_offset"]) == np.count_nonzero(record["signal_error_slope"]) == 1
+    )
 
 
 @pytest.mark.parametrize("noise", [1e-4, 2e-3])
@@ -97,13 +101,13 @@ def test_a_reading_is_off_by_four_sigma_its_bias_and_half_a_step():
 def test_the_poles_find_the_smallest_fault_there_is_to_be_found(noise, eta_bar):
     """phi (1 - exp(-lam T)) / lam > eta_bar / lam + 2 nbar, by trying every pole."""
     nothing = scenario({"name": "x"}).sensors
-    assert bound_kernels.poles_for_noise(SensorErrors(nothing), eta_bar) == ()
+    assert bound_kernels.detection_poles_for_noise(SensorErrors(nothing), eta_bar) == ()
     sensors = scenario({"name": "x", "sensors": {"r": {"noise_std_deg_s": float(np.degrees(noise))}}}).sensors
     nbar = 4.0 * noise
     poles = np.geomspace(1e-3, 1e4, 200_001)
-    found = bound_kernels.poles_for_noise(SensorErrors(sensors), eta_bar)
-    assert len(found) == len(bound_kernels.DESIGN_DELAYS_S)
-    for T, pole in zip(bound_kernels.DESIGN_DELAYS_S, found, strict=True):
+    found = bound_kernels.detection_poles_for_noise(SensorErrors(sensors), eta_bar)
+    assert len(found) == len(bound_kernels.POLE_DESIGN_DELAYS_S)
+    for T, pole in zip(bound_kernels.POLE_DESIGN_DELAYS_S, found, strict=True):
         smallest = (eta_bar + 2.0 * nbar * poles) / (1.0 - np.exp(-poles * T))
         at_it = (eta_bar + 2.0 * nbar * pole) / (1.0 - np.exp(-pole * T))
         assert at_it == pytest.approx(smallest.min(), rel=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.air import Dryden
+from beaver_ftc.design import Dryden
 from beaver_ftc.design.context import Declared
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record

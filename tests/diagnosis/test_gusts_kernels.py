@@ -23,12 +23,15 @@ Y = np.array([0.1, 0.03, 45.0, 1036.0, 0.3, 0.0, 0.0, 0.0])
 def new_air(**fields):
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
     (
-        record["config"]["span"],
+        record["config"]["wing_span"],
         record["config"]["gravity"],
-        record["output"]["moving"],
-        record["output"]["measures_gust"],
+        record["output"]["is_turbulent"],
+        record["output"]["is_gust_measured"],
     ) = SPAN, GRAVITY, 1, 1
-    record["config"]["turbulence_length"], record["config"]["rolling_length"] = SCALE, ROLLING
+    record["config"]["turbulence_scale_length"], record["config"]["rolling_gust_correlation_length"] = (
+        SCALE,
+        ROLLING,
+    )
     return fill(record, **fields)
 
 
@@ -78,20 +81,20 @@ def test_the_gust_followed_is_the_airs_own_change(seed):
     gusts.start_gust_estimate(record, *flight.reading())
     pitching = yawing = 0.0
     for _ in range(6):
-        wind, axes_then = flight.wind, record["output"]["axes"].copy()
+        wind, axes_then = flight.wind, record["output"]["gust_axes_in_body"].copy()
         psi_then = flight.attitude[2]
-        record["memory"]["force"] = flight.step()
+        record["memory"]["specific_force"] = flight.step()
         y, attitude = flight.reading()
-        gusts.update_gust(record, y, attitude, DT)
+        gusts.update_gust_rotation(record, y, attitude, DT)
         change = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.wind - wind)
         tau_q, tau_r = 4.0 * SPAN / (np.pi * y[2]), 3.0 * SPAN / (np.pi * y[2])
         pitching = np.exp(-DT / tau_q) * pitching + change[2] / (y[2] * tau_q)
         yawing = np.exp(-DT / tau_r) * yawing + change[1] / (y[2] * tau_r)
-        assert record["memory"]["gust"] == pytest.approx([0.0, pitching, yawing])
+        assert record["memory"]["air_rotation_in_level_axes"] == pytest.approx([0.0, pitching, yawing])
         # The axes of the gusts: level, along the heading of the instant before.
         axes = (to_earth(flight.attitude).inv() * Rotation.from_euler("z", psi_then)).as_matrix()
-        assert record["output"]["axes"] == pytest.approx(axes)
-        assert record["memory"]["axes_rate"] == pytest.approx((axes - axes_then) / DT)
+        assert record["output"]["gust_axes_in_body"] == pytest.approx(axes)
+        assert record["memory"]["gust_axes_rate"] == pytest.approx((axes - axes_then) / DT)
 
 
 @pytest.mark.parametrize(("turn_rad", "swings"), [(1e-3, False), (0.1, True)])
@@ -100,26 +103,28 @@ def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(tur
     gusts.start_gust_estimate(record, *flight.reading())
     flight.attitude[1] = 0.0
     for _ in range(3):
-        record["memory"]["force"] = flight.step()
+        record["memory"]["specific_force"] = flight.step()
         flight.attitude[1] += turn_rad
         y, attitude = flight.reading()
-        gusts.update_gust(record, y, attitude, DT)
+        gusts.update_gust_rotation(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
-    assert not 0.8 * gusts.MIN_AXES_TURN < walk < 1.3 * gusts.MIN_AXES_TURN
-    assert bool(record["memory"]["axes_turn_fast"]) == swings == (walk > gusts.MIN_AXES_TURN)
+    assert not 0.8 * gusts.MIN_AXES_TURN_INTENSITY_SHARE < walk < 1.3 * gusts.MIN_AXES_TURN_INTENSITY_SHARE
+    assert (
+        bool(record["memory"]["has_fast_axes_turn"]) == swings == (walk > gusts.MIN_AXES_TURN_INTENSITY_SHARE)
+    )
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
-    record = new_air(axes=np.eye(3))
-    most = np.sqrt(2.0 * gusts.MIN_AXES_TURN) * 45.0 / ROLLING
-    record["memory"]["axes_rate"] = np.eye(3)
-    record["memory"]["axes_rate"][1, 2] = share * most * DT
-    record["memory"]["axes_rate"][0, 0] += 0.5 * most * DT
-    gusts.update_axes_rate(record, DT, 45.0)
-    assert record["memory"]["axes_rate"][1, 2] == pytest.approx(-share * most)
-    assert record["memory"]["axes_turn_fast"] == (share > 1.0)
+    record = new_air(gust_axes_in_body=np.eye(3))
+    most = np.sqrt(2.0 * gusts.MIN_AXES_TURN_INTENSITY_SHARE) * 45.0 / ROLLING
+    record["memory"]["gust_axes_rate"] = np.eye(3)
+    record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
+    record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT
+    gusts.update_gust_axes_rate(record, DT, 45.0)
+    assert record["memory"]["gust_axes_rate"][1, 2] == pytest.approx(-share * most)
+    assert record["memory"]["has_fast_axes_turn"] == (share > 1.0)
 
 
 def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
@@ -127,7 +132,10 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     record, y = new_air(), np.array([0.0, 0.0, 45.0, 1000.0, 0, 0, 0, 0])
     level = np.zeros(3)
     gusts.start_gust_estimate(record, y, level)
-    record["memory"]["force"], record["memory"]["gust"] = (0.0, 0.0, -GRAVITY), (0.0, 0.0, 0.05)
+    record["memory"]["specific_force"], record["memory"]["air_rotation_in_level_axes"] = (
+        (0.0, 0.0, -GRAVITY),
+        (0.0, 0.0, 0.05),
+    )
     tau_r, lag = 3.0 * SPAN / (np.pi * 45.0), np.exp(-DT / (3.0 * SPAN / (np.pi * 45.0)))
     enough = np.sqrt(np.pi * 45.0**2 / (SPAN * SCALE))  # rad/s at which all of it is lost
     turn = 1.1 * enough * DT
@@ -137,16 +145,18 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
         ((0, 0, turn), 0.05 * lag**3, lag),
         ((0, 0, turn), 0.05 * lag**4, lag**2),
     ):
-        gusts.update_gust(record, y, np.array(attitude), DT)
-        assert record["memory"]["gust"][2] == pytest.approx(gust)
-        assert record["memory"]["turning_share"] == pytest.approx(turning)
-        record["memory"]["force"] = 0.0, 0.0, -GRAVITY
+        gusts.update_gust_rotation(record, y, np.array(attitude), DT)
+        assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(gust)
+        assert record["memory"]["unmeasured_share_by_past_turns"] == pytest.approx(turning)
+        record["memory"]["specific_force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
-    gusts.update_gust(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["memory"]["lost_share"] == pytest.approx(0.25)
-    assert record["memory"]["turning_share"] == pytest.approx(max(lag**3, 0.25))
+    gusts.update_gust_rotation(record, y, np.array([0, 0, turn + part]), DT)
+    assert record["memory"]["unmeasured_share_by_turn"] == pytest.approx(0.25)
+    assert record["memory"]["unmeasured_share_by_past_turns"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
-    assert record["memory"]["gust"][2] == pytest.approx(0.05 * lag**5 - aside / (45.0 * tau_r))
+    assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(
+        0.05 * lag**5 - aside / (45.0 * tau_r)
+    )
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -162,49 +172,57 @@ def test_a_heading_that_turns_round_as_the_nose_passes_the_vertical_is_no_gust(l
             [0.0, 0.0, -GRAVITY]
         )  # nothing accelerates
 
-    y, record["memory"]["force"] = look(then, 1)
+    y, record["memory"]["specific_force"] = look(then, 1)
     gusts.start_gust_estimate(record, y, then)
-    record["memory"]["gust"][2] = 0.05
+    record["memory"]["air_rotation_in_level_axes"][2] = 0.05
     if late:  # the wind turns a step after the heading
         y, force = look(over, [-1, -1, 1])
-        gusts.update_gust(record, y, over, DT)
-        record["memory"]["force"] = force
-    gusts.update_gust(record, look(over, 1)[0], over, DT)
-    assert abs(record["memory"]["gust"][2]) <= 0.05
-    unseen, record["memory"]["unmeasured_share"] = np.array(record["memory"]["unmeasured_share"]), np.ones(3)
-    record["output"]["damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["axes"].T
-    everything = gusts.unmeasured_gust_drift(record, 45.0, 2, 2)
-    record["memory"]["unmeasured_share"] = unseen
-    assert gusts.unmeasured_gust_drift(record, 45.0, 2, 2) == pytest.approx(everything)
+        gusts.update_gust_rotation(record, y, over, DT)
+        record["memory"]["specific_force"] = force
+    gusts.update_gust_rotation(record, look(over, 1)[0], over, DT)
+    assert abs(record["memory"]["air_rotation_in_level_axes"][2]) <= 0.05
+    unseen, record["memory"]["unmeasured_intensity_share"] = (
+        np.array(record["memory"]["unmeasured_intensity_share"]),
+        np.ones(3),
+    )
+    record["output"]["rate_damping"] = np.diag([0.0, 0.0, 5.0]) @ record["output"]["gust_axes_in_body"].T
+    everything = gusts.unmeasured_gust_drift_intensity(record, 45.0, 2, 2)
+    record["memory"]["unmeasured_intensity_share"] = unseen
+    assert gusts.unmeasured_gust_drift_intensity(record, 45.0, 2, 2) == pytest.approx(everything)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_level_axes_are_a_rotation(seed):
     phi, theta = np.random.default_rng(seed).uniform(-1.4, 1.4, 2)
     turn, body = np.full((3, 3), 9.0), np.random.default_rng(seed + 10).normal(size=3)
-    gusts.fill_level_axes(phi, theta, turn)
+    gusts.fill_level_to_body_rotation(phi, theta, turn)
     of_level = to_earth((phi, theta, 0.0))
     assert turn == pytest.approx(of_level.inv().as_matrix(), abs=1e-15)
-    assert [gusts.to_level(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
+    assert [gusts.level_component(turn, body, i) for i in range(3)] == pytest.approx(of_level.apply(body))
 
 
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
-    record = new_air(started=1, lost_share=0.4, turning_share=0.3, gust=(0.1, 0.2, 0.3))
+    record = new_air(
+        has_acceleration_before=1,
+        unmeasured_share_by_turn=0.4,
+        unmeasured_share_by_past_turns=0.3,
+        air_rotation_in_level_axes=(0.1, 0.2, 0.3),
+    )
     gusts.start_gust_estimate(record, *flight.reading())
     assert (
-        record["memory"]["started"],
-        record["memory"]["lost_share"],
-        record["memory"]["turning_share"],
+        record["memory"]["has_acceleration_before"],
+        record["memory"]["unmeasured_share_by_turn"],
+        record["memory"]["unmeasured_share_by_past_turns"],
     ) == (
         0,
         0.0,
         0.0,
     )
-    assert not record["memory"]["gust"].any()
-    assert record["output"]["axes"] == pytest.approx(record["memory"]["level_to_body"])
+    assert not record["memory"]["air_rotation_in_level_axes"].any()
+    assert record["output"]["gust_axes_in_body"] == pytest.approx(record["memory"]["level_to_body"])
     through = Rotation.from_euler("z", -flight.attitude[2]).apply(flight.velocity - flight.wind)
-    assert record["memory"]["velocity"] == pytest.approx(through)
+    assert record["memory"]["air_relative_velocity"] == pytest.approx(through)
 
 
 def without_inertia(design):
@@ -218,13 +236,13 @@ def without_inertia(design):
 def test_what_a_gust_does_is_what_the_opposite_rates_would():
     """By differences of the design model's own response, whose inertia terms the air knows nothing of."""
     design = design_record().view(np.recarray)
-    record = new_air(area_per_mass=0.01)
+    record = new_air(wing_area_per_mass=0.01)
     fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
-    record["memory"]["gust"] = 0.0, 0.02, -0.03
+    record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
     gusts.fill_gust_effect(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
-    assert record["memory"]["rotation"] == pytest.approx(rotation)
+    assert record["memory"]["air_rotation_in_body_axes"] == pytest.approx(rotation)
 
     def acceleration(x):
         f, G = np.zeros(3), np.zeros((3, 4))
@@ -233,24 +251,24 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
 
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
-    assert record["output"]["acceleration"] == pytest.approx(expected, rel=1e-6)
+    assert record["output"]["gust_acceleration"] == pytest.approx(expected, rel=1e-6)
     gusts.fill_gust_effect(record, design[0], X, Y, U)
     gusts.begin_gust_sums(record, 45.0, 0.01)
-    record["output"]["acceleration"] = 0.0
-    assert record["memory"]["acceleration_sum"] == pytest.approx(expected, rel=1e-6)
+    record["output"]["gust_acceleration"] = 0.0
+    assert record["memory"]["gust_angular_acceleration_sum"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(
         (
-            "gust",
-            "started",
-            "lost_share",
-            "turning_share",
-            "turn_variance_now",
-            "turn_variance_before",
-            "turn_variance",
-            "turn_frames",
+            "air_rotation_in_level_axes",
+            "has_acceleration_before",
+            "unmeasured_share_by_turn",
+            "unmeasured_share_by_past_turns",
+            "axes_turn_variance_now",
+            "axes_turn_variance_before",
+            "axes_turn_variance",
+            "n_axes_turn_frames",
         ),
         1,
     )
@@ -270,13 +288,16 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     record, seen = new_air(), []
     gusts.start_gust_estimate(record, y, level)
     for _ in range(4000):
-        record["memory"]["force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
+        record["memory"]["specific_force"] = -GRAVITY * np.array([-np.sin(alpha), 0.0, np.cos(alpha)])
         blurred = level.copy()
         blurred[place] += np.radians(std_deg) * rng.normal()
-        gusts.update_gust(record, y, blurred, DT)
-        seen.append(record["memory"]["gust"].copy())
+        gusts.update_gust_rotation(record, y, blurred, DT)
+        seen.append(record["memory"]["air_rotation_in_level_axes"].copy())
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
-    counted, reckoned = np.std(seen, axis=0)[1:] * lags, bounds.flow_angle_noise(SensorErrors(sensors), 45.0)
+    counted, reckoned = (
+        np.std(seen, axis=0)[1:] * lags,
+        bounds.level_flow_angle_noise_std(SensorErrors(sensors), 45.0),
+    )
     assert (counted <= 1.02 * reckoned).all()
     if axis is not None:
         assert counted[axis - 1] == pytest.approx(reckoned[axis - 1], rel=0.05)

@@ -14,15 +14,15 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.extensions import watch_imports
+from beaver_ftc.plugins import watch_imports
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from beaver_ftc.aircraft.aircraft import Aircraft
-    from beaver_ftc.control.base import Law, Reference
+    from beaver_ftc.control import Law, Reference
     from beaver_ftc.design.context import Context
-    from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.diagnosis import Detector, Measured, Verdict
     from beaver_ftc.loop.stream import Diagnosis
     from beaver_ftc.plant.conditions import linearise, trim
     from beaver_ftc.results.flight import Flight, fly, open_run
@@ -36,9 +36,9 @@ __version__ = "0.1.0"
 
 # Public name -> module, or module:name there, by which it is found at first use.
 _WHERE = {
-    **dict.fromkeys(("Detector", "Measured", "Verdict"), "beaver_ftc.diagnosis.base"),
+    **dict.fromkeys(("Detector", "Measured", "Verdict"), "beaver_ftc.diagnosis"),
     **dict.fromkeys(("Flight", "fly", "open_run"), "beaver_ftc.results.flight"),
-    **dict.fromkeys(("Law", "Reference"), "beaver_ftc.control.base"),
+    **dict.fromkeys(("Law", "Reference"), "beaver_ftc.control"),
     **dict.fromkeys(("linearise", "trim"), "beaver_ftc.plant.conditions"),
     "Context": "beaver_ftc.design.context",
     "Diagnosis": "beaver_ftc.loop.stream",

@@ -45,7 +45,7 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from beaver_ftc.documents.files import Document
-from beaver_ftc.extensions import entries, loaded, required
+from beaver_ftc.plugins import entries, loaded, required
 
 __all__ = [
     "COMMANDS", "GROUP", "GROUPS", "Reporter", "ScenarioArgument", "StudyCommand", "WorkersOption", "declare",
@@ -175,7 +175,9 @@ SCENARIO = typer.Argument(
     metavar="SCENARIO", help="A file, or the name of a built-in scenario.", autocompletion=complete_names
 )
 ScenarioArgument = Annotated[str, SCENARIO]
-WorkersOption = Annotated[int | None, typer.Option(min=1, max=1024, help="Processes; default: one a core.")]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one for each core.")
+]
 AirspeedOption = Annotated[float | None, typer.Option(min=1, max=1000)]
 AirspeedsOption = Annotated[list[float] | None, typer.Option(min=1, max=1000)]
 AltitudeOption = Annotated[float | None, typer.Option(min=-300, max=30000)]

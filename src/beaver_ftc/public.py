@@ -35,12 +35,13 @@ def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
 
 @cache
 def published(package: str) -> dict[str, tuple[str, str]]:
-    """{public name: (module, name there)} of the imports that a package lists under TYPE_CHECKING."""
+    """{public name: (module, name there)} of the imports that a package lists under TYPE_CHECKING, where an
+    `else` follows; without one they are for its annotations."""
     tree = ast.parse(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
     blocks = (
         node.body
         for node in tree.body
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        if isinstance(node, ast.If) and node.orelse and ast.unparse(node.test) == "TYPE_CHECKING"
     )
     imports = (node for block in blocks for node in block if isinstance(node, ast.ImportFrom))
     return {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from beaver_ftc.design.air import SCALE_M, Dryden, rotation_lengths
+from beaver_ftc.design import SCALE_M, Dryden, rotation_lengths
 
 
 @pytest.mark.parametrize("span_m", [2.09, 14.63])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.air import Dryden
+from beaver_ftc.design import Dryden
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import NEVER, GustSchedule, configure, take_off, trim_of
 from beaver_ftc.scenario.airframe import Gust

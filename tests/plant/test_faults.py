@@ -7,8 +7,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from beaver_ftc.plant.faults import NEVER, FaultSchedule, frame_of
-from beaver_ftc.scenario.faults import HEALTHY, TYPES, Fault, FaultType
-from beaver_ftc.scenario.faults.base import SurfaceFault
+from beaver_ftc.scenario.faults import HEALTHY, TYPES, Fault, FaultType, SurfaceFault
 
 RATE_HZ = 100
 

@@ -39,6 +39,10 @@ class Noted(Plant):
         self.written[name] = value
         super().write(name, value)
 
+    def write_all(self, names, values):
+        self.written |= zip(names, values, strict=True)
+        super().write_all(names, values)
+
 
 def written(plant):
     return dict(sorted(plant.written.items()))

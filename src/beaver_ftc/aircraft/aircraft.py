@@ -276,8 +276,8 @@ class Aircraft:
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
 
     def separated_by_force(self, force: str) -> tuple[int, ...]:
-        """The surfaces, by number, that a force distinguishes where the rates alone do not: CZ those that
-        lead pitch, by their lift, CY the others; none if there is but one."""
+        """Numbers of the surfaces that a force distinguishes and the rates do not: CZ those that
+        lead pitch, by their lift, CY the others; none if there is only one."""
         moved = {term.surface for term in self.measurable_forces if term.coefficient == force}
         lead = enumerate(zip(self.surfaces, self.dominant_axis, strict=True))
         found = tuple(s for s, (name, axis) in lead if (axis == 1) == (force == "CZ") and name in moved)
@@ -297,7 +297,7 @@ class Aircraft:
     def coefficient(self, name: str, of: Mapping[str, Any], scale: Mapping[str, float] | None = None) -> Any:
         """One coefficient as the sum of its terms; `of` has a value for every signal and surface.
 
-        A plain sum for those who want one number now and then; `scale` multiplies single terms.
+        A plain sum, for occasional use; `scale` multiplies single terms.
         """
         scale = scale or {}
         terms = self._terms_of[name]
@@ -312,7 +312,7 @@ class Aircraft:
         }
 
     def index(self, term: str) -> int:
-        """Place of a moment's term in `moments`. Raises KeyError for a name the file lacks."""
+        """Index of a term in `moments`. Raises KeyError for a name that is not in the file."""
         return self._places[term]
 
     @cached_property
@@ -431,10 +431,10 @@ def _root() -> Path:
 
 
 def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
-    """The aircraft a scenario names, as its file says; `beside` is the folder the scenario is in.
+    """Load the aircraft of a scenario from its file; `beside` is the folder of the scenario.
 
-    Raises UnknownAircraft for what is no aircraft, NotDerived for one whose file is yet to be made, and
-    ScenarioError with one line a mistake in its file.
+    Raises UnknownAircraft for an unknown name, NotDerived for an aircraft that has not been derived yet, and
+    ScenarioError with one line for each mistake in its file.
     """
     if not isinstance(reference, str):
         raise UnknownAircraft(f"{reference!r:.60} is no aircraft, allowed: {_ALLOWED}")

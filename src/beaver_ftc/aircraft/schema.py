@@ -41,14 +41,14 @@ def _not_nothing(share: float) -> float:
 
 
 class OutputSection(Section):
-    """One output of an autopilot, as one surface or the engine takes it.
+    """One output of an autopilot that moves a surface or the engine.
 
-    channel: number of the output, 1 the first
-    share: how much of the way to the stop full output is; below 0 towards the other one
-    reversed: whether a longer pulse is less
+    channel: number of the output, counted from 1
+    share: deflection at full output, as a share of the travel to the stop; negative: towards the other stop
+    reversed: true: a longer pulse gives a smaller deflection; together with a negative `share` the two cancel
     pwm_us: shortest and longest pulse, us
-    trim_us: pulse that leaves a surface at 0 and closes a throttle, us; by itself the middle, of a throttle
-        the lower end
+    trim_us: pulse that puts a surface at 0 deg and closes a throttle; left out: the middle of `pwm_us`, for a
+        throttle its lower end, us
     """
 
     channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
@@ -70,7 +70,7 @@ class OutputSection(Section):
 
 
 class ChannelsSection(Section):
-    """Outputs of an autopilot, by what they move; a surface that is not here keeps its trim.
+    """Outputs of an autopilot, by the part that they move. A surface that is not listed stays at trim.
 
     surfaces: the outputs of each surface
     throttle: the output of the engine
@@ -130,7 +130,7 @@ Stops = Annotated[tuple[_Stop, _Stop], AfterValidator(_in_order)]
 
 
 class SurfaceSection(Section):
-    """One control surface: its properties in JSBSim, and how far it goes."""
+    """One control surface: its properties in JSBSim, and its travel."""
 
     command: Property = Field(
         description="property that commands the deflection", examples=["fcs/elevator-cmd-rad"]
@@ -147,14 +147,17 @@ class SurfaceSection(Section):
 
 
 class SignalSection(Section):
-    """A measured dimensionless signal beside rates, alpha, beta, airspeed and dynamic pressure."""
+    """A measured dimensionless signal in addition to rates, alpha, beta, airspeed and dynamic pressure."""
 
-    property: Property = Field(description="property that holds it", examples=["aero/dpt"])
-    sensed: Literal[True] = Field(default=True, description="that an instrument measures it", examples=[True])
+    property: Property = Field(description="property with the value of the signal", examples=["aero/dpt"])
+    sensed: Literal[True] = Field(
+        default=True, description="whether an instrument measures it: always true", examples=[True]
+    )
 
 
 class MassSection(Section):
-    """Mass and inertia about the centre of gravity, body axes; Jxz enters the tensor with a minus sign."""
+    """Mass, and inertia about the centre of gravity in body axes. Jxz enters the inertia tensor with a minus
+    sign."""
 
     mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7, examples=[2288.231])
     Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9, examples=[5368.39])
@@ -180,17 +183,23 @@ class GeometrySection(Section):
 
 
 class TermSection(Section):
-    """One term of a coefficient.
+    """One term of a coefficient: its value times powers of signals and, if given, times a deflection.
 
-    name: of the term: unique, and what `uncertainty.coefficients` calls it
-    source: where the value is from
-    description: what the term is
+    name: unique name of the term; `uncertainty.coefficients` uses it
+    source: source of the value
+    description: meaning of the term
     """
 
     name: Name = entry(..., examples=["Cm_alpha"])
-    value: Number = number(..., "1", "per rad of each angle or deflection", range="any", examples=[-0.6028])
+    value: Number = number(
+        ..., "1", "coefficient, per rad of each angle or deflection in it", range="any", examples=[-0.6028]
+    )
     of: dict[str, Power] = Field(
-        default_factory=dict, description="power of each signal it multiplies", examples=[{"alpha": 1}]
+        default_factory=dict,
+        description="exponent of each factor. A factor is `alpha`, `beta` (rad), `ph`, `qh`, `rh` "
+        "(dimensionless rates) or a signal of the file, in `forces` also `betadoth`. A term of `moments` "
+        "with a `surface` has no rate as a factor",
+        examples=[{"alpha": 1}],
     )
     surface: Name | None = Field(
         default=None, description="the surface whose deflection it multiplies", examples=["elevator"]
@@ -226,11 +235,11 @@ class Forces(Section):
 
 
 class EnvelopeSection(Section):
-    """Where the terms hold.
+    """Flight conditions in which the terms are valid.
 
     airspeed_mps: lowest and highest true airspeed, m/s
     alpha_deg: lowest and highest angle of attack, deg
-    altitude_m: lowest and highest altitude above sea level, m; left out: any
+    altitude_m: lowest and highest altitude above sea level; left out: any altitude, m
     """
 
     airspeed_mps: Interval = entry(..., examples=[[30, 55]])
@@ -242,24 +251,25 @@ _Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "share 
 
 
 class TrimSection(Section):
-    """What trim moves beside the surfaces that lead an axis."""
+    """Parts that trim moves in addition to the main surface of each axis."""
 
     throttle: Property = Field(
         description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="of a surface that leads an axis: others that go with it, and what share of the way",
+        description="for a surface that trims an axis: other surfaces that move with it, and their share of "
+        "the way",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
 
 class LimitSection(Section):
-    """A property that must stay in a range in trim.
+    """A property that must be within a range in trim.
 
     property: property of JSBSim
-    says: what it is, for messages
-    unit: of the range, for messages
+    says: name of the property in messages
+    unit: unit of the range in messages
     range: lowest and highest value
     """
 
@@ -270,13 +280,9 @@ class LimitSection(Section):
 
 
 class SettingSection(LimitSection):
-    """An engine setting a scenario may give.
+    """An engine setting that a scenario can have.
 
-    property: property of JSBSim that sets it
-    says: what it is, for messages
-    unit: of the range, for messages
-    range: lowest and highest value
-    default: where a scenario says nothing
+    default: value if the scenario has none
     """
 
     default: Number = number(..., "as said", range="in `range`", examples=[100])
@@ -304,12 +310,12 @@ _Forces = Annotated[tuple[_Force, ...], Field(min_length=2, max_length=MAX_THRUS
 
 
 class ThrustSection(Section):
-    """Steady force that power adds along the body's x axis, by airspeed and by the setting that trim moves.
+    """Steady force of the engine along the body x axis, by airspeed and by the setting that trim moves.
 
     airspeed_mps: true airspeeds, m/s
-    setting: of the property that `trim.throttle` names
-    force_n: a row for each airspeed, in it a force for each setting, none less than the one before, N
-    lag_s: until 63 % of a change are there, s
+    setting: values of the property that `trim.throttle` names
+    force_n: one row for each airspeed, with a force for each setting; forces do not decrease, N
+    lag_s: time until 63 % of a change is reached, s
     """
 
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
@@ -329,12 +335,13 @@ class ThrustSection(Section):
 
 
 class EngineSection(Section):
-    """Settings of the engine, by their key in a scenario's `initial`, and limits of what they yield.
+    """Settings of the engine, by their key in the section `initial` of a scenario, and limits of the trim.
 
-    start: how they come to run: at once, by their starters with time to come to speed, or not
-    settings: what a scenario may set
-    limits: what must stay in a range in trim
-    thrust: what the setting that trim moves gives; left out: an airspeed is held only by what forces say
+    start: how the engines start; `steady`: at once, `run_up`: by starters, which takes time, `off`: not at
+    all
+    settings: settings that a scenario can have
+    limits: properties that must be within a range in trim
+    thrust: force at each value of the setting that trim moves; left out: airspeed is held with `forces` alone
     """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
@@ -344,21 +351,24 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine that the law may move alone: what it gives along the body's x axis turns the aircraft about
-    the centre of gravity by its arms.
+    """An engine with a lever of its own, which the law moves: its force along the body x axis turns the
+    aircraft about
+    the centre of gravity.
 
-    throttle: property that is added to the power lever of this engine alone, in the units of its setting
-    share: of the thrust of all, `engine.thrust`
+    throttle: property that is added to the lever of this engine alone, in the unit of its setting
+    share: share of the thrust of all engines, `engine.thrust`
     """
 
     throttle: Property = entry(..., examples=["fcs/actuated-throttle-0-difference"])
-    share: Number = number(..., "1", "of the thrust of all engines", gt=0, le=1, examples=[0.5])
-    right_m: Number = number(..., "m", "of the centre of gravity", ge=-100, le=100, examples=[-4.9])
-    down_m: Number = number(0.0, "m", "of the centre of gravity", ge=-100, le=100, examples=[1.1])
+    share: Number = number(..., "1", "share of the thrust of all engines", gt=0, le=1, examples=[0.5])
+    right_m: Number = number(
+        ..., "m", "distance to the right of the centre of gravity", ge=-100, le=100, examples=[-4.9]
+    )
+    down_m: Number = number(0.0, "m", "distance below the centre of gravity", ge=-100, le=100, examples=[1.1])
 
 
 class ModelErrorSection(Section):
-    """Largest error of the angular accelerations, as measured where the terms were derived."""
+    """Largest error of the angular accelerations, measured when the terms were derived."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
@@ -374,8 +384,8 @@ Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
 
 
 class ErrorBox(Section):
-    """A box of states, and the largest error in it: a row for each age of the flight, in it a value for each
-    share of the surfaces' travel.
+    """A box of states, and the largest error in it. An error has a row for each age of the flight, with a
+    value for each share of the surfaces' travel.
 
     airspeed_mps: true airspeed, m/s
     alpha_rad: angle of attack, rad
@@ -383,12 +393,13 @@ class ErrorBox(Section):
     p_rad_s: roll rate, rad/s
     q_rad_s: pitch rate, rad/s
     r_rad_s: yaw rate, rad/s
-    density_kg_m3: of the air, kg/m3
+    density_kg_m3: air density, kg/m3
     signals: a range for each declared signal
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: Cn of engines beyond what their thrust gives, at most, all levers alike; left out: unknown
+    engines_apart: largest Cn of the engines with equal levers, in addition to that of their thrust; left out:
+    unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -412,15 +423,21 @@ class ErrorBox(Section):
 
 
 class ErrorMapSection(Section):
-    """The error of the angular accelerations where it was measured, from the innermost box outwards.
+    """The measured error of the angular accelerations, in nested boxes of states.
 
-    Outside of all boxes nothing is known: no alarm is raised there.
-    boxes: from the innermost outwards
+    Outside of all boxes the error is unknown, and no alarm is raised.
+    boxes: the boxes, the innermost one first
     """
 
-    travel_share: Shares = number(..., "share of 1", "shares of the surfaces' travel, rising", examples=[[1]])
+    travel_share: Shares = number(
+        ..., "share of 1", "shares of the travel of the surfaces, rising", examples=[[1]]
+    )
     stand_ins: Number = number(
-        1.0, unit="share of 1", says="of these but the last, for surfaces that stand in", gt=0, le=1
+        1.0,
+        unit="share of 1",
+        says="factor on all shares but the last, for surfaces that only replace others",
+        gt=0,
+        le=1,
     )
     until_s: Ages = entry(
         ..., "ages of a flight, rising: fuel burns, and the inertia changes, s", examples=[[600]]
@@ -447,7 +464,7 @@ class ErrorMapSection(Section):
 
 
 class StartSection(Section):
-    """Where a flight starts unless its scenario says otherwise."""
+    """Flight condition at the start, if the scenario has no other."""
 
     airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
     altitude_m: Number | None = number(
@@ -456,23 +473,30 @@ class StartSection(Section):
 
 
 class GroundSection(Section):
-    """The ground, of an aircraft that can be told of one: elsewhere it flies on below sea level.
+    """The aircraft on the ground. Without this section there is no ground, not even at sea level.
 
-    present: property that is 1 where there is a ground, 0 where there is none
+    present: property that is 1 if there is a ground, otherwise 0
     """
 
     present: Property = entry(..., examples=["ground/present"])
     height_m: Number = number(
-        ..., unit="m", says="of the centre of gravity, standing", gt=0, le=100, examples=[1.5]
+        ...,
+        unit="m",
+        says="height of the centre of gravity when the aircraft stands",
+        gt=0,
+        le=100,
+        examples=[1.5],
     )
-    pitch_deg: Number = number(..., unit="deg", says="attitude, standing", ge=-45, le=45, examples=[11])
+    pitch_deg: Number = number(
+        ..., unit="deg", says="pitch angle when the aircraft stands", ge=-45, le=45, examples=[11]
+    )
 
 
 class DamageSection(Section):
-    """One case of damage: of several at once the aircraft has the first.
+    """One case of damage. If several are set at once, only the first one acts.
 
-    property: property that is 1 where it is there, 0 where not
-    takes: surfaces that are lost with it
+    property: property that is 1 if the damage is present, otherwise 0
+    takes: surfaces that the damage removes
     """
 
     property: Property = entry(..., examples=["failures/damage/left-wing-tip-off"])
@@ -482,26 +506,26 @@ class DamageSection(Section):
 class AircraftFile(Section):
     """The whole file.
 
-    jsbsim: the JSBSim model beside this file
-    groups: who can stand in for whom, in the order of hand-over
-    model_error_rad_s2: added to the declared bound of the uncertainty
-    model_error_map: where in the envelope the error is how large, in place of one value
-    channels: which output of an autopilot moves which surface
-    ground: how it stands; without it no flight begins on the ground
-    damage: cases of damage that a scenario may inflict, by name
-    name: of the aircraft
-    description: what it is, in a line
+    jsbsim: the JSBSim model, a file beside this one
+    groups: groups of surfaces that can replace each other, in the order in which they take over
+    model_error_rad_s2: largest model error, which is added to the declared bound
+    model_error_map: largest model error in each part of the envelope, instead of one value
+    channels: outputs of an autopilot, and the surfaces that they move
+    ground: the aircraft on the ground; left out: no flight begins on the ground
+    damage: cases of damage that a scenario can have, by name
+    name: name of the aircraft
+    description: one line about the aircraft
     surfaces: three or more control surfaces, by name
     signals: measured dimensionless signals that terms multiply
     mass: mass and inertia
     geometry: reference dimensions
     moments: terms of the moment coefficients
     forces: terms of the force coefficients; left out: no airspeed can be held
-    envelope: where the terms hold
-    trim: what trim may move beside the surfaces
+    envelope: range in which the terms are valid
+    trim: parts that trim moves in addition to the main surfaces
     engine: settings and limits of the engine
-    effectors: engines that turn the aircraft where surfaces no longer reach, by name
-    start: where a flight starts unless its scenario says otherwise
+    effectors: engines that turn the aircraft if surfaces are not enough, by name
+    start: flight condition at the start, if the scenario has no other
     """
 
     name: Name = entry(..., examples=["my-uav"])

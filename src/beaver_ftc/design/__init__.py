@@ -1,12 +1,167 @@
-"""The design model: f, G, their sensitivities, and what the designer knows of air and actuators."""
+"""The design model: f, G, their sensitivities, and what the designer knows of air and actuators.
 
-from typing import TYPE_CHECKING
+The air is in this file: the standard atmosphere up to 20 km [ISA], and turbulence by Dryden's spectra, its
+speed [MIL-F-8785C, 3.7] and its rotation [Yeager1998]. The vertical gust has standard deviation sigma_w and
+scale L, the lateral gust is its like, both functions of height. Above 2000 ft they are constant; below 1000
+ft sigma_w is a tenth of the wind at 20 ft and L is the height; between the two heights both go from the one
+to the other, and what follows from them is below the values above 2000 ft.
+"""
 
+from dataclasses import dataclass
+from math import exp, log, pi, sqrt
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, M_PER_FT
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.design.air import standard_air
-    from beaver_ftc.design.context import Context, Declared, DesignFunctions
-    from beaver_ftc.design.model import AXES, N_Y, design_record, inertia_coefficients, inertial
+    from beaver_ftc.design.context import Context, Declared
+    from beaver_ftc.design.model import (
+        AXES,
+        N_Y,
+        DesignFunctions,
+        design_record,
+        inertia_coefficients,
+        inertial,
+    )
 else:
     __getattr__, __dir__ = lazily(__name__)
+
+
+T0_K, LAPSE_K_M, P0_HPA, SCALE, STRATOSPHERE_M = 288.15, 0.0065, 1013.25, 5.2558797, 11000.0
+R_AIR, PA_PER_HPA, KELVIN_AT_0_C = 287.05287, 100.0, 273.15
+
+
+def standard_air(altitude_m: float) -> tuple[float, float]:
+    """Pressure, hPa, and temperature, deg C."""
+    low_m = min(altitude_m, STRATOSPHERE_M)
+    kelvin = T0_K - LAPSE_K_M * low_m
+    pressure = P0_HPA * (kelvin / T0_K) ** SCALE
+    return pressure * exp(-GRAVITY_MPS2 * (altitude_m - low_m) / (R_AIR * kelvin)), kelvin - KELVIN_AT_0_C
+
+
+def standard_air_density(altitude_m: float) -> float:
+    """Density of the air, kg/m3."""
+    pressure_hpa, celsius = standard_air(altitude_m)
+    return PA_PER_HPA * pressure_hpa / (R_AIR * (celsius + KELVIN_AT_0_C))
+
+
+def altitude_of(density_kg_m3: float) -> float:
+    """The altitude at which the air has this density, m: the inverse of `standard_air_density`."""
+    tropopause = standard_air_density(STRATOSPHERE_M)
+    if density_kg_m3 >= tropopause:
+        share = density_kg_m3 / standard_air_density(0.0)
+        return T0_K / LAPSE_K_M * (1.0 - share ** (1.0 / (SCALE - 1.0)))
+    scale_m = R_AIR * (T0_K - LAPSE_K_M * STRATOSPHERE_M) / GRAVITY_MPS2
+    return STRATOSPHERE_M + scale_m * log(tropopause / density_kg_m3)
+
+
+Severity = Literal["none", "light", "moderate", "severe"]
+SEVERITIES: tuple[Severity, ...] = ("none", "light", "moderate", "severe")
+
+# Largest vertical gust (standard deviation, ft/s) above 2000 ft, and its scale [MIL-F-8785C, fig. 7, 3.7.2].
+GUST_FT_S = {"none": 0.0, "light": 7.4, "moderate": 10.6, "severe": 23.6}
+SCALE_FT = 1750.0
+SCALE_M = M_PER_FT * SCALE_FT
+# Below 1000 ft: wind at 20 ft, of 15, 30 and 45 kt, and a tenth of it, the gusts, ft/s [MIL-F-8785C, 3.7.3].
+WIND_AT_20_FT = {"light": 25.3, "moderate": 50.6, "severe": 76.0}
+LOW_GUST_FT_S = {"none": 0.0, "light": 2.53, "moderate": 5.06, "severe": 7.6}
+EXCEEDENCE = {"light": 3, "moderate": 4, "severe": 6}  # JSBSim's number of the curve in fig. 7
+LEAST_HEIGHT_M = 3.048  # 10 ft: below this height turbulence is as at this height
+# Of the rotating gusts the rolling one is the strongest: sigma_p = ROLLING sigma_w / sqrt(L b), and it
+# returns within sqrt(L b) / (ROLLING_LAG V) [Yeager1998, eq. 8].
+ROLLING, ROLLING_LAG = 1.9, 2.6
+
+
+@dataclass(frozen=True)
+class Dryden:
+    """Turbulence of one severity; `none` is still air. Spans and lengths in m, speeds in m/s."""
+
+    severity: Severity = "none"
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is any turbulence."""
+        return self.severity != "none"
+
+    @property
+    def rank(self) -> int:
+        """0 for still air, then one more for each severity."""
+        return SEVERITIES.index(self.severity)
+
+    @property
+    def sigma_mps(self) -> float:
+        """Standard deviation of the vertical gusts above 2000 ft; their scale is SCALE_M."""
+        return M_PER_FT * GUST_FT_S[self.severity]
+
+    @property
+    def low_sigma_mps(self) -> float:
+        """The same below 1000 ft, where their scale is the height."""
+        return M_PER_FT * LOW_GUST_FT_S[self.severity]
+
+    def rotation_limit_rad_s(self, span_m: float) -> float:
+        """Standard deviation of the air's rotation about any axis: that of the rolling gust."""
+        span_ft = span_m / M_PER_FT
+        return ROLLING * GUST_FT_S[self.severity] / sqrt(SCALE_FT * span_ft)
+
+    def low_rotation_limit_rad_s(self, span_m: float) -> float:
+        """The same below 1000 ft times the root of the height in m, rad/s m^0.5."""
+        return ROLLING * self.low_sigma_mps / sqrt(span_m)
+
+    def rotation(self, airspeed_mps: float, span_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Standard deviation (3,) rad/s and correlation time (3,) s of the air's rotation [Yeager1998].
+
+        Rolling: a first-order process of its own (eq. 8 to 10). Pitching and yawing: the slope of the
+        vertical and the lateral gusts along the flight path, s / V / (1 + tau s) of each; through Dryden's
+        spectrum the variance is sigma^2 / 2 L^2 (3 / (k (1 + k)) - 1 / (1 + k)^2), k = tau V / L.
+        """
+        sigma, L, length = self.sigma_mps, SCALE_M, rotation_lengths(span_m)
+        k = length / L
+        rotation = sigma / L * np.sqrt(1.5 / (k * (1.0 + k)) - 0.5 / (1.0 + k) ** 2)
+        rotation[0] = ROLLING * sigma / sqrt(L * span_m)
+        return rotation, length / airspeed_mps
+
+    def rotation_walk(self, span_m: float) -> np.ndarray:
+        """Intensity of the random walk that each rotating gust is over times short beside its own, over V.
+
+        (3,) rad2/s3 per m/s, for roll, pitch and yaw. The rolling gust is a first-order process of deviation
+        sigma and lag tau: 2 sigma^2 / tau [Yeager1998, eq. 8]. The others are lagged slopes of a velocity of
+        intensity 3 sigma_w^2 V / L [MIL-F-8785C, 3.7], over (V tau)^2.
+        """
+        return _rotation_walk(self.sigma_mps, SCALE_M, span_m)
+
+    def rotation_walk_at_1_m(self, span_m: float) -> np.ndarray:
+        """The same by the formulas below 1000 ft, where the scale is the height, h in m: over h^1.5 the
+        rolling one, over h the pitching one, and a bound on the yawing one.
+
+        The lateral gust has sigma_v^2 / L_v = sigma_w^2 / h (0.177 + 0.000823 h / ft)^0.4, which is less.
+        """
+        return _rotation_walk(self.low_sigma_mps, 1.0, span_m)
+
+    def velocity_walk(self, airspeed_mps: float, faster: float = 1.0) -> float:
+        """Intensity, m2/s3, of the random walk that a vertical or lateral gust is over short times, for an
+        aircraft so many times faster than this airspeed: 3 sigma_w^2 V / L [MIL-F-8785C, 3.7.1]."""
+        return 3.0 * self.sigma_mps**2 * faster * airspeed_mps / SCALE_M
+
+    def angle_walk(self, airspeed_mps: float) -> float:
+        """Intensity, rad2/s, of the random walk of the flow's angle: that of the gust's speed over V^2."""
+        return 3.0 * self.sigma_mps**2 / (SCALE_M * airspeed_mps)
+
+    @property
+    def low_m(self) -> float:
+        """Height, m, below which gusts change faster than above 2000 ft, as their intensity sigma^2 / h is
+        larger there [MIL-F-8785C, 3.7.3]; 0 in still air."""
+        return SCALE_M * (self.low_sigma_mps / self.sigma_mps) ** 2 if self.moves else 0.0
+
+
+def rotation_lengths(span_m: float) -> np.ndarray:
+    """Distance flown within which the rolling, pitching and yawing gust returns, (3,) m [Yeager1998]."""
+    return np.array([sqrt(SCALE_M * span_m) / ROLLING_LAG, 4.0 * span_m / pi, 3.0 * span_m / pi])
+
+
+def _rotation_walk(sigma_w: float, L: float, b: float) -> np.ndarray:
+    rolling = 2.0 * ROLLING**2 * ROLLING_LAG * sigma_w**2 / (L * b) ** 1.5
+    velocity = 3.0 * sigma_w**2 / L
+    return np.array([rolling, velocity * (pi / (4 * b)) ** 2, velocity * (pi / (3 * b)) ** 2])

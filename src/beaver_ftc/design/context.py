@@ -3,35 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.aircraft import load
 
-
-class DesignFunctions:
-    """The design model as two functions, xdot = f(x, y) + G(y) u (see design/model.py for the order of y)."""
-
-    def __init__(self, record: np.ndarray) -> None:
-        from beaver_ftc.design.model import responses  # compiled: nothing for those who only list plug-ins
-
-        self._record, self._fill = record[0], responses
-
-    def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y. Of x (n, 3), (n, 3)."""
-        return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
-
-    def G(self, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration of each surface, (3, surfaces) rad/s2 per rad."""
-        return self._response(np.zeros((1, 3)), y)[1]
-
-    def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        f, G = np.empty(x.shape), np.zeros(self._record["G0"].shape)
-        self._fill(self._record, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
-        return f, G
-
-
-SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
+if TYPE_CHECKING:
+    from beaver_ftc.design.model import DesignFunctions
 
 
 _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
@@ -41,7 +20,7 @@ _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 class DeclaredErrors:
     """Declared errors beside the published bounds, as a plug-in is given them; zero where none is declared.
 
-    noise, bias, resolution, slope (7,): of the instruments, in the order of SIGNALS, SI; noise is the
+    noise, bias, resolution, slope (7,): of the instruments, in the order of sensors.SIGNALS, SI; noise is the
     standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,
     standard deviation and correlation time; gust_effect (3, 3) 1/s: the angular acceleration it causes.
     coefficients: tolerance of each moment coefficient, absolute, in the order of `Aircraft.moments`. inertia:
@@ -107,19 +86,19 @@ Declared = DeclaredErrors  # the name that plug-ins know
 
 @dataclass(frozen=True)
 class Context:
-    """Everything a plug-in may know before the flight; arrays are its own.
+    """The data that a plug-in receives before the flight. The arrays are copies.
 
-    dt_s: length of a frame. substeps: JSBSim frames in it. model: what the designer believes.
-    trim_x (3,) rad/s, trim_y (4 + signals,), trim_rad (surfaces,): the flight condition at the start.
-    travel_rad (2, surfaces): lower and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared
-    bounds of the uncertainty. seed: of everything random. options: `fdi.options` or `control.options` of the
-    scenario. declared: instruments, air and tolerances, as far as `fdi.bounds` declares them, and the
-    actuators. surfaces: their names. leading: which of them leads roll, pitch and yaw.
+    dt_s: length of a frame. substeps: JSBSim steps in it. model: the design model. trim_x (3,) rad/s, trim_y
+    (4 + signals,), trim_rad (surfaces,): the flight condition at the start. travel_rad (2, surfaces): lower
+    and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared bounds of the uncertainty. seed:
+    seed of the scenario. options: `fdi.options` or `control.options` of the scenario. declared: the other
+    sections of `fdi.bounds`, and the actuators. surfaces: names of the surfaces. leading: indices in
+    it of the main surfaces of roll, pitch and yaw; `leaders` has their names.
     """
 
     dt_s: float
     substeps: int
-    model: DesignFunctions
+    model: "DesignFunctions"
     trim_x: np.ndarray
     trim_y: np.ndarray
     trim_rad: np.ndarray

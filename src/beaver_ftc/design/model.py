@@ -1,32 +1,27 @@
-"""The design model, from its terms up: coefficients, actuators, engine, the dynamics, and models that are
-wrong on purpose.
-
-The one evaluator of an aircraft's coefficients: sums of terms, by looping over their table.
-
-A term is a value times a monomial of dimensionless signals and, if it has a surface, times that surface's
-deflection. The monomials form a chain: each is an earlier one times one signal, so it costs one
-multiplication. From the same table come the sums without surfaces (f), the slopes per rad of each surface
-(G), what each value multiplies, and the derivative of everything along a signal.
-
-The table holds three coefficients: Cl, Cm, Cn of the design model, or CX, CY, CZ. Its terms are sorted by
-coefficient, of each first those without a surface.
-
-What the diagnosis believes of the actuators: the aircraft's own first-order lag, rate limit and stops.
-
-    u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
-
-the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is where
-the model has it.
-
-The R-985 Wasp Junior and its slipstream, as FDC has them [FDC, Power].
-
-The design model: what the diagnosis and the laws believe of the (p, q, r) dynamics.
+"""The design model: what the diagnosis and the laws believe of the (p, q, r) dynamics.
 
     xdot = f(x, y) + G(y) u     x = (p, q, r), y = (alpha, beta, V, qdyn, declared signals), u: the surfaces
 
 [Zhang2005, eq. (2)] with the moment terms of the aircraft's file. The moment coefficients are linear in
-their values, so they are kept as a table: a bound on a coefficient is then a bound on an
-acceleration. What multiplies rate products and moments in the accelerations [FDC]:
+their values, so they are kept as a table: a bound on a coefficient is then a bound on an acceleration.
+
+*Table.* A term is a value times a monomial of dimensionless signals and, if it has a surface, times that
+surface's deflection. The monomials form a chain: each is an earlier one times one signal, so it costs one
+multiplication. From the same table come the sums without surfaces (f), the slopes per rad of each surface
+(G), what each value multiplies, and the derivative of everything along a signal. A table holds three
+coefficients, Cl, Cm, Cn or CX, CY, CZ; its terms are sorted by coefficient, of each first those without a
+surface.
+
+*Actuators.* The aircraft's own first-order lag, rate limit and stops:
+
+    u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
+
+the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is where the
+model has it.
+
+*Engine.* The R-985 Wasp Junior and its slipstream [FDC, Power].
+
+*Accelerations.* What multiplies rate products and moments [FDC]:
 
     pdot = Ppq p q + Pqr q r + Pn N + Pl L          Ir = Ix Iz - Jxz^2
     qdot = Qpp p^2 + Qpr p r + Qrr r^2 + Qm M
@@ -35,7 +30,7 @@ acceleration. What multiplies rate products and moments in the accelerations [FD
 Sign conventions: body axes X forward, Y right, Z down; positive moments right wing down, nose up, nose
 right.
 
-Design models that are wrong on purpose: what a designer may have simplified or mistaken.
+*Simplified models.* A scenario may ask for a model that is wrong on purpose (`design_of`, `anchor`):
 
     engine terms neglected, other coefficients, another mass or inertia     only other numbers in the record
     frozen alpha                f(x, y0) and G(y0) with alpha held at its trim value, all else as measured
@@ -268,12 +263,12 @@ def density_ratio(y):
 
 
 @kernel
-def slipstream_slopes(y, thin_air_kw):
+def slipstream_slopes(y, density_power_error_kw):
     """What dpt changes by per unit of airspeed, s/m, of dynamic pressure, 1/Pa, and of the power, 1/kW, from
-    which it is worked out; thin_air_kw: of that for the whole of the density."""
+    which it is worked out; density_power_error_kw: of that for the whole of the density."""
     V, qdyn = y[AIRSPEED], y[QDYN]
     per_kw = KW_TO_DPT / (qdyn * V)
-    thin = per_kw * thin_air_kw * density_ratio(y)
+    thin = per_kw * density_power_error_kw * density_ratio(y)
     return (2.0 * thin - (y[DPT] - DPT_0)) / V, -(thin + y[DPT] - DPT_0) / qdyn, per_kw
 
 
@@ -577,3 +572,23 @@ def linear_response(design, x, y, f, G):
             f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
         for s in range(G.shape[1]):
             G[i, s] = design.G0[i, s]
+
+
+class DesignFunctions:
+    """The design model as two functions, xdot = f(x, y) + G(y) u; y: see above."""
+
+    def __init__(self, record: np.ndarray) -> None:
+        self._record = record[0]
+
+    def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y. Of x (n, 3), (n, 3)."""
+        return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
+
+    def G(self, y: np.ndarray) -> np.ndarray:
+        """Angular acceleration of each surface, (3, surfaces) rad/s2 per rad."""
+        return self._response(np.zeros((1, 3)), y)[1]
+
+    def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        f, G = np.empty(x.shape), np.zeros(self._record["G0"].shape)
+        responses(self._record, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
+        return f, G

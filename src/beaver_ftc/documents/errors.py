@@ -2,7 +2,6 @@
 docstring says of a command's options and of a section's keys.
 """
 
-import re
 import sys
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
@@ -67,7 +66,12 @@ def split_docstring(docstring: str | None, names: Iterable[str]) -> tuple[str | 
     """The docstring without its end, and what it says there of each of these names: `name: ...`."""
     if docstring is None:
         return None, {}
-    about, *said = re.split(rf"^({'|'.join(names)}): ", cleandoc(docstring), flags=re.MULTILINE)
-    return about.rstrip(), {
-        name: " ".join(text.split()) for name, text in zip(said[::2], said[1::2], strict=True)
-    }
+    known, about = set(names), list[str]()
+    said, into = dict[str, list[str]](), about
+    for line in cleandoc(docstring).split("\n"):
+        name, colon, text = line.partition(": ")
+        if colon and name in known:
+            into = said[name] = [text]
+        else:
+            into.append(line)
+    return "\n".join(about).rstrip(), {name: " ".join(" ".join(of).split()) for name, of in said.items()}

@@ -181,7 +181,7 @@ _NO_LIST = ("list_type", "tuple_type")
 
 def _not_one_of(detail: Any, given: Any, here: list[dict[str, Any]]) -> _Said:
     if detail["type"] == "union_tag_invalid":
-        given, allowed = detail["ctx"]["tag"], detail["ctx"]["expected_tags"].replace("'", "").split(", ")
+        given, allowed = detail["ctx"]["tag"], [tag for node in here for tag in _types(node)]
         near = nearest(str(given), allowed)
     else:
         choices = list(map(str, _choices(here)))

@@ -2,7 +2,7 @@
 
 import warnings
 
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 
 __all__ = ["BeaverEnv", "BeaverVectorEnv"]
 

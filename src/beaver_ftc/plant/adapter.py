@@ -5,7 +5,7 @@ what fixes its state at one instant.
 import os
 import re
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from itertools import count, takewhile
@@ -26,6 +26,7 @@ from beaver_ftc.plant.model_file import check_model_has_no_side_effects, package
 
 START_LATITUDE_DEG = 45.0
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
+_AT_ZERO = dict.fromkeys(_STATES, 0.0)
 
 
 @dataclass(frozen=True, init=False)
@@ -69,7 +70,8 @@ class FlightState:
             surfaces_rad = at_neutral if surfaces_rad is None else surfaces_rad
             settings = by_default if settings is None else settings
         surfaces_rad, settings = dict(surfaces_rad), dict(settings)
-        for name in [name for name in given if name not in type(self).__dataclass_fields__]:
+        known = type(self).__dataclass_fields__
+        for name in [name for name in given if name not in known]:
             surface = name.removesuffix("_rad")
             if name in settings:
                 settings[name] = given.pop(name)
@@ -77,9 +79,8 @@ class FlightState:
                 surfaces_rad[surface] = given.pop(name)
             else:
                 raise TypeError(f"a flight condition has no {name!r}")
-        values = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m, **dict.fromkeys(_STATES, 0.0)}
-        for name, value in {**values, **given, "surfaces_rad": surfaces_rad, "settings": settings}.items():
-            object.__setattr__(self, name, value)
+        values = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m, **_AT_ZERO, **given}
+        self.__dict__.update(values, surfaces_rad=surfaces_rad, settings=settings)
 
     def __getattr__(self, name: str) -> float:
         own = self.__dict__
@@ -124,6 +125,13 @@ _AT_REST = str(data_root() / "aircraft" / "at_rest.xml")
 # divides the error by more than 100 (CY_betadot qdyn S b / 2 m V^2 is at most 0.01), so five leave nothing
 # above rounding.
 _RUNS_TO_SETTLE = 5
+
+# What places an aircraft. Body velocity after the attitude: JSBSim keeps what was set last when an earlier
+# quantity changes.
+_PLACED = (
+    "ic/lat-geod-deg", "ic/long-gc-deg", "ic/h-sl-ft", "ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad",
+    "ic/u-fps", "ic/v-fps", "ic/w-fps", "ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec",
+)  # fmt: skip
 
 _RUN_UP_S = 10.0  # in which a started engine comes to speed; a propeller's governor takes a few
 _BETWEEN_PLACINGS_S = 0.1  # the aircraft is put back where it was, so that it flies nowhere meanwhile
@@ -207,7 +215,11 @@ def translated(flown: Path | str) -> Iterator[None]:
         yield
     except jsbsim.BaseError as error:
         name = flown if isinstance(flown, str) else f"{flown.parent.name}/{flown.name}"
-        raise SimulationFailed(f"JSBSim cannot fly {name}: {' '.join(str(error).split())}") from None
+        raise _not_flown(name, error) from None
+
+
+def _not_flown(name: str, error: jsbsim.BaseError) -> SimulationFailed:
+    return SimulationFailed(f"JSBSim cannot fly {name}: {' '.join(str(error).split())}")
 
 
 def bare(model: Path, absent: Iterable[str] = ()) -> jsbsim.FGFDMExec:
@@ -253,6 +265,8 @@ class Plant:
         self._nodes: dict[str, jsbsim.FGPropertyNode] = {}
         self.as_loaded: dict[str, float] = {}  # of what has been written since
         self._inputs: dict[str, jsbsim.FGPropertyNode] = {}
+        self._getters: dict[tuple[str, ...], list[Callable[[], float]]] = {}
+        self._setters: dict[tuple[str, ...], list[Callable[[float], Any]]] = {}
         self.native = available() and _is_ours(model or self.aircraft.jsbsim)
         self.executive = 0  # its address, if compiled code may run it: see channels.py
         self.origin: object = None  # what it was loaded from, if it is to be flown again: see conditions.py
@@ -299,6 +313,19 @@ class Plant:
         """Set a property, in the unit its name says."""
         self.input(name).set_double_value(value)
 
+    def read_all(self, names: tuple[str, ...]) -> list[float]:
+        """The values of properties that are read again and again: quicker than one by one."""
+        if names not in self._getters:
+            self._getters[names] = [self.node(name).get_double_value for name in names]
+        return [get() for get in self._getters[names]]
+
+    def write_all(self, names: tuple[str, ...], values: Iterable[float]) -> None:
+        """Set properties that are set again and again, in this order."""
+        if names not in self._setters:
+            self._setters[names] = [self.input(name).set_double_value for name in names]
+        for put, value in zip(self._setters[names], values, strict=True):
+            put(value)
+
     def start(self, state: FlightState, wind_mps: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
         """Put the aircraft into a state at time 0: surfaces and engine in place, accelerations the state's.
 
@@ -338,8 +365,10 @@ class Plant:
         self._initialise()
 
     def _initialise(self) -> None:
-        with translated(self.aircraft.name):
+        try:
             initialised = self.fdm.run_ic()
+        except jsbsim.BaseError as error:
+            raise _not_flown(self.aircraft.name, error) from None
         if not initialised:
             raise SimulationFailed("JSBSim cannot initialise the flight")
 
@@ -352,6 +381,11 @@ class Plant:
         self._place(state)
         self._initialise()
         self.settle()
+
+    def pass_over(self, state: FlightState) -> None:
+        """Take from `hold` what later states depend on: the last bits of a place are what the places before
+        it have left in JSBSim's initial conditions."""
+        self._place(state)
 
     def _start_engines(self, state: FlightState) -> None:
         """Let all engines run as they do in steady flight with the power as it is set."""
@@ -416,23 +450,13 @@ class Plant:
 
     def _place(self, state: FlightState) -> None:
         V = state.airspeed_mps * FT_PER_M
-        initial = {
-            "lat-geod-deg": START_LATITUDE_DEG,
-            "long-gc-deg": 0.0,
-            "h-sl-ft": state.altitude_m * FT_PER_M,
-            "phi-rad": state.phi_rad,
-            "theta-rad": state.theta_rad,
-            "psi-true-rad": state.psi_rad,
-            # body velocity last: JSBSim keeps what was set last when an earlier quantity changes
-            "u-fps": V * cos(state.alpha_rad) * cos(state.beta_rad),
-            "v-fps": V * sin(state.beta_rad),
-            "w-fps": V * sin(state.alpha_rad) * cos(state.beta_rad),
-            "p-rad_sec": state.p_rad_s,
-            "q-rad_sec": state.q_rad_s,
-            "r-rad_sec": state.r_rad_s,
-        }
-        for name, value in initial.items():
-            self.write(f"ic/{name}", value)
+        alpha, beta = state.alpha_rad, state.beta_rad
+        along = cos(beta)
+        velocity = V * cos(alpha) * along, V * sin(beta), V * sin(alpha) * along
+        where = START_LATITUDE_DEG, 0.0, state.altitude_m * FT_PER_M
+        attitude = state.phi_rad, state.theta_rad, state.psi_rad
+        rates = state.p_rad_s, state.q_rad_s, state.r_rad_s
+        self.write_all(_PLACED, (*where, *attitude, *velocity, *rates))
 
 
 def body_axes(state: FlightState) -> np.ndarray:

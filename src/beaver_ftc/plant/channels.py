@@ -1,25 +1,21 @@
-"""What is read from the truth and written to it and to the log each frame, and how compiled code does so.
+"""What is read from the truth, written to it and logged in each frame, and how compiled code does so.
 
-What is read from the truth, and what is written to the log, each frame: names, units, order.
+The truth is read as one array: what every aircraft has, then of all surfaces position, effective deflection
+and effectiveness, then the declared signals. With n surfaces, compiled code finds surface s at POS + s,
+POS + n + s and POS + 2 n + s, and signal k at POS + 3 n + k.
 
-The truth is read as one array: what every aircraft has, then of all surfaces position, effective
-deflection and effectiveness, then the declared signals. With n surfaces, compiled code finds surface s at
-POS + s, POS + n + s and POS + 2 n + s, and signal k at POS + 3 n + k.
-
-Many properties in one compiled call, and JSBSim's own frame from compiled code.
-
-A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty.
-The binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's
-own address: 0.01 us each. That rests on how one build of the binding is laid out, so addresses.py has it
-proved in a child process before it is used. The environment variable BEAVER_FTC_NATIVE=0 turns it off; the
-caller reads and writes through Python then.
-
-Likewise the executive's `Run`, which `advance` calls: a flight then leaves compiled code only when
-something changes. An error that JSBSim raises could not be caught there. Its models of an aircraft without
-engines raise none once that is loaded and trimmed; aircraft with engines are run through Python.
+A property read through JSBSim's Python binding costs about 0.1 us; a frame reads and writes some forty. The
+binding exports the C++ accessors of a property node, so a compiled kernel can call them on the node's own
+address: 0.01 us each. That rests on how one build of the binding is laid out, so addresses.py has it proved
+in a child process before it is used. The environment variable BEAVER_FTC_NATIVE=0 turns it off; the caller
+reads and writes through Python then.
 
     bank = NodeBank([plant.node(name) for name in names])
     read_nodes(address(GETTER), bank.pointers, out)       # also from inside another compiled kernel
+
+Likewise `advance` calls the executive's `Run`: a flight then leaves compiled code only when something
+changes. An error that JSBSim raises could not be caught there. Its models of an aircraft without engines
+raise none once that is loaded and trimmed; aircraft with engines are run through Python.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,7 @@
-"""Flight conditions to fly from: an aircraft that is loaded once and flown many times, trimmed as a scenario
-says, and the truth linearised there.
+"""Flight conditions to fly from: an aircraft trimmed as a scenario says, and the truth linearised there.
 
-Aircraft loaded once and flown many times, each time as freshly loaded, to the bit.
-
-What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
+An aircraft is loaded once and flown many times, each time as freshly loaded, to the bit. What a flight leaves
+behind in JSBSim (1.3.3), and what takes it away:
 
     initial conditions   the attitude and the wind keep a rounding remainder of all that was set before;
                          `run_ic` and a reset leave them alone. A file that states everything: at_rest.xml,
@@ -14,8 +12,6 @@ What a flight leaves behind in JSBSim (1.3.3), and what takes it away:
     random numbers       a flight in turbulence seeds its own.
 
 Aircraft with engines are loaded again: what their engines remember is more than this.
-
-A trimmed flight condition and the truth linearised about it, from what a scenario says of them.
 """
 
 import os
@@ -106,17 +102,17 @@ def _files_of(model: Path) -> tuple[str, ...]:
 def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
     """Steady straight flight, wings level, on the scenario's truth with its errors.
 
-    scenario: a name, a path, a mapping or a Scenario; left out, the defaults. initial: keys of its section
-    `initial` in place of its own, e.g. airspeed_mps=40, altitude_m=300, flap_deg=10. Raises BadInput that
-    names the key, and for what cannot be trimmed.
+    scenario: a name, a path, a mapping or a Scenario; left out: the defaults. initial: keys that replace
+    those of its section `initial`, e.g. airspeed_mps=40, altitude_m=300, flap_deg=10. Raises BadInput that
+    names the key, and if there is no trim.
     """
     return trimmed(_condition(scenario, initial))[1]
 
 
 def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "LinearModel":
-    """The truth about the trimmed flight that `trim` finds: xdot = A x + B u, ten states, the surfaces.
+    """Linear model of the truth at the trim of `trim`: xdot = A x + B u, with ten states and the surfaces.
 
-    `.state_space()` gives it as python-control has it. Raises BadInput as `trim` does.
+    `.state_space()` returns it for python-control. Raises BadInput as `trim` does.
     """
     from beaver_ftc.plant.linear import differences
 

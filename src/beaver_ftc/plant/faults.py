@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, SensorFault, place_of
-from beaver_ftc.scenario.faults.base import Past, SurfaceFault
+from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, Past, SensorFault, SurfaceFault, place_of
 from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
 from beaver_ftc.scenario.signals import frame_of, grown_share
 

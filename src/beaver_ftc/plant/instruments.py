@@ -15,9 +15,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, measured_slipstream
-from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS, SIGNALS
 
-SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")  # what the diagnosis compares with its model
 N_SIGNALS = len(SIGNALS)
 SENSORS = tuple(row.name for row in ROWS)
 N_SENSORS = len(SENSORS)
@@ -231,13 +230,26 @@ def take_sample(measured, x, y, attitude):
 
 
 @kernel
+def set_inertial(measured, inertial):
+    """Whether accelerometers are read, and none may be broken."""
+    measured.inertial = inertial
+
+
+@kernel
+def share_force(measured):
+    """From the readings to the force."""
+    for i in range(3):
+        measured.force[i] = measured.signal[AX + i]
+
+
+@kernel
 def share_out(measured):
     """From the readings to x, y, attitude, force and altitude."""
     signal, y = measured.signal, measured.y
     for i in range(3):
         measured.x[i] = signal[i]
         measured.attitude[i] = signal[PHI + i]
-        measured.force[i] = signal[AX + i]
+    share_force(measured)
     y[ALPHA], y[BETA], y[AIRSPEED] = signal[_ALPHA], signal[_BETA], signal[_AIRSPEED]
     y[QDYN] = signal[_QDYN]
     measured.altitude = signal[ALTITUDE]

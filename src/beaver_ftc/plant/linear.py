@@ -80,9 +80,9 @@ class LinearModel:
         return LinearModel(self.A[np.ix_(rows, rows)], self.B[rows], states, self.inputs)
 
     def state_space(self) -> "StateSpace":
-        """As python-control has it, every state an output; names carry units. Wants the extra `control`.
+        """The model as a state space of python-control, with every state as an output and units in the names.
 
-        Raises BadInput where that is not installed.
+        Needs the extra `control`; raises BadInput if it is not installed.
         """
         try:
             import control

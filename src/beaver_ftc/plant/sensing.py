@@ -1,4 +1,4 @@
-"""Sensing: the truth's record, and what the instruments make of it.
+"""Sensing: the record of the truth, and the readings that the instruments give of it.
 
 The truth and what is measured are records of different types, so that compiled code of the diagnosis or of a
 law cannot be handed the truth by mistake.
@@ -23,11 +23,13 @@ from beaver_ftc.plant.instruments import (
     read_all,
     read_forces,
     read_sampled,
+    set_inertial,
+    share_force,
     share_out,
 )
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
-AT_REST_MPS = 1.0  # of an aircraft on its wheels: the lower limit of the truth's own equations
+MIN_AIRSPEED_ON_WHEELS_MPS = 1.0  # a lower measured one counts as this, as in the truth's own equations
 # Beyond these the flight has departed: body rates, incidence and sideslip; or below the ground.
 DEPARTURE_RATE_RAD_S, DEPARTURE_ANGLE_RAD = 6.0, 0.6
 DEPARTURE_SIGNALS = ("p", "q", "r", "alpha", "beta", "altitude")
@@ -54,7 +56,7 @@ def truth_dtype(n: int) -> np.dtype:
 
 @kernel
 def position(truth, s):
-    """Where the actuator of surface s is, rad."""
+    """Position of the actuator of surface s, rad."""
     return truth.value[ch.POS + s]
 
 
@@ -66,19 +68,19 @@ def effective(truth, s):
 
 @kernel
 def effectiveness(truth, s):
-    """What surface s has left of its effectiveness, 1 healthy."""
+    """Remaining effectiveness of surface s: 1 if healthy, 0 if lost."""
     return truth.value[ch.POS + 2 * truth.immovable.size + s]
 
 
 @kernel
 def first_signal(truth):
-    """Where the declared signals begin among the values."""
+    """Index of the first declared signal in `value`."""
     return ch.POS + 3 * truth.immovable.size
 
 
 @kernel
 def measure(truth, instruments, measured):
-    """Read the truth's nodes, in SI, and fill `measured` with what the instruments give."""
+    """Read the truth's nodes into `value`, SI, and fill `measured` with the readings of the instruments."""
     value, signal = truth.value, measured.signal
     if truth.native:
         read_nodes(truth.getter, truth.read_pointers[: truth.n], value)
@@ -100,13 +102,14 @@ def measure(truth, instruments, measured):
         read_sampled(instruments, signal, measured.fresh)
     if instruments.broken:
         break_all(instruments, signal, measured.missing)
-    sort(truth, instruments, measured)
+    distribute_readings(truth, instruments, measured)
 
 
 @kernel
 def read_further(value, first, n, measured):
     """Take the readings of accelerometers, of sensors that the monitor alone uses, and of the engine's."""
-    measured.inertial, engine = 1, first + 4 + N_SAMPLED
+    set_inertial(measured, 1)
+    engine = first + 4 + N_SAMPLED
     for i in range(3):
         measured.signal[AX + i] = value[first + i] / value[first + 3]
     for i in range(N_SAMPLED):
@@ -119,19 +122,20 @@ def read_further(value, first, n, measured):
 @kernel
 def sample_forces(instruments, measured):
     """Read the accelerometers, whose truth stands among the readings, for the first time."""
-    measured.inertial = 1
+    set_inertial(measured, 1)
     if instruments.real:
         read_forces(instruments, measured.signal)
-    measured.force[:] = measured.signal[AX : AX + 3]
+    share_force(measured)
 
 
 @kernel
-def sort(truth, instruments, measured):
-    """Put the readings where those who use them look; declared signals without an instrument are ideal."""
+def distribute_readings(truth, instruments, measured):
+    """Copy the readings in `signal` to the records of their users. Declared signals have no instrument: their
+    readings are exact."""
     share_out(measured)
     y, first = measured.y, first_signal(truth)
-    if y[AIRSPEED] < AT_REST_MPS and truth.slow_mps > 0.0:
-        y[AIRSPEED] = AT_REST_MPS  # rates over an airspeed stay finite
+    if y[AIRSPEED] < MIN_AIRSPEED_ON_WHEELS_MPS and truth.slow_mps > 0.0:
+        y[AIRSPEED] = MIN_AIRSPEED_ON_WHEELS_MPS  # rates over an airspeed stay finite
     for j in range(truth.declared):
         y[DPT + j] = truth.value[first + j]
     if instruments.engine:
@@ -140,7 +144,7 @@ def sort(truth, instruments, measured):
 
 @kernel
 def flight_status(value, ground_m, slow_mps):
-    """FLYING, NOT_FINITE, or DEPARTED + the index in DEPARTURE_SIGNALS of what left its limits, times ten."""
+    """FLYING; NOT_FINITE; or DEPARTED + 10 i, where signal i of DEPARTURE_SIGNALS has left its limits."""
     for i in range(value.size):
         if not np.isfinite(value[i]):
             return NOT_FINITE
@@ -159,7 +163,7 @@ def flight_status(value, ground_m, slow_mps):
 
 @kernel
 def hand_over(truth, commanded, levers):
-    """Write the command (n,) rad, and the engine's where it is used, where nodes are native."""
+    """Write the command (n,) rad, and the levers' commands if they are used, where nodes are native."""
     if truth.native:
         write_nodes(truth.setter, truth.write_pointers, commanded)
         if levers.in_use:

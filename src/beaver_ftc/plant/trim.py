@@ -1,20 +1,15 @@
-"""The truth as a scenario has it: its errors are written into the aircraft's properties, it is trimmed there,
-the air moves.
+"""The truth as a scenario has it: its errors are written into the aircraft; it is trimmed; the air moves.
 
-Trim: steady straight flight with wings level, solved on the truth's own accelerations.
-
-Wings level, the propeller's side force and moments are balanced by a little sideslip, aileron and rudder
-[FDC]. Unknowns: alpha, beta, theta and the surfaces that lead the axes. Equations: JSBSim's six body
-accelerations are zero, which absorbs everything the textbook leaves out (round rotating Earth, real
-gravity, standard atmosphere).
+Trim is steady straight flight with wings level, solved on the truth's own accelerations. The propeller's side
+force and moments are balanced by a little sideslip, aileron and rudder [FDC]. Unknowns: alpha, beta, theta
+and the surfaces that lead the axes. Equations: JSBSim's six body accelerations are zero, which absorbs
+everything the textbook leaves out (round rotating Earth, real gravity, standard atmosphere).
 
 A start of the truth costs nine JSBSim frames, Newton's method two dozen starts. So an aircraft without
 engines is brought near by Broyden's method: the Jacobian is found once, by differences, and then corrected
 by each step [Broyden1965, the first method]; and of a start only what changes is done again. The side
 force of betadot lags one look behind: the steps end at zero, and so does what it lags by. The full start
 has the last word.
-
-Writes what a scenario says of the truth into the aircraft's properties, trims it there, moves the air.
 
 Turbulence and one-minus-cosine gusts are JSBSim's own models.
 """
@@ -30,7 +25,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, Travel
 from beaver_ftc.aircraft.aircraft import KG_PER_LB
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
-from beaver_ftc.design.air import EXCEEDENCE, WIND_AT_20_FT
+from beaver_ftc.design import EXCEEDENCE, WIND_AT_20_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import FT_PER_M, PA_PER_PSF, FlightState, Plant
 from beaver_ftc.scenario.airframe import Gust
@@ -63,7 +58,7 @@ Look = Callable[[Vector], Vector]
 class TrimPoint(FlightState):
     """A trimmed flight condition.
 
-    gamma_rad: flight-path angle, positive climbing. residual: the six accelerations left, (udot, vdot,
+    gamma_rad: flight-path angle, positive climbing. residual: the six remaining accelerations, (udot, vdot,
     wdot) m/s2 and (pdot, qdot, rdot) rad/s2. envelope_valid: inside the flight-validated envelope.
     """
 

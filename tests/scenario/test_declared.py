@@ -5,7 +5,7 @@ import ast
 import numpy as np
 import pytest
 
-from beaver_ftc.design.air import SEVERITIES, Dryden
+from beaver_ftc.design import SEVERITIES, Dryden
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Bounds
 from beaver_ftc.scenario.schema import load

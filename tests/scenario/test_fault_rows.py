@@ -3,8 +3,7 @@
 import pytest
 
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import TYPES, fault_name, of_a_sensor, place_of
-from beaver_ftc.scenario.faults.base import Past
+from beaver_ftc.scenario.faults import TYPES, Past, fault_name, of_a_sensor, place_of
 from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 from scenario.damageable import damageable

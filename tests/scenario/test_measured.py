@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from beaver_ftc.design.air import altitude_of, standard_density
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.warnings import (
+from beaver_ftc.design import altitude_of, standard_air_density
+from beaver_ftc.scenario.declared import (
     ALTITUDE,
     BETWEEN,
     LATE,
@@ -17,6 +16,7 @@ from beaver_ftc.scenario.warnings import (
     percent,
     quantities,
 )
+from beaver_ftc.scenario.schema import Scenario
 from trainer import trainer
 
 # Density by altitude [ISA], m and kg/m3.
@@ -25,7 +25,7 @@ TABLE = [(0, 1.225), (1000, 1.1116), (2000, 1.0065), (5000, 0.73612), (11000, 0.
 
 @pytest.mark.parametrize(("altitude_m", "density"), TABLE)
 def test_density_and_altitude_are_the_tables(altitude_m, density):
-    assert standard_density(altitude_m) == pytest.approx(density, rel=2e-4)
+    assert standard_air_density(altitude_m) == pytest.approx(density, rel=2e-4)
     assert altitude_of(density) == pytest.approx(altitude_m, abs=3.0)
 
 

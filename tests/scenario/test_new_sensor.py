@@ -24,8 +24,7 @@ class RadioAltimeter(_Sensor):
 
 
 class Equal(NamedTuple):'''
-ROW = """    Row("az", Accelerometer, 100.0),
-    Row(
+ROW = """    Row(
         "radio_altitude", RadioAltimeter, 500.0, truth=("position/h-agl-ft", 0.3048),
         column="radio_altitude_measured_m", rate_hz=5.0, equal=Equal("altitude", 0.5),
     ),
@@ -56,12 +55,12 @@ def copied(tmp_path_factory):
     """A copy of the package with the sensor in it."""
     root = tmp_path_factory.mktemp("copied")
     package = root / "beaver_ftc"
-    shutil.copytree(beaver_ftc.__path__[0], package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(beaver_ftc.__path__[0], package)
     for folder in ("aircraft", "scenarios"):
         shutil.copytree(data_root() / folder, package / "data" / folder, dirs_exist_ok=True)
     rows = package / "scenario" / "sensors.py"
     text = rows.read_text().replace("class Equal(NamedTuple):", ERRORS)
-    rows.write_text(text.replace('    Row("az", Accelerometer, 100.0),\n)\n', ROW))
+    rows.write_text(text.replace(")\n# The first rows:", ROW + "# The first rows:"))
     presets = rows.with_name("presets.yaml")
     presets.write_text(presets.read_text().replace("consumer-grade:\n", PRESET))
     return root

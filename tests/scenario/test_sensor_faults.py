@@ -17,7 +17,7 @@ def faulty(**fault):
         ({"sensor": "pp"}, "faults[0].sensor: 'pp' is no sensor, did you mean p? allowed: p, q, r, alpha"),
         (
             {"type": "jammed"},
-            "faults[0].type: 'jammed' is not known, allowed: bias, noise, scale, freeze, lost",
+            "faults[0].type: 'jammed' is not known, allowed: bias, freeze, lost, noise, scale",
         ),
         ({"magnitude": 500}, "faults[0].magnitude: 500 is out of range, allowed: at most 200 deg/s for p"),
         (

@@ -3,7 +3,8 @@
 import pytest
 
 from beaver_ftc.documents.validation import ScenarioError
-from beaver_ftc.scenario.sweeps import SweepFile, Variation, is_sweep, load_sweep, load_sweep_text
+from beaver_ftc.scenario.builtin import is_sweep
+from beaver_ftc.scenario.sweeps import SweepFile, Variation, load_sweep, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\n"
 LONG = "n" * 120

@@ -160,7 +160,7 @@ def of_trainer(**keys):
 
 
 def test_where_forces_separate_no_surfaces_no_error_of_them_counts():
-    assert not Loop(of_trainer()).frames["fdi"]["statistical"]["forces"]["known"].any()
+    assert not Loop(of_trainer()).frames["fdi"]["statistical"]["forces"]["in_use"].any()
     heavy = of_trainer(uncertainty={"mass": 1.06, "coefficients": {"CZ_alpha": 1.2}})
     assert list(undeclared(heavy)) == []
     assert heavy.warnings() == ()

@@ -9,14 +9,14 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.builtin import (
         builtin_names,
         builtin_sweeps,
+        is_sweep,
         looks_like_a_path,
         read_file,
         resolve,
         to_yaml,
     )
-    from beaver_ftc.scenario.declared import Declared
+    from beaver_ftc.scenario.declared import Declared, measured_spans, plural, span_in_words
     from beaver_ftc.scenario.diagnosis import Bounds
-    from beaver_ftc.scenario.judgement import Onset
     from beaver_ftc.scenario.schema import (
         NAME_PATTERN,
         Expect,
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     )
     from beaver_ftc.scenario.sensors import sensor_words, sensors_there
     from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, channels_of
-    from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, is_sweep, load_sweep, validate_sweep
-    from beaver_ftc.scenario.warnings import measured_spans, plural, span_in_words
+    from beaver_ftc.scenario.sweeps import Sweep, SweepExpect, load_sweep, validate_sweep
 else:
     __getattr__, __dir__ = lazily(__name__)

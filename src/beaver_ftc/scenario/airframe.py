@@ -44,7 +44,7 @@ from beaver_ftc.documents.document import (
     refuse_unknown,
 )
 from beaver_ftc.documents.errors import BeaverFtcError, suggestion
-from beaver_ftc.extensions import offered, required
+from beaver_ftc.plugins import offered, required
 
 _CHECKED: ContextVar[tuple[Aircraft, str | None] | None] = ContextVar("aircraft", default=None)
 
@@ -149,12 +149,14 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The trimmed flight condition the run starts from."""
+    """The flight condition at the start: a trimmed, straight flight with the wings level."""
 
-    airspeed_mps: Number = number(45.0, "m/s", "true airspeed, validated from 30 to 55", ge=20, le=70)
+    airspeed_mps: Number = number(
+        45.0, "m/s", "true airspeed; the model is valid from 30 to 55 m/s", ge=20, le=70
+    )
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
-        None, "true: standing on the ground, which is at altitude_m; under an autopilot alone (`sitl`)"
+        None, "true: the aircraft stands on the ground, whose elevation is altitude_m; only for `sitl`"
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -204,7 +206,7 @@ def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
     (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
     slowest, fastest = airspeeds_of(aircraft)
     default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
-    says = f"true airspeed, validated from {low:g} to {high:g}"
+    says = f"true airspeed; the model is valid from {low:g} to {high:g} m/s"
     speed = number(default, "m/s", says, ge=slowest, le=fastest)
     keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
     if start.altitude_m is not None:
@@ -239,9 +241,9 @@ def initial_schema(schema: dict[str, Any]) -> None:
 class ActuatorDynamics(Section):
     """First-order lag, rate limit and stops of one surface.
 
-    bandwidth_rad_s: bandwidth of the lag, 0 means none, rad/s
-    rate_limit_deg_s: largest surface rate, 0 means no limit, deg/s
-    travel_deg: lower and upper stop; left out: the aircraft's own, deg
+    bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
+    rate_limit_deg_s: largest rate of the surface; 0: no limit, deg/s
+    travel_deg: lower and upper stop; left out: those of the aircraft, deg
     """
 
     bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000, examples=[20])
@@ -269,7 +271,7 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section, extra="allow"):
-    """One set of dynamics a surface; a preset's name, or numbers beside the surfaces, stand for all."""
+    """Dynamics of the actuators. A preset applies to all surfaces, and so do keys outside the surfaces."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
 
@@ -312,15 +314,15 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 
 
 class Gust(Section):
-    """A one-minus-cosine gust: it rises, stays and fades as JSBSim's own does."""
+    """A one-minus-cosine gust of JSBSim: its velocity rises, is held, and fades."""
 
-    at_s: Number = number(..., "s", "when it starts", ge=0, le=360_000, examples=[10])
+    at_s: Number = number(..., "s", "start of the gust", ge=0, le=360_000, examples=[10])
     velocity_mps: tuple[Wind, Wind, Wind] = number(
-        ..., "m/s", "at its height, towards north, east, down", examples=[[0, 0, -3]]
+        ..., "m/s", "largest velocity of the gust, towards north, east, down", examples=[[0, 0, -3]]
     )
     rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
-    hold_s: Number = number(0.0, "s", "time at its height", ge=0, le=3600, examples=[2])
-    fade_s: Number = number(1.0, "s", "duration of the decay", gt=0, le=3600)
+    hold_s: Number = number(0.0, "s", "time at the largest velocity", ge=0, le=3600, examples=[2])
+    fade_s: Number = number(1.0, "s", "duration of the fading", gt=0, le=3600)
 
     @property
     def end_s(self) -> float:
@@ -348,13 +350,13 @@ def _no_severity(given: Any) -> Any:
 
 
 class Environment(Section):
-    """The air."""
+    """Wind, turbulence and gusts."""
 
     turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
         "none", "still air or Dryden turbulence", needs={"severity": "light"}, examples=["dryden"]
     )
     severity: Severity | None = entry(
-        None, "of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
+        None, "severity of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
     )
     wind_mps: tuple[Wind, Wind, Wind] = number(
         (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down", examples=[[5, 0, 0]]
@@ -366,7 +368,10 @@ class Environment(Section):
             Discriminator(_one_or_several),
         ]
         | None
-    ) = entry(None, "a one-minus-cosine gust, or a list of them, each begun after the one before has faded")
+    ) = entry(
+        None,
+        "one gust, or a list of gusts that do not overlap",
+    )
 
     @property
     def gusts(self) -> tuple[Gust, ...]:
@@ -376,16 +381,20 @@ class Environment(Section):
         return (self.gust,) if isinstance(self.gust, Gust) else self.gust
 
     @property
+    def is_turbulent(self) -> bool:
+        """Whether there is turbulence; then `severity` is given."""
+        return self.turbulence != "none"
+
+    @property
     def is_still(self) -> bool:
         """Whether there is no wind, gust or turbulence."""
-        return self.turbulence == "none" and not any(self.wind_mps) and not self.gusts
+        return not (self.is_turbulent or any(self.wind_mps) or self.gusts)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        turbulent = self.turbulence != "none"
-        if turbulent and self.severity is None:
+        if self.is_turbulent and self.severity is None:
             deny("required key is missing, allowed: light, moderate, severe", "severity")
-        if self.severity is not None and not turbulent:
+        if self.severity is not None and not self.is_turbulent:
             deny("has no meaning here, allowed: only with turbulence: dryden", "severity")
         refuse(self._overlapping())
         return self

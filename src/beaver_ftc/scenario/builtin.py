@@ -97,6 +97,11 @@ def has_key(path_or_name: str | Path, kind: str, key: str) -> bool:
         return False
 
 
+def is_sweep(path_or_name: str | Path) -> bool:
+    """Whether a file (or name) that can be read is a sweep: it has a `base`, as no scenario has."""
+    return has_key(path_or_name, "sweep", "base")
+
+
 def looks_like_a_path(given: str) -> bool:
     """A built-in name has no folder and no dot."""
     return any(mark in given for mark in "/\\.")
@@ -145,11 +150,14 @@ def to_yaml(scenario: BaseModel) -> str:
 
 
 def texts_of(scenario: BaseModel, sections: Iterable[str]) -> tuple[str, ...]:
-    """What sections hold. Flights of a sweep share those that do not vary, whose text is written once."""
+    """What sections hold, nothing where a scenario has none. Flights of a sweep share those that do not vary,
+    whose text is written once."""
     return tuple(_text_of(getattr(scenario, name)) for name in sections)
 
 
-def _text_of(section: BaseModel) -> str:
+def _text_of(section: BaseModel | None) -> str:
+    if section is None:
+        return ""
     known = _texts.get(id(section))
     if known is None:
         if len(_texts) >= _MOST:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Strict, field_validator, model_validator
 
-from beaver_ftc.design.air import Severity
+from beaver_ftc.design import Severity
 from beaver_ftc.documents.document import Conflict, Section, deny, entry, number, refuse
 from beaver_ftc.documents.errors import suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, refusal, wrong_options
@@ -93,9 +93,9 @@ Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 class PerAxis(Section, strict=True):
     """One non-negative number for each of p, q and r.
 
-    p: of roll
-    q: of pitch
-    r: of yaw
+    p: value for roll
+    q: value for pitch
+    r: value for yaw
     """
 
     p: Bound = entry(0.0, examples=[0.1])
@@ -121,19 +121,21 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
 class Bounds(Section, strict=True):
-    """What uncertainty the diagnosis admits; thresholds follow from it [Zhang2005, sec. VII].
+    """Declared uncertainty, from which the thresholds follow [Zhang2005, sec. VII].
 
-    inertia_coupling: relative error of Pqr, Qpr, Rpq: as published
-    constant_rad_s2: unstructured angular acceleration, rad/s2: as published
-    coefficients: tolerance of the moment coefficients as a share: of all, or by name
-    inertia: tolerance of Ix, Iy, Iz and Jxz as a share of each
-    sensors: measurement errors, as those of the truth: a preset, or noise, bias, resolution, slope by
-    signal
-    deflection_deg: how far a surface may be from its actuator's model, deg
-    turbulence: rotation of the air, which no instrument sees: Dryden, at the height flown, no less than above
-    2000 ft
-    vertical_wind_mps: the strongest steady vertical wind, up or down, by which the sensor monitor compares
-    altitude and climb, m/s
+    inertia_coupling: relative error of the inertia coupling on each axis; the default is that of the
+    published     study
+    constant_rad_s2: any other error of the angular acceleration; the default is that of the published study,
+    rad/s2
+    coefficients: tolerance of the moment coefficients, as a share of each: one number for all, or one for
+    each     name
+    inertia: tolerance of Ix, Iy, Iz and Jxz, as a share of each
+    sensors: measurement errors: a preset, or noise, bias, resolution and slope error by signal
+    deflection_deg: largest difference between a surface and the model of its actuator, deg
+    turbulence: severity of Dryden turbulence; no instrument measures the rotation of this air. The bound is
+    that of     the present height, but at least that above 2000 ft
+    vertical_wind_mps: strongest steady vertical wind, up or down, that the sensor monitor allows for when it
+    compares altitude and climb, m/s
     """
 
     inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1")
@@ -155,11 +157,12 @@ class Bounds(Section, strict=True):
 
 
 class Statistical(Section, strict=True):
-    """Likelihood ratio tests beside the worst-case thresholds; levels follow from the rates declared here.
+    """Likelihood ratio tests in addition to the worst-case thresholds. Alarm levels follow from the declared
+    rates.
 
-    false_alarms_per_h: at most so many false alarms per flight hour under the noise declared
-    misnaming: chance, within a second, that noise excludes the true fault
-    uncertainty_rad_s: how fast an uncertainty that is merely bounded swings, rad/s: as published
+    false_alarms_per_h: largest rate of false alarms per flight hour under the declared noise
+    misnaming: probability that noise excludes the true fault within one second
+    uncertainty_rad_s: highest frequency of the model error; the default is that of the published study, rad/s
     """
 
     false_alarms_per_h: float = number(1e-3, "1/h", gt=0, le=3600)
@@ -168,24 +171,29 @@ class Statistical(Section, strict=True):
 
 
 class Probing(Section):
-    """A small movement of the flap, met by the elevator, to learn which of the two is at fault.
+    """Active diagnosis: a small movement of the flap, balanced by the elevator, shows which of them is at
+    fault.
 
-    If both follow, nothing is felt. It begins when the pitch axis is at fault and neither is named once a
-    slow oscillation would have shown, and ends when one is.
+    If both surfaces follow their commands, the aircraft does not react. Probing begins if the pitch axis is
+    at     fault, and neither surface is named within the time that a slow oscillation needs to become
+    visible. Probing     ends when a surface is named.
     """
 
-    amplitude_deg: float = entry(3.0, "greatest flap deflection, downwards, deg", gt=0, le=10)
-    frequency_hz: float = entry(0.5, "movements a second, Hz", gt=0, le=5)
-    duration_s: float = entry(4.0, "at most so long, s", gt=0, le=60)
+    amplitude_deg: float = entry(3.0, "largest flap deflection, downwards, deg", gt=0, le=10)
+    frequency_hz: float = entry(0.5, "number of movements in a second, Hz", gt=0, le=5)
+    duration_s: float = entry(4.0, "longest duration, s", gt=0, le=60)
 
 
 class Sharpen(Section, strict=True):
-    """Margin the published scheme gives away; each step loses no guarantee (theory.md, section 3)."""
+    """Steps that make the published tests more sensitive. Each step keeps the guarantees G1 and G2
+    (theory.md)."""
 
-    pole_bank: bool = entry(True, "alarm on the first of several filters: `fdi.pole_bank_per_s`")
-    memory: bool = entry(True, "hold each fault against the whole flight, not only what follows the alarm")
-    shared_effectiveness: bool = entry(True, "one parameter per surface, shared by the axes it moves")
-    set_membership: bool = entry(True, "intersect the sets of a parameter declared constant")
+    pole_bank: bool = entry(True, "several filters (`fdi.pole_bank_per_s`): each can raise the alarm")
+    memory: bool = entry(True, "each fault must explain the whole flight, not only the time after the alarm")
+    shared_effectiveness: bool = entry(True, "one parameter for each surface, shared by all axes")
+    set_membership: bool = entry(
+        True, "if a parameter is declared constant, its sets of possible values are intersected over time"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -202,28 +210,33 @@ class Sharpen(Section, strict=True):
 
 
 class FdiConfig(Section, strict=True):
-    """Gains, bounds and the choice of scheme. All have defaults.
+    """The diagnosis: scheme, fault class, declared bounds and poles.
 
-    scheme: a registered detector, `beaver-ftc list schemes` names them; none: nobody diagnoses
-    options: parameters of a registered detector, by name
-    fault_class: what may befall a surface: loss of effectiveness of aileron, elevator or rudder, or every
-    fault type on all four
-    pairs: also look for two faults at once on different surfaces (class `all`), pitch and roll-yaw each
-    for itself
-    sensor_monitor: hold the instruments against one another: auto, where the scenario breaks one
-    slowest_oscillation_rad_s: oscillatory failures are this fast or faster (class `all`), rad/s
-    slowest_rate_deg_s: a slow surface moves this fast or faster, a slower one is a jam (class `all`),
+    scheme: name of a diagnosis scheme; `beaver-ftc list schemes` prints all. `none`: no diagnosis
+    options: parameters of the scheme, by name
+    fault_class: faults that the diagnosis looks for. `published`: loss of effectiveness of aileron, elevator
+    or     rudder; `all`: all fault types on all surfaces
+    pairs: true: also look for faults of two surfaces at once, in pitch, and in roll and yaw; needs the class
+    `all`
+    sensor_monitor: when the instruments are compared with each other; `auto`: if the scenario has a fault of
+    an     instrument
+    slowest_oscillation_rad_s: lowest frequency of an oscillatory failure that the class `all` contains, rad/s
+    slowest_rate_deg_s: lowest rate of a slow surface in the class `all`; a slower surface counts as jammed,
     deg/s
-    probing: active diagnosis (class `all`): off unless given; `{}` for its defaults
-    statistical: statistical detector beside the worst-case one: off unless given; `{}` for its defaults
-    authority: whose alarms and exclusions count where there are two detectors
-    thresholds: isolation test: signed interval or the paper's norm bound
-    detection_pole_per_s: Lambda0, 1/s: a few times the bound shows in 0.1 s
-    isolation_pole_per_s: Lambda of the isolation estimators, 1/s
-    forgetting_time_s: memory of the estimates, s: longer than a reference period
-    sharpen: steps beyond the published scheme: `all`, `none` or one by one
-    pole_bank_per_s: filters beside the published one, 1/s; the default keeps a single frame
-    fault_profile: what is assumed of the fault's course: nothing, or constant once it is there
+    probing: active diagnosis, with the class `all`; left out: off; `{}`: on, with default values
+    statistical: statistical detector beside the worst-case detector; left out: off; `{}`: on, with default
+    values
+    authority: detector whose alarms and exclusions count, if there are two
+    thresholds: bound of the isolation tests: an interval with signs, or the norm of the published study
+    detection_pole_per_s: pole of the detection filter of the published study, 1/s
+    isolation_pole_per_s: pole of the isolation estimators, 1/s
+    forgetting_time_s: time constant with which estimates forget; it should exceed a period of the reference,
+    s
+    sharpen: steps beyond the published scheme: `all`, `none`, or true or false for each
+    pole_bank_per_s: poles of further detection filters; a filter with the default pole uses only the last
+    frame,     1/s
+    fault_profile: assumption about a fault. `any`: its parameter may change with time; `abrupt`: it is
+    constant     from the beginning
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -333,20 +346,23 @@ Law = Annotated[str, named(partial(refusal, LAWS))]
 
 
 class EnginePower(Section, strict=True):
-    """Engine power on pitch, once neither elevator nor flap acts on it; with the fault-tolerant law and
-    fault_class: all, and with the oracle. docs/explanation/fault-types.md has the design.
+    """Control of pitch by engine power, if elevator and flap are both lost.      It works with the law
+    fault-tolerant and `fault_class: all`, and with the oracle. The page on fault types
+    (docs/explanation/fault-types.md) has the design.
 
-    enabled: false: the engine stays as trimmed, whatever is lost
-    speed_gain_inhg_per_mps: less power for more airspeed than usual, inHg per m/s: damps the phugoid
-    attitude_gain_inhg_per_deg: more power for a nose too high, inHg per deg: power lowers it
-    washout_s: usual airspeed: the mean over about so long, a phugoid's period, s
-    attitude_memory_s: how long a missed pitch rate is remembered, s
-    smoothing_s: lag on the airspeed, against noise and gusts, s
+    enabled: false: the engine keeps its trim setting
+    speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed; this
+    damps     the phugoid, inHg per m/s
+    attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the nose is too high;
+    power     lowers the nose, inHg per deg
+    washout_s: time constant of the mean airspeed; about a period of the phugoid, s
+    attitude_memory_s: time constant with which an earlier error of the pitch rate is forgotten, s
+    smoothing_s: time constant of the lag on the airspeed, against noise and gusts, s
     lowest_inhg: manifold pressure with the throttle closed, inHg
-    highest_inhg: highest manifold pressure, inHg: the R-985's take-off rating
-    rate_inhg_s: fastest change, inHg/s: the whole range in five seconds
-    patience_s: how long pitch must have been lost before power takes over, s
-    release_s: and how long not, before the engine goes back to its trim, s
+    highest_inhg: highest manifold pressure; the default is the take-off rating of the engine R-985, inHg
+    rate_inhg_s: fastest change of the manifold pressure, inHg/s
+    patience_s: time for which both surfaces must be lost before engine power takes over, s
+    release_s: time for which a surface must act again before the engine returns to its trim setting, s
     """
 
     enabled: bool = True
@@ -369,26 +385,29 @@ class EnginePower(Section, strict=True):
 
 
 class ControlConfig(Section, strict=True):
-    """The law and its gains. All have defaults; the paper prints none of them.
+    """The control law and its gains. The published study gives no gains, so the default values are ours.
 
-    law: a registered law, `beaver-ftc list laws` names them, e.g. nominal, adaptive, oracle
-    options: parameters of a registered law, by name
-    gain_margin_db: of every loop of the default law, up and down, dB
-    phase_margin_deg: of every loop of the default law, deg
-    noise_share: of a surface's rate limit, that gyro noise may cost with the default law, as a standard
-    deviation: it stays within the limit 95 % of the time
-    proportional_per_s: Kp, 1/s: error bandwidth, well above the 0.2 Hz references
-    integral_per_s2: Ki, 1/s2: Kp^2/4, two equal real error poles at Kp/2
-    reference_natural_frequency_rad_s: reference model, rad/s: faster than the loop, slower than a 20 Hz
-    frame
-    reference_damping: reference model damping ratio: no overshoot
-    network_gain_per_s2: learning gain, 1/s2: with the FDAE's pole a well damped observer
-    network_leak_per_s: how fast the network lets go once the isolated fault explains the error, 1/s
-    network_weight_limit_rad_s2: projection bound on every weight, rad/s2
-    effectiveness_rate_per_s: fastest change of the effectiveness the law uses, 1/s: bumpless
-    least_effectiveness: projection: a surface weaker than this is not divided by, but given up
-    hand_over_s: duration of the continuous hand-over to the flap, s
-    power: engine power on pitch, when elevator and flap are lost
+    law: name of a control law; `beaver-ftc list laws` prints all
+    options: parameters of the law, by name
+    gain_margin_db: gain margin that every loop of the default law keeps, upwards and downwards, dB
+    phase_margin_deg: phase margin that every loop of the default law keeps, deg
+    noise_share: largest standard deviation of a surface's rate that gyro noise causes with the default law,
+    as a     share of the rate limit; with 0.5 the rate is within the limit 95 % of the time
+    proportional_per_s: proportional gain Kp of the tracking error, 1/s
+    integral_per_s2: integral gain Ki of the tracking error; Ki = Kp^2/4 gives two equal poles of the error at
+    Kp/2, 1/s2
+    reference_natural_frequency_rad_s: natural frequency of the reference model; faster than the control loop,
+    rad/s
+    reference_damping: damping ratio of the reference model; from 1 on there is no overshoot
+    network_gain_per_s2: learning gain of the network of the laws `adaptive` and `fault-tolerant-published`,
+    1/s2
+    network_leak_per_s: rate at which the network forgets after the isolated fault explains the error, 1/s
+    network_weight_limit_rad_s2: largest magnitude of each weight of the network, rad/s2
+    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses, so that commands do not
+    jump, 1/s
+    least_effectiveness: effectiveness below which the law no longer uses a surface
+    hand_over_s: duration of the transfer of control from a failed surface to its stand-in, s
+    power: control of pitch by engine power, if elevator and flap are both lost
     """
 
     law: Law = entry("fault-tolerant", examples=["nominal"])

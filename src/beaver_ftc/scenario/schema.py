@@ -8,7 +8,9 @@ nothing.
 `load` takes a file, a built-in name or a mapping: every mistake at once, one line each.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
 from itertools import pairwise
 from math import isfinite
 from os import PathLike
@@ -24,6 +26,7 @@ from pydantic import (
     PrivateAttr,
     SerializeAsAny,
     Tag,
+    ValidationError,
     ValidationInfo,
     model_validator,
 )
@@ -167,22 +170,29 @@ MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
 
 
 class InertiaCoupling(Section):
-    """theta_p, theta_q, theta_r: relative errors of Pqr, Qpr, Rpq in the truth (published: within 0.25)."""
+    """Relative errors of the inertia coupling in the truth: the errors of the coefficients of the products
+    of two body rates. In the published study they are within 0.25."""
 
-    p: Number = number(0.0, "share of 1", "theta_p", ge=-1, le=1, examples=[0.2])
-    q: Number = number(0.0, "share of 1", "theta_q", ge=-1, le=1, examples=[0.2])
-    r: Number = number(0.0, "share of 1", "theta_r", ge=-1, le=1, examples=[0.2])
+    p: Number = number(
+        0.0, "share of 1", "error in roll, of the coefficient of q r", ge=-1, le=1, examples=[0.2]
+    )
+    q: Number = number(
+        0.0, "share of 1", "error in pitch, of the coefficient of p r", ge=-1, le=1, examples=[0.2]
+    )
+    r: Number = number(
+        0.0, "share of 1", "error in yaw, of the coefficient of p q", ge=-1, le=1, examples=[0.2]
+    )
 
 
 class Sinusoid(Section):
-    """amplitude sin(frequency t) added to one angular acceleration."""
+    """The amplitude times sin(frequency t), added to one angular acceleration at the time t."""
 
     amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
 
 
 class SinusoidAxes(Section):
-    """One sinusoid an axis."""
+    """One sinusoidal acceleration for each axis."""
 
     p: Sinusoid = Field(default_factory=Sinusoid)
     q: Sinusoid = Field(default_factory=Sinusoid)
@@ -190,7 +200,7 @@ class SinusoidAxes(Section):
 
 
 class TrueInertia(Section):
-    """The truth's inertia, as a share of the table's value."""
+    """Inertia of the truth, as a share of the value in the aircraft file."""
 
     Ix: Number = number(1.0, "share of 1", "roll inertia", ge=0.5, le=2)
     Iy: Number = number(1.0, "share of 1", "pitch inertia", ge=0.5, le=2)
@@ -201,14 +211,16 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 
 
 class Uncertainty(Section):
-    """How the truth differs from what the designer believes.
+    """How the truth differs from the design model.
 
     inertia_coupling: relative errors of the inertia coupling
     sinusoid: sinusoidal angular accelerations
-    coefficients: truth / design ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 1.05
-    mass: truth / design ratio of the mass, at the same inertia, share of 1
-    inertia: truth / design ratio of the inertia
-    cg_m: centre of gravity, forward, right and down of where the designer has it, m
+    coefficients: single aerodynamic terms of the truth, each as a share of its value in the aircraft file; 1
+    is no error
+    mass: mass of the truth, as a share of the value in the aircraft file; the inertia is not changed, share
+    of 1
+    inertia: inertia of the truth
+    cg_m: shift of the centre of gravity from that of the aircraft file: forward, right, down, m
     """
 
     inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
@@ -223,7 +235,7 @@ Scale = Annotated[Number, Field(ge=0.1, le=10)]
 
 
 class InertiaScale(Section):
-    """What the designer takes the inertia for, as a share of the table's value."""
+    """Inertia of the design model, as a share of the value in the aircraft file."""
 
     Ix: Scale = number(1.0, "share of 1", "roll inertia")
     Iy: Scale = number(1.0, "share of 1", "pitch inertia")
@@ -232,14 +244,17 @@ class InertiaScale(Section):
 
 
 class DesignModel(Section):
-    """What the designer leaves out or gets wrong on purpose; the truth stays as it is.
+    """Deliberate errors of the design model; the truth stays as it is.
 
-    engine_terms: false neglects the dpt terms of Cl, Cm, Cn, as published
-    linearised: true: the Jacobian at the trim the flight starts from, instead of f and G
-    frozen_alpha: true: alpha stays at its trim value in the designer's model
-    mass: the designer's mass over the table's; inertia goes with it, share of 1
-    inertia: the designer's inertia over the table's
-    coefficients: design / table ratio of single aerodynamic terms, 1 is no error, e.g. Cm_alpha: 0.9
+    engine_terms: false: the terms of the slipstream (`dpt`) in Cl, Cm and Cn are left out, as in the
+    published     study
+    linearised: true: the design model is linear, about the trim at the start
+    frozen_alpha: true: in the design model, alpha always has its trim value
+    mass: mass of the design model, as a share of the value in the aircraft file; the inertia has the same
+    share,     share of 1
+    inertia: inertia of the design model
+    coefficients: single aerodynamic terms of the design model, each as a share of its value in the aircraft
+    file; 1 is no     error
     """
 
     engine_terms: Flag = True
@@ -251,15 +266,19 @@ class DesignModel(Section):
 
 
 class Change(Section):
-    """From a time on another law, another diagnosis, other sensors; what is left out stays as it is."""
+    """A change of law, diagnosis or sensors in flight. A key that is left out changes nothing."""
 
-    at_s: Number = number(..., "s", "from when on", gt=0, le=360_000, examples=[20])
+    at_s: Number = number(..., "s", "time of the change", gt=0, le=360_000, examples=[20])
     law: Law | None = entry(
-        None, "as control.law; surfaces and reference go on from where they are", examples=["nominal"]
+        None, "the new law, as in `control.law`; commands and reference continue", examples=["nominal"]
     )
-    scheme: Scheme | None = entry(None, "as fdi.scheme; the diagnosis restarts", examples=["zhang2005"])
-    sensors: Sensors | None = entry(None, "as sensors: a preset, or errors by signal")
-    declared_sensors: BoundedSensors | None = entry(None, "as fdi.bounds.sensors; the diagnosis restarts")
+    scheme: Scheme | None = entry(
+        None, "the new scheme, as in `fdi.scheme`; the diagnosis restarts", examples=["zhang2005"]
+    )
+    sensors: Sensors | None = entry(None, "the new sensor errors, as in `sensors`")
+    declared_sensors: BoundedSensors | None = entry(
+        None, "the new declaration, as in `fdi.bounds.sensors`; the diagnosis restarts"
+    )
 
     @model_validator(mode="after")
     def _changes_something(self) -> Self:
@@ -270,7 +289,7 @@ class Change(Section):
 
 
 class RmsLimits(Section):
-    """Largest RMS tracking error allowed, per axis."""
+    """Largest RMS tracking error that is allowed on each axis."""
 
     p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000, examples=[1.5])
     q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000, examples=[1.5])
@@ -278,7 +297,7 @@ class RmsLimits(Section):
 
 
 class Arrival(Section):
-    """What the flight has come to at its end: deviations from the commanded profile, means over 10 s."""
+    """Deviations from the commanded profile at the end of the flight, after a first-order lag of 10 s."""
 
     altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
     airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
@@ -294,26 +313,28 @@ Names = Annotated[tuple[Nameable, ...], Field(max_length=MOST_NAMES)]
 
 
 class Expect(Section):
-    """What must come out for the run to pass; what is left out is not asserted.
+    """Conditions that the flight must meet; a condition that is left out is not checked.
 
     detected_within_s: delay from fault to first alarm, s
-    isolated_as: what the diagnosis must name: a surface, `sensor p` and the like, or unanticipated; a list:
-    every name that it gives in flight, withdrawn ones too, in the order of the faults
-    isolated_type: the fault type the diagnosis must name
-    candidate_type: a fault type that must be named or still be possible
+    isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
+    unanticipated. A list: the names given in flight, withdrawn ones included, are exactly these, in the order
+    of the faults; a name given before its fault does not count
+    isolated_type: fault type that the diagnosis must name
+    candidate_type: fault type that must be named or still possible
     isolated_within_s: delay from fault to isolation, s
-    no_false_alarm: true: no alarm without a fault; false: there must be one
-    no_departure: true: the aircraft is kept; false: it must be lost
-    pre_fault_rms_deg_s: largest RMS tracking error before the fault, or of a flight without one
+    no_false_alarm: true: there must be no alarm without a fault; false: there must be one
+    no_departure: true: the aircraft must not be lost; false: it must be lost
+    pre_fault_rms_deg_s: largest RMS tracking error before the fault, or of the whole flight if there is none
     post_fault_rms_deg_s: largest RMS tracking error after the fault
     altitude_within_m: largest deviation from the commanded altitude, m
-    airspeed_within_mps: largest deviation of the airspeed, as a mean over 10 s, from what is commanded, m/s
-    airspeed_within_limits_mps: the same from the commanded airspeed, as limited to what can still be
-    held, m/s
-    heading_within_deg: largest deviation from the commanded heading, 30 s after a change of it and later,
+    airspeed_within_mps: largest deviation from the commanded airspeed, after a first-order lag of 10 s, m/s
+    airspeed_within_limits_mps: the same deviation, but from the commanded airspeed limited to the airspeeds
+    that can be held after a fault, m/s
+    heading_within_deg: largest deviation from the commanded heading, from 30 s after each change of it on,
     deg
-    stays_in_envelope: true: never outside the validated envelope; false: it must leave it
-    arrives: how far it is from the commanded profile at its end; a lost aircraft never arrives
+    stays_in_envelope: true: the flight must stay inside the validated envelope; false: it must leave it
+    arrives: largest deviations from the commanded profile at the end of the flight; a lost aircraft never
+    arrives
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
@@ -339,28 +360,28 @@ class Expect(Section):
 
 
 class Scenario(Section, title="beaver-ftc scenario"):
-    """One flight: what flies, what it shall do, what breaks, who diagnoses and controls, what is expected.
+    """One flight: aircraft, manoeuvre, faults, diagnosis, control law and expectations.
 
     name: name of the result folder: letters, digits, - and _
-    description: what the case shows
-    aircraft: what flies: a built-in name, or ./FOLDER beside this file
+    description: purpose of the flight
+    aircraft: built-in name, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
-    substeps: JSBSim frames per such frame
-    seed: of everything random in the flight
+    substeps: JSBSim steps in each frame
+    seed: seed of all random numbers of the flight
     initial: flight condition at the start, trimmed
-    reference: body rates to follow
-    autopilot: the flight path to fly, on top of the reference; left out: no outer loops
-    faults: what breaks, and when
+    reference: commanded body rates
+    autopilot: flight path that outer loops follow; left out: only the body rates are controlled
+    faults: faults of surfaces and sensors
     uncertainty: how the truth differs from the design model
     actuators: actuator dynamics
     sensors: measurement errors
     environment: wind, turbulence and gusts
     fdi: fault detection and isolation
     control: the control law
-    changes: law, diagnosis and sensors changed in flight, and when
-    design_model: what the designer believes
-    expect: what must come out
+    changes: changes of law, diagnosis and sensors in flight
+    design_model: deliberate errors of the design model
+    expect: conditions that the flight must meet
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=100, examples=["elevator-partial-loss"])
@@ -375,18 +396,19 @@ class Scenario(Section, title="beaver-ftc scenario"):
     initial: Annotated[SerializeAsAny[Initial], PlainValidator(given_initial)] = entry(
         default_initial, json_schema_extra=initial_schema
     )
-    reference: Reference = entry(Reference)
+    # A section that is left out is the same object in every flight: what is worked out of it is kept.
+    reference: Reference = entry(cache(Reference))
     autopilot: Autopilot | None = None
     faults: tuple[Fault, ...] = entry((), max_length=MOST_FAULTS)
-    uncertainty: Uncertainty = entry(Uncertainty)
+    uncertainty: Uncertainty = entry(cache(Uncertainty))
     actuators: Actuators = entry(Actuators)
-    sensors: Sensors = entry(Sensors)
-    environment: Environment = entry(Environment)
-    fdi: FdiConfig = entry(FdiConfig)
-    control: ControlConfig = entry(ControlConfig)
+    sensors: Sensors = entry(cache(Sensors))
+    environment: Environment = entry(cache(Environment))
+    fdi: FdiConfig = entry(cache(FdiConfig))
+    control: ControlConfig = entry(cache(ControlConfig))
     changes: tuple[Change, ...] = entry((), max_length=1000)
-    design_model: DesignModel = entry(DesignModel)
-    expect: Expect = entry(Expect)
+    design_model: DesignModel = entry(cache(DesignModel))
+    expect: Expect = entry(cache(Expect))
 
     _airframe: Aircraft | None = PrivateAttr(default=None)
 
@@ -434,11 +456,26 @@ class Scenario(Section, title="beaver-ftc scenario"):
             except UnusableKeyError as error:
                 raise BadInput(f"{key}: {str(error).replace('the base', 'the scenario')}") from None
         with checked_against(self.airframe, self.aircraft):
+            with suppress(ValidationError):
+                return self.model_validate(data | self.sections_beside(changes), context={"folder": Path()})
             return validate(type(self), Document(data), "", Path(), conflicts)
 
+    def sections_beside(self, keys: Iterable[str]) -> dict[str, Section]:
+        """The sections that are set and that changes at these dotted keys leave alone: as they are, so that
+        what was worked out of them is known of them still. None where the aircraft changes, which has other
+        names."""
+        changed = {parse_key(key)[0] for key in keys}
+        if "aircraft" in changed:
+            return {}
+        return {
+            name: section
+            for name, section in self
+            if isinstance(section, Section) and name in self.model_fields_set - changed
+        }
+
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed and yet deserves a word: one line each, `key.path: what`."""
-        from beaver_ftc.scenario.warnings import warnings_of
+        """Warnings about allowed but unusual values, one line each: `key.path: warning`."""
+        from beaver_ftc.scenario.declared import warnings_of
 
         return warnings_of(self)
 
@@ -454,10 +491,10 @@ ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 
 
 def load(scenario: ScenarioLike) -> Scenario:
-    """The scenario of a built-in name, a file's path or a mapping; a Scenario is returned as it is.
+    """Load a scenario from a built-in name, a file's path or a mapping. A Scenario is returned unchanged.
 
-    A mapping has the keys of a scenario file, `name` may be left out; its CSV files are in the working
-    directory. Raises BadInput with one line a mistake.
+    A mapping has the keys of a scenario file; `name` may be left out. Its CSV files are in the working
+    directory. Raises BadInput with one line for each mistake.
     """
     if isinstance(scenario, Scenario):
         return scenario

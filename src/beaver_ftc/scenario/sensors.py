@@ -38,10 +38,11 @@ NOISE_LIMIT_SIGMA = 4.0
 class _Sensor(Section):
     """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one.
 
-    scale_error: relative error of the slope, share of 1
-    delay_s: age of the measurement, s
-    bandwidth_rad_s: bandwidth of the first-order lag, 0 means none, rad/s
-    dropout_share: samples lost, the last one standing in, share of 1
+    scale_error: relative error of the slope: a reading is multiplied by 1 + this; below 1 in
+    declared errors (`fdi.bounds.sensors`, `declared_sensors`), share of 1
+    delay_s: delay of the measurement, s
+    bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
+    dropout_share: share of lost samples; each is replaced by the last sample before it, share of 1
     """
 
     # Keys of noise, bias and resolution, their unit, and that unit in SI.
@@ -86,7 +87,7 @@ _S = TypeVar("_S", bound=_Sensor)
 def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[type[_S]], type[_S]]:
     """An instrument's row: the ending of its keys, their unit, the largest error, and the unit in SI."""
     keys = f"noise_std_{suffix}", f"bias_{suffix}", f"quantum_{suffix}"
-    meaning = "standard deviation of a sample", "constant error", "resolution"
+    meaning = "standard deviation of the noise of a sample", "constant error", "resolution"
     fields: dict[str, Any] = {
         key: (Number, number(0.0, unit, says, ge=least, le=most, examples=[most / 1000]))
         for key, says, least in zip(keys, meaning, (0, -most, 0), strict=True)
@@ -103,12 +104,12 @@ def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[ty
 
 @_reads("deg_s", "deg/s", 100, radians(1.0))
 class RateGyro(_Sensor):
-    """A body rate."""
+    """Body rate."""
 
 
 @_reads("deg", "deg", 45, radians(1.0))
 class FlowVane(_Sensor):
-    """An incidence angle."""
+    """Angle of attack or of sideslip."""
 
 
 @_reads("mps", "m/s", 50)
@@ -122,7 +123,7 @@ class DynamicPressure(_Sensor):
 
 
 class AttitudeAngle(FlowVane):
-    """Roll, pitch or yaw: a vertical or directional gyro, or integrated rates that drift away."""
+    """Roll, pitch or yaw angle: of a vertical or directional gyro, or of integrated rates, which drift."""
 
     drift_deg_h: Number = number(
         0.0, "deg/h", "growth of the error from the start on", ge=-3600, le=3600, examples=[10]
@@ -151,7 +152,7 @@ class ManifoldGauge(_Sensor):
 
 @_reads("mps2", "m/s2", 100)
 class Accelerometer(_Sensor):
-    """Specific force along a body axis at the centre of mass: all forces but gravity, over the mass."""
+    """Specific force along a body axis at the centre of mass: all forces except gravity, over the mass."""
 
 
 class Equal(NamedTuple):
@@ -166,7 +167,8 @@ class Row(NamedTuple):
 
     name: its key in `sensors`. errors: the model of them. most: the largest offset or noise of a fault, in
     the unit of its errors. test: the test of the sensor monitor (`diagnosis/monitors/redundancy.py`) in
-    which a jump of its reading appears at once. words: another name of it in a scenario's faults.
+    which a jump of its reading appears at once. words: another name of it in a scenario's faults. says: what
+    it measures.
 
     Only of a sensor that no equation of the diagnosis uses: truth is the JSBSim property that it measures,
     and that property's unit in SI; column is its log column; rate_hz is how often it is read, 0 for every
@@ -182,29 +184,32 @@ class Row(NamedTuple):
     column: str = ""
     rate_hz: float = 0.0
     equal: Equal | None = None
+    says: str = ""
 
 
 # Equations of the diagnosis use the first sixteen by their places: rates and flow, attitude and altitude,
 # engine, accelerometers. Sensors that only the monitor compares stand below them, with the property they
 # measure.
 ROWS = (
-    Row("p", RateGyro, 200.0, "roll"),
-    Row("q", RateGyro, 200.0, "pitch"),
-    Row("r", RateGyro, 200.0, "yaw"),
-    Row("alpha", FlowVane, 90.0, "incidence"),
-    Row("beta", FlowVane, 90.0, "sideslip"),
-    Row("V", Airspeed, 100.0, "speed", "airspeed"),
-    Row("qdyn", DynamicPressure, 5000.0, "density", "dynamic_pressure"),
-    Row("phi", AttitudeAngle, 90.0, "bank angle"),
-    Row("theta", AttitudeAngle, 90.0, "pitch angle"),
-    Row("psi", AttitudeAngle, 90.0, "heading"),
-    Row("altitude", Altimeter, 5000.0, "climb"),
-    Row("engine_rpm", Tachometer, 3000.0, "engine speed"),
-    Row("manifold_pressure", ManifoldGauge, 50.0, "manifold pressure"),
-    Row("ax", Accelerometer, 100.0),
-    Row("ay", Accelerometer, 100.0),
-    Row("az", Accelerometer, 100.0),
+    Row("p", RateGyro, 200.0, "roll", says="roll rate"),
+    Row("q", RateGyro, 200.0, "pitch", says="pitch rate"),
+    Row("r", RateGyro, 200.0, "yaw", says="yaw rate"),
+    Row("alpha", FlowVane, 90.0, "incidence", says="angle of attack"),
+    Row("beta", FlowVane, 90.0, "sideslip", says="angle of sideslip"),
+    Row("V", Airspeed, 100.0, "speed", "airspeed", says="true airspeed"),
+    Row("qdyn", DynamicPressure, 5000.0, "density", "dynamic_pressure", says="dynamic pressure"),
+    Row("phi", AttitudeAngle, 90.0, "bank angle", says="bank angle"),
+    Row("theta", AttitudeAngle, 90.0, "pitch angle", says="pitch attitude"),
+    Row("psi", AttitudeAngle, 90.0, "heading", says="heading"),
+    Row("altitude", Altimeter, 5000.0, "climb", says="altitude above sea level"),
+    Row("engine_rpm", Tachometer, 3000.0, "engine speed", says="engine speed"),
+    Row("manifold_pressure", ManifoldGauge, 50.0, "manifold pressure", says="manifold pressure"),
+    Row("ax", Accelerometer, 100.0, says="specific force forward, along the x axis"),
+    Row("ay", Accelerometer, 100.0, says="specific force to the right, along the y axis"),
+    Row("az", Accelerometer, 100.0, says="specific force down, along the z axis"),
 )
+# The first rows: the inputs of the design model.
+SIGNALS = ("p", "q", "r", "alpha", "beta", "V", "qdyn")
 N_IN_EQUATIONS = sum(not row.truth[0] for row in ROWS)  # of these rows, from the first on
 
 
@@ -233,7 +238,7 @@ PRESETS: dict[str, dict[str, dict[str, float]]] = parse(_FILE.read_text(encoding
 
 
 class _Sensors(Section):
-    """The measurements the diagnosis and the law live on."""
+    """Errors of the measurements that the diagnosis and the law receive."""
 
     if TYPE_CHECKING:  # its fields are the rows
 
@@ -261,12 +266,15 @@ class _Sensors(Section):
         return {"anyOf": [preset, signals]}
 
 
+_FIELDS: dict[str, Any] = {
+    row.name: (row.errors, Field(default_factory=row.errors, description=row.says or None)) for row in ROWS
+}
 Sensors = create_model(
     "Sensors",
     __base__=_Sensors,
     __module__=__name__,
     __doc__=_Sensors.__doc__,
-    **{row.name: (row.errors, Field(default_factory=row.errors)) for row in ROWS},  # type: ignore[call-overload]
+    **_FIELDS,
 )
 
 
@@ -303,7 +311,7 @@ SensorName = Annotated[
     str,
     BeforeValidator(_in_short),
     among(sensors_there, "{!r} is no sensor"),
-    entry(..., "the instrument that fails, as in `sensors`", json_schema_extra=_examples),
+    entry(..., "instrument that fails, named as in `sensors`", json_schema_extra=_examples),
 ]
 
 
@@ -311,8 +319,8 @@ class SensorFault(Section):
     """When an instrument is broken."""
 
     sensor: SensorName
-    at_s: Number = number(..., "s", "when the fault starts", ge=0, le=360_000, examples=[12])
-    end_s: Number | None = number(None, "s", "when it is gone; left out: it stays", gt=0, examples=[20])
+    at_s: Number = number(..., "s", "start of the fault", ge=0, le=360_000, examples=[12])
+    end_s: Number | None = number(None, "s", "end of the fault; left out: it stays", gt=0, examples=[20])
     profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt", examples=["abrupt"])
 
     @model_validator(mode="before")
@@ -332,7 +340,7 @@ class SensorFault(Section):
 
 
 class SensorBias(SensorFault):
-    """The reading is off by a constant."""
+    """The reading has a constant error."""
 
     type: Literal["bias"]
     magnitude: Number = number(
@@ -341,9 +349,9 @@ class SensorBias(SensorFault):
 
 
 class SensorNoise(SensorFault):
-    """The reading scatters.
+    """The reading has additional noise.
 
-    magnitude: standard deviation added to the reading, the sensor's unit
+    magnitude: standard deviation of the added noise, the sensor's unit
     """
 
     type: Literal["noise"]
@@ -351,7 +359,7 @@ class SensorNoise(SensorFault):
 
 
 class SensorScale(SensorFault):
-    """The reading is (1 + magnitude) times what it should be.
+    """The reading is multiplied by 1 + magnitude.
 
     magnitude: relative error of the reading, share of 1
     """
@@ -361,13 +369,13 @@ class SensorScale(SensorFault):
 
 
 class SensorFreeze(SensorFault):
-    """The reading stays as it was."""
+    """The reading stays at its last value."""
 
     type: Literal["freeze"]
 
 
 class SensorLost(SensorFault):
-    """The reading is missing, and is flagged as missing."""
+    """There is no reading, and it is marked as missing."""
 
     type: Literal["lost"]
 

@@ -96,7 +96,7 @@ def _frequency(says: str = "frequency") -> Any:
 
 
 def _start() -> Any:
-    return number(0.0, "s", "when it starts", ge=0, le=_LATEST_S, examples=[5])
+    return number(0.0, "s", "start of the signal", ge=0, le=_LATEST_S, examples=[5])
 
 
 def _during(tau_s: "Samples", length_s: float | None) -> "NDArray[np.bool_]":
@@ -109,7 +109,9 @@ class _Window(Section):
     """A signal that is zero outside [start_s, end_s)."""
 
     start_s: Number = _start()
-    end_s: Number | None = number(None, "s", "when it ends; left out: with the flight", gt=0, examples=[20])
+    end_s: Number | None = number(
+        None, "s", "end of the signal; left out: end of the flight", gt=0, examples=[20]
+    )
 
     @model_validator(mode="after")
     def _ends_after_it_starts(self) -> Self:
@@ -130,7 +132,7 @@ class _Wave(_Window):
 
 
 class Sine(_Wave):
-    """amplitude sin(2 pi frequency tau + phase)."""
+    """The amplitude times sin(2 pi frequency tau + phase). Here tau is the time since start_s."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -143,7 +145,7 @@ class Sine(_Wave):
 
 
 class Doublet(Section):
-    """+amplitude for width_s, then -amplitude for width_s: it lasts two widths and undoes its own turn."""
+    """+amplitude for width_s, then -amplitude for width_s. The two changes of angle cancel."""
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
@@ -157,7 +159,7 @@ class Doublet(Section):
 
 
 class Step(_Window):
-    """amplitude from start_s on (a pulse, with end_s)."""
+    """The amplitude from start_s to end_s."""
 
     amplitude_deg_s: Number = _amplitude()
 
@@ -168,7 +170,7 @@ class Step(_Window):
 
 
 class Square(_Wave):
-    """+amplitude in the first half of each period, -amplitude in the second; phase shifts it as in `sine`."""
+    """+amplitude in the first half of each period, -amplitude in the second. The phase is that of `sine`."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -182,7 +184,7 @@ class Square(_Wave):
 class _Closed(_Window):
     """A signal that needs both its ends."""
 
-    end_s: Number = number(..., "s", "when it ends", gt=0, le=_LATEST_S, examples=[20])
+    end_s: Number = number(..., "s", "end of the signal", gt=0, le=_LATEST_S, examples=[20])
 
     @property
     def length_s(self) -> float:
@@ -190,7 +192,7 @@ class _Closed(_Window):
 
 
 class Ramp(_Closed):
-    """From 0 at start_s in a straight line to amplitude at end_s, held from there on."""
+    """A straight line from 0 at start_s to the amplitude at end_s. Then the amplitude is held."""
 
     amplitude_deg_s: Number = _amplitude()
 
@@ -201,7 +203,7 @@ class Ramp(_Closed):
 
 
 class Chirp(_Closed):
-    """amplitude sin(2 pi (f0 tau + (f1 - f0) tau^2 / 2T)): a linear sweep from f0 to f1 in T."""
+    """A sine whose frequency changes linearly from start_frequency_hz to end_frequency_hz."""
 
     amplitude_deg_s: Number = _amplitude()
     start_frequency_hz: Number = _frequency("frequency at start_s")
@@ -217,15 +219,16 @@ class Chirp(_Closed):
 
 
 class Csv(Section):
-    """A table in a CSV file beside the scenario: straight lines between rows, end values held outside.
+    """A table in a CSV file, with straight lines between its rows. Outside, the first and last values are
+    held.
 
-    The table is read when the scenario is loaded and becomes part of it (`time_s`, `values_deg_s`), so that a
-    fully resolved scenario flies anywhere.
+    The table is read when the scenario is loaded, and becomes a part of the scenario (`time_s`,
+    `values_deg_s`). The scenario in a result folder therefore needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
-    column: column to fly, deg/s; time is `t_s`
-    time_s: read from the file: times, s
-    values_deg_s: read from the file: rates, deg/s
+    column: name of the column with the rates in deg/s; the column `t_s` has the times in s
+    time_s: times, usually read from the file, s
+    values_deg_s: rates, usually read from the file, deg/s
     """
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
@@ -358,11 +361,11 @@ Signals = tuple[Signal, ...]
 
 
 class Reference(Section):
-    """What the three body rates shall follow; the signals of an axis are summed, a missing axis is 0."""
+    """Commanded body rates. The signals of an axis are summed. An axis without signals is 0."""
 
-    p: Signals = entry((), "roll rate reference", max_length=50)
-    q: Signals = entry((), "pitch rate reference", max_length=50)
-    r: Signals = entry((), "yaw rate reference", max_length=50)
+    p: Signals = entry((), "signals of the roll rate", max_length=50)
+    q: Signals = entry((), "signals of the pitch rate", max_length=50)
+    r: Signals = entry((), "signals of the yaw rate", max_length=50)
 
 
 def sample(reference: Reference, t_s: "Samples") -> "Samples":
@@ -399,8 +402,12 @@ MAX_LEGS = 100
 class _Leg(Section):
     """From a time on: a value, or hold what is flown."""
 
-    at_s: Number = number(0.0, "s", "from when on", ge=0, le=_LATEST_S, examples=[10])
-    hold: Flag = entry(False, "true: hold what is flown or commanded at that time")
+    at_s: Number = number(0.0, "s", "time from which the leg applies", ge=0, le=_LATEST_S, examples=[10])
+    hold: Flag = entry(
+        False,
+        "true: keep the value that is commanded at this time, or if there is none, the value that the "
+        "aircraft has",
+    )
     value: Number | None = None
 
     @model_validator(mode="after")
@@ -413,27 +420,27 @@ class _Leg(Section):
 
 
 class AltitudeLeg(_Leg):
-    """An altitude, reached at a steady climb or descent."""
+    """A commanded altitude, to which the command moves at a steady rate of climb or descent."""
 
     value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000, examples=[1900])
-    climb_mps: Number = number(2.5, "m/s", "how fast the command goes there", gt=0, le=10)
+    climb_mps: Number = number(2.5, "m/s", "rate of climb or descent of the command", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
-    """An airspeed."""
+    """A commanded airspeed, to which the command moves at a steady acceleration."""
 
     value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
-    change_mps2: Number = number(0.2, "m/s2", "how fast the command goes there", gt=0, le=5)
+    change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
 
 
 class HeadingLeg(_Leg):
-    """A true heading, by the shorter turn."""
+    """A commanded true heading. The aircraft takes the shorter turn."""
 
     value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
 
 
 class BankLeg(_Leg):
-    """A bank angle, right wing down positive."""
+    """A commanded bank angle, positive with the right wing down."""
 
     value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
 
@@ -469,16 +476,16 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The profile to fly; a channel left out is left to the reference and the trim."""
+    """The flight path. A channel that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
-        "altitude in time"
+        "legs of the altitude"
     )
     airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
-        "true airspeed in time, by engine power; by pitch where there is none"
+        "legs of the true airspeed, which engine power holds, or pitch if there is no engine"
     )
-    heading_deg: tuple[HeadingLeg, ...] = _legs("true heading in time")
-    bank_deg: tuple[BankLeg, ...] = _legs("bank angle in time")
+    heading_deg: tuple[HeadingLeg, ...] = _legs("legs of the true heading")
+    bank_deg: tuple[BankLeg, ...] = _legs("legs of the bank angle")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.documents.document import (
@@ -41,7 +41,6 @@ from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import (
     builtin_names,
     builtin_path,
-    has_key,
     looks_like_a_path,
     no_such,
     read_file,
@@ -60,14 +59,14 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 
 class Variation(Section):
-    """How one key varies: a mapping of exactly one kind to its parameters.
+    """How one key varies: a mapping with exactly one of these kinds.
 
-    uniform: [lowest, highest], all values equally likely
-    loguniform: [lowest, highest], all ratios equally likely, lowest over 0
+    uniform: [lowest, highest]; all values are equally likely
+    loguniform: [lowest, highest]; the logarithms of the values are equally likely
     normal: [mean, standard deviation]
-    within: [lowest, highest] that `normal` is cut to; only with normal
-    linspace: [first, last, count], gone through in turn
-    choice: a list of values, all equally likely
+    within: [lowest, highest] of the drawn values of `normal`; only with `normal`
+    linspace: [first, last, count]; evenly spaced values, one after the other
+    choice: a list of values; all are equally likely
     """
 
     uniform: Span | None = number(None, "as the key", range="rising", examples=[[0.2, 0.8]])
@@ -125,11 +124,13 @@ class Variation(Section):
 
 
 class Level(Section):
-    """A bound on a number that the flights estimate; with a confidence, on its one-sided confidence bound.
+    """A limit for a rate that is estimated from the flights, or with `confidence` for its one-sided
+    confidence bound.
 
-    at_least: smallest value allowed
-    at_most: largest value allowed
-    confidence: left out: the estimate itself is held against the bound
+    at_least: smallest allowed value
+    at_most: largest allowed value
+    confidence: confidence of the bound that is compared with the limit; left out: the estimate itself is
+    compared
     """
 
     at_least: Number | None = entry(None, range="any", examples=[0.9])
@@ -146,34 +147,35 @@ class Level(Section):
 
 
 class QuantileLevel(Level):
-    """A bound on a quantile over the flights."""
+    """A limit for a quantile over the flights."""
 
     quantile: Number = number(
-        0.95, "share of 1", "which quantile, 0.5 is the median", gt=0, lt=1, needs={"at_most": 1}
+        0.95, "share of 1", "the quantile; 0.5 is the median", gt=0, lt=1, needs={"at_most": 1}
     )
 
 
 class AxisLevels(Section):
-    """One bound an axis."""
+    """One limit for each axis."""
 
-    p: QuantileLevel | None = None
-    q: QuantileLevel | None = None
-    r: QuantileLevel | None = None
+    p: QuantileLevel | None = entry(None, "limit for roll")
+    q: QuantileLevel | None = entry(None, "limit for pitch")
+    r: QuantileLevel | None = entry(None, "limit for yaw")
 
 
 class SweepExpect(Section):
-    """What the statistics of a sweep must show; what is left out is not asserted.
+    """Conditions on the statistics of a sweep; a condition that is left out is not checked.
 
     detection_rate: share of faults that were detected
-    isolation_rate: share of faults that were named rightly
-    false_alarms_per_hour: per hour without a fault
-    departure_rate: share of flights that lost the aircraft
+    isolation_rate: share of faults that were named correctly
+    false_alarms_per_hour: number of false alarms per hour without a fault
+    departure_rate: share of flights in which the aircraft was lost
     failure_rate: share of flights that could not be flown
     pass_rate: share of flights that met every expectation of the base scenario
-    detection_delay_s: from fault to alarm; a missed fault counts as infinite
-    isolation_delay_s: from fault to the right name; a fault not named rightly counts as infinite
-    post_fault_rms_deg_s: RMS tracking error after the fault; a departure counts as infinite
-    tracking_ratio: RMS error after / before the fault; a departure counts as infinite
+    detection_delay_s: time from fault to alarm; a missed fault counts as infinite
+    isolation_delay_s: time from fault to the correct name; a missing or wrong name counts as infinite
+    post_fault_rms_deg_s: RMS tracking error after the fault; for a lost aircraft it counts as infinite
+    tracking_ratio: RMS tracking error after the fault, divided by that before it; for a lost aircraft it
+    counts     as infinite
     """
 
     detection_rate: Level | None = number(None, "share of 1")
@@ -189,17 +191,17 @@ class SweepExpect(Section):
 
 
 class SweepFile(Section, title="beaver-ftc sweep"):
-    """Many flights: a base scenario, what varies in it, and what the statistics must show.
+    """Many flights: a base scenario, the keys that vary, and the conditions that the statistics must meet.
 
     name: name of the result folder: letters, digits, - and _
-    description: what the sweep is to show
-    base: a built-in scenario's name, a scenario file beside this one, or a scenario itself
-    set: dotted keys of the base to new values, the same in all flights
-    runs: number of flights; left out: one a point of the grid
-    seed: of all values and of each flight's seed
-    sampling: how values are drawn that are not linspace
-    vary: dotted keys of the base to how they vary
-    expect: what the statistics must show
+    description: purpose of the sweep
+    base: name of a built-in scenario, a scenario file beside this one, or a scenario itself
+    set: keys of the base, written with dots, with new values for all flights
+    runs: number of flights; left out: one flight for each point of the grid
+    seed: seed of the drawn values and of the flights
+    sampling: how values are drawn; `linspace` is never drawn
+    vary: keys of the base, written with dots, each with the way in which it varies
+    expect: conditions that the statistics must meet
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["loss-of-the-elevator"])
@@ -279,24 +281,17 @@ class Sweep:
         Raises pydantic's ValidationError if they contradict each other.
         """
         places = {parse_key(key): value for key, value in values.items()}
-        varied = {place[0] for place in places}
-        ready = {} if "aircraft" in varied else self._sections
-        ready = {name: section for name, section in ready.items() if name not in varied}
+        ready = self._base_read.sections_beside(values) if self._base_read else {}
         rest = {name: value for name, value in self.base.items() if name not in ready}
         with checked_against(self.aircraft, self.base.get("aircraft")):
             return Scenario.model_validate({**with_values(rest, places), **ready, **settings})
 
     @cached_property
-    def _sections(self) -> dict[str, BaseModel]:
-        """Sections of the base, read once for the flights that do not vary them; none if it cannot fly."""
-        try:
-            with checked_against(self.aircraft, self.base.get("aircraft")):
-                base = Scenario.model_validate({"name": self.name, **self.base})
-        except ValidationError:
-            return {}
-        return {
-            name: section for name, section in base if name in self.base and isinstance(section, BaseModel)
-        }
+    def _base_read(self) -> Scenario | None:
+        """The base, read once for the flights that do not vary all of it; None if it cannot fly."""
+        with checked_against(self.aircraft, self.base.get("aircraft")), contextlib.suppress(ValidationError):
+            return Scenario.model_validate({"name": self.name, **self.base})
+        return None
 
 
 def load_sweep(path_or_name: str | Path) -> Sweep:
@@ -329,11 +324,6 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
     if problems:
         raise ScenarioError(source, problems)
     return Sweep(file, base, aircraft)
-
-
-def is_sweep(path_or_name: str | Path) -> bool:
-    """Whether a file (or name) that can be read is a sweep: it has a `base`, as no scenario has."""
-    return has_key(path_or_name, "sweep", "base")
 
 
 def _base(

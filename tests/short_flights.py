@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import yaml
 
-from beaver_ftc.extensions import SERVICES, entries
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plugins import SERVICES, entries
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import load
 from kept import in_short, of_record

@@ -101,7 +101,7 @@ def test_sound_accelerometers_with_the_declared_errors_are_never_suspected(
         for _ in loop.chunks():
             pass
         monitor = loop.frames[0]["fdi"]["sensor_monitor"]
-        assert monitor["memory"]["begun"]
+        assert monitor["memory"]["start_stage"]
         assert not monitor["output"]["alarmed"]
 
 
@@ -154,9 +154,9 @@ def test_they_are_read_from_the_frame_on_in_which_an_instrument_breaks():
 def test_where_one_breaks_forces_are_weighed_no_more():
     loop = Loop(flight(fault("az", "lost"), fdi=WEIGHED))
     statistical = loop.frames[0]["fdi"]["statistical"]
-    assert statistical["forces"]["known"]
-    assert not statistical["air"]["output"]["uses_accelerometers"], "watched: not taken at their word"
+    assert statistical["forces"]["in_use"]
+    assert not statistical["gust"]["output"]["uses_accelerometers"], "watched: not taken at their word"
     for _ in loop.chunks():
         pass
-    assert not statistical["forces"]["known"]
-    assert np.isfinite(statistical["alarm"]["score"])
+    assert not statistical["forces"]["in_use"]
+    assert np.isfinite(statistical["alarm"]["score_over_alarm_level"])

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.diagnosis.detection.parity import size_for
+from beaver_ftc.diagnosis.detection.parity import required_record_size
 from beaver_ftc.diagnosis.detection.statistical import statistical_dtype
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
@@ -53,14 +53,14 @@ def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it
     """A record has the room that its aircraft and its delays need."""
     usual = assembled()
     assert usual.nbytes <= 1_000_000  # the order of a second-level cache
-    assert usual["fdi"]["statistical"].dtype == statistical_dtype(size_for(load()))
+    assert usual["fdi"]["statistical"].dtype == statistical_dtype(required_record_size(load()))
     file = load().file
     twice = {axis: 2 * terms for axis, terms in file.moments}
     many = file.model_copy(update={"moments": file.moments.model_copy(update=twice)})
-    size = size_for(dataclasses.replace(load(), file=many))
+    size = required_record_size(dataclasses.replace(load(), file=many))
     in_roll_and_yaw = 2 * sum(term.coefficient != "Cm" for term in load().moments)
-    assert usual["fdi"]["statistical"]["block"]["tolerance"].shape[1] < in_roll_and_yaw + 5
-    assert in_roll_and_yaw + 5 <= size.rates.regressors < size.view.regressors
+    assert usual["fdi"]["statistical"]["block"]["regressor_tolerance"].shape[1] < in_roll_and_yaw + 5
+    assert in_roll_and_yaw + 5 <= size.rate_block.max_regressors < size.view_block.max_regressors
     slow = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}
     says = {}, {"sensors": slow}, {"changes": [{"at_s": 3.0, "sensors": slow}]}
     lines = [assembled(**keys)["instruments"]["line"].size for keys in says]
@@ -79,32 +79,37 @@ def at(record, path):
 
 
 EXPECTED = {
-    "dt": DT, "belief.share": 0.5, "belief.u": TRIM, "belief.commanded": TRIM, "control.layout.trim": TRIM,
+    "dt": DT, "prediction.frame_share_per_instant": 0.5, "prediction.u": TRIM, "prediction.commanded": TRIM,
+    "control.layout.trim": TRIM,
     "control.allocation.output.command": TRIM,
-    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.config.forgetting": exp(-DT / 2.0),
-    "fdi.isolation.config.decay": exp(-2.5 * DT),
-    "fdi.fdae.config.pole": 1.5, "fdi.fdae.config.decay": exp(-1.5 * DT), "fdi.isolation.config.n": 8,
-    "fdi.fdae.network.config.gain": 45.0, "fdi.fdae.network.config.leak_per_s": 0.8,
+    "fdi.config.enabled": 1, "fdi.config.dt": DT, "fdi.isolation.config.forgetting_factor": exp(-DT / 2.0),
+    "fdi.isolation.config.filter_decay": exp(-2.5 * DT),
+    "fdi.fdae.config.pole_per_s": 1.5, "fdi.fdae.config.decay_factor": exp(-1.5 * DT),
+    "fdi.isolation.config.n_estimators": 8,
+    "fdi.fdae.network.config.learning_gain": 45.0, "fdi.fdae.network.config.leak_per_s": 0.8,
     "fdi.fdae.network.config.weight_limit": 15.0,
-    "fdi.bound.inertia": (0.1, 0.2, 0.3), "fdi.bound.constant": (0.01, 0.02, 0.03),
-    "fdi.bound.earth_rate": 7.292115e-5,  # rad/s [WGS84]
-    "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.type": -1,
-    "fdi.verdict.type_at_s": -1.0, "fdi.verdict.lead": -1, "fdi.verdict.lead_kind": -1,
-    "accounts.guarantee.certain_after_s": -1.0,
+    "fdi.bound.inertia_coupling": (0.1, 0.2, 0.3), "fdi.bound.constant_bound": (0.01, 0.02, 0.03),
+    "fdi.bound.earth_rate_rad_s": 7.292115e-5,  # rad/s [WGS84]
+    "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.fault_type": -1,
+    "fdi.verdict.type_decided_at_s": -1.0, "fdi.verdict.accommodated_surface": -1,
+    "fdi.verdict.accommodation_mode": -1, "accounts.guarantee.certain_after_s": -1.0,
     "fdi.layout.main": (AILERON, ELEVATOR, RUDDER), "fdi.layout.dominant_axis": (0, 1, 2, 1),
     "fdi.layout.partner": (RUDDER, FLAP, AILERON, ELEVATOR),
-    "fdi.config.every_type": 1, "fdi.types.config.length": 1, "fdi.types.config.block_s": DT,
-    "fdi.types.config.whole": 0, "fdi.config.instants": 2,
-    "fdi.types.config.released_returns": 1, "fdi.types.config.half_cycle_frames": 131,  # of 2.618 s
-    "fdi.types.pair.enabled": 0, "fdi.types.pair.first": -1,
+    "fdi.config.diagnoses_all_types": 1, "fdi.types.config.frames_per_block": 1,
+    "fdi.types.config.block_duration_s": DT,
+    "fdi.types.config.is_single_instant": 0, "fdi.config.n_substeps": 2,
+    "fdi.types.config.returns_via_actuator": 1, "fdi.types.config.slowest_half_cycle_frames": 131,
+    # of 2.618 s
+    "fdi.types.pair.enabled": 0, "fdi.types.pair.first_fault_surface": -1,
     "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
     "fdi.types.surface.1.accommodation.mode": -1,
-    "fdi.types.surface.1.status.type": -1, "fdi.types.surface.0.status.is_candidate": 1,
-    "fdi.types.surface.1.actuator.approach": 1.0 - exp(-25.0 * DT / 2),
-    "fdi.types.surface.1.actuator.step": pi / 2 * DT / 2,
-    "fdi.types.surface.1.actuator.least_runaway_rate": pi / 4,
-    "fdi.types.surface.1.actuator.slowest_step": radians(3.0) * DT / 2,
-    "fdi.bank.config.n": 3, "fdi.isolation.config.memory": 0, "fdi.isolation.config.membership": 1,
+    "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.is_candidate": 1,
+    "fdi.types.surface.1.actuator.lag_share_per_substep": 1.0 - exp(-25.0 * DT / 2),
+    "fdi.types.surface.1.actuator.max_motion_per_substep": pi / 2 * DT / 2,
+    "fdi.types.surface.1.actuator.min_runaway_rate": pi / 4,
+    "fdi.types.surface.1.actuator.min_motion_per_substep": radians(3.0) * DT / 2,
+    "fdi.bank.config.n_filters": 3, "fdi.isolation.config.uses_reach_test": 0,
+    "fdi.isolation.config.narrows_theta_sets": 1,
     "control.reference.config.dt": DT,
     "control.surfaces.output.effectiveness": 1.0,
     "control.surfaces.config.effectiveness_step": 2.5 * DT, "control.reference.memory.scale": 1.0,
@@ -116,9 +121,11 @@ EXPECTED = {
     "control.probe.config.frames": 150,
     "control.probe.memory.from_s": -1.0,
     "control.probe.memory.to_s": -1.0,
-    "belief.actuators.real": 1, "belief.actuators.low": TRAVEL[0], "belief.actuators.high": TRAVEL[1],
-    "belief.actuators.approach.2": 1.0 - exp(-12.0 * DT / 2), "belief.actuators.approach.1": 1 - exp(-0.25),
-    "belief.actuators.step.1": pi / 2 * DT / 2,
+    "prediction.actuators.real": 1,
+    "prediction.actuators.low": TRAVEL[0], "prediction.actuators.high": TRAVEL[1],
+    "prediction.actuators.approach.2": 1.0 - exp(-12.0 * DT / 2),
+    "prediction.actuators.approach.1": 1 - exp(-0.25),
+    "prediction.actuators.step.1": pi / 2 * DT / 2,
     "control.power.config.enabled": 1,
     "control.power.output.from_s": -1.0,
     "control.power.config.impatience": DT / 1.25,
@@ -140,12 +147,12 @@ EXPECTED = {
 
 @pytest.mark.parametrize("path", EXPECTED)
 def test_a_number_of_the_record(path, frame):
-    found, rel = np.array(at(frame, path)), 1e-6 if path.endswith("earth_rate") else 1e-9
+    found, rel = np.array(at(frame, path)), 1e-6 if path.endswith("earth_rate_rad_s") else 1e-9
     assert found == pytest.approx(np.broadcast_to(EXPECTED[path], found.shape), rel=rel)
 
 
 def test_poles_are_that_of_detection_and_the_bank(frame):
-    assert frame["fdi"]["bank"]["config"]["decay"][:3] == pytest.approx(
+    assert frame["fdi"]["bank"]["config"]["decay_factor"][:3] == pytest.approx(
         np.exp(-DT * np.array([1.5, 0.5, 4.0]))
     )
 
@@ -177,8 +184,8 @@ def test_losses_of_the_leading_surfaces_come_first_then_the_others_and_every_pos
     )  # fmt: skip
     fies = frame["fdi"]["isolation"]["estimator"][:8]
     assert fies["surface"].tolist() == [0, 1, 2, 3] * 2
-    assert fies["low"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
-    assert fies["high"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
+    assert fies["theta_min"].tolist() == [-1.0] * 4 + TRAVEL[0].tolist()
+    assert fies["theta_max"].tolist() == [0.0] * 4 + TRAVEL[1].tolist()
     assert frame["fdi"]["layout"]["loss_estimator"].tolist() == [0, 1, 2, 3]
     assert frame["fdi"]["layout"]["position_estimator"].tolist() == [4, 5, 6, 7]
 
@@ -206,18 +213,18 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     switches = (
         before["config"]["enabled"],
         before["sensor_monitor"]["config"]["enabled"],
-        before["config"]["every_type"],
+        before["config"]["diagnoses_all_types"],
     )
     assert switches == (1, 1, 1)
     plugin_frame.plugged(frames, scenario, np.ones(40), RlsMonitor(), None)
     fdi = frames["fdi"][0]
     off = (
         fdi["config"]["enabled"],
-        fdi["isolation"]["config"]["n"],
-        fdi["config"]["every_type"],
+        fdi["isolation"]["config"]["n_estimators"],
+        fdi["config"]["diagnoses_all_types"],
         fdi["sensor_monitor"]["config"]["enabled"],
     )
     power = frames["control"]["power"]["config"]
-    assert (*off, fdi["statistical"]["tests"]["enabled"], power["enabled"][0]) == (0,) * 6
+    assert (*off, fdi["statistical"]["test_config"]["enabled"], power["enabled"][0]) == (0,) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None

@@ -82,7 +82,7 @@ def test_sound_instruments_are_never_suspected(more):
     for _ in loop.chunks():
         pass
     watch = loop.frames[0]["fdi"]["sensor_monitor"]
-    assert watch["memory"]["begun"]
+    assert watch["memory"]["start_stage"]
     assert not watch["output"]["alarmed"]
 
 

@@ -29,7 +29,8 @@ GOES_ON = {
         *(f"control.{name}" for name in REFERENCE_AND_COMMAND),
         *(f"control.power.{name}" for name in ENGINE),
     },
-    "scheme": {"fdi.bank.output.closest", "fdi.statistical.alarm.closest"},
+    "scheme": {
+        "fdi.bank.output.max_threshold_ratio_so_far", "fdi.statistical.alarm.max_score_over_alarm_level"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")
@@ -49,8 +50,8 @@ OWN = {
     "observer": OF_A_LAW,
     "scheme": {
         "since",
-        "fdi.statistical.air.config.in_flight",
-        "fdi.statistical.inertial_air.config.in_flight",
+        "fdi.statistical.gust.config.starts_in_flight",
+        "fdi.statistical.inertial_gust.config.starts_in_flight",
     },
     "sensors": {"instruments.taken"},
 }

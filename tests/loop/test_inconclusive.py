@@ -9,7 +9,7 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.diagnosis.bounds import UNKNOWN_RAD_S2
+from beaver_ftc.diagnosis.bounds import UNMAPPED_ERROR_RAD_S2
 
 FULL = {
     "p_rad_s": [-9, 9], "q_rad_s": [-9, 9], "r_rad_s": [-9, 9], "alpha_rad": [-1, 1], "beta_rad": [-1, 1],
@@ -43,7 +43,7 @@ def flown(folder, **keys):
 
 
 def share_by_log(flight):
-    return float(np.mean(np.asarray(flight.log["q_eta_bar_rad_s2"]) > 0.4 * UNKNOWN_RAD_S2))
+    return float(np.mean(np.asarray(flight.log["q_eta_bar_rad_s2"]) > 0.4 * UNMAPPED_ERROR_RAD_S2))
 
 
 def test_inside_of_the_map_all_is_as_before(folder):

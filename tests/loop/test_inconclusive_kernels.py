@@ -2,24 +2,24 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.bounds import N_PLACES
+from beaver_ftc.diagnosis.bounds import N_MAP_COORDINATES
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
-from beaver_ftc.loop.accounts import INCONCLUSIVE, note_inconclusive
+from beaver_ftc.loop.frame import INCONCLUSIVE, note_inconclusive
 
 DENSITY = 6
 
 
 def diagnosis(enabled=1, outside=1, time_s=5.0, n_boxes=2, **place):
     fdi = np.zeros(1, diagnosis_dtype(4)).view(np.recarray)[0]
-    fdi["config"]["enabled"], error_map = enabled, fdi["bound"]["error_map"]
-    error_map["n_boxes"], error_map["outside"], error_map["time_s"] = n_boxes, outside, time_s
-    error_map["n_ages"], error_map["until_s"][0] = 1, 60.0
-    error_map["low"][0], error_map["high"][0] = -1.0, 1.0
-    error_map["low"][1], error_map["high"][1] = -2.0, 3.0
-    error_map["low"][:2, DENSITY], error_map["high"][:2, DENSITY] = (0.9, 1.0), (1.05, 1.2)
-    error_map["place"][:], error_map["place"][DENSITY] = 0.5, 1.1
+    fdi["config"]["enabled"], error_map = enabled, fdi["bound"]["model_error_map"]
+    error_map["n_boxes"], error_map["is_outside_all_boxes"], error_map["time_s"] = n_boxes, outside, time_s
+    error_map["n_time_rows"], error_map["until_s"][0] = 1, 60.0
+    error_map["box_low"][0], error_map["box_high"][0] = -1.0, 1.0
+    error_map["box_low"][1], error_map["box_high"][1] = -2.0, 3.0
+    error_map["box_low"][:2, DENSITY], error_map["box_high"][:2, DENSITY] = (0.9, 1.0), (1.05, 1.2)
+    error_map["coordinates"][:], error_map["coordinates"][DENSITY] = 0.5, 1.1
     for name, value in place.items():
-        error_map["place"][int(name[1:])] = value
+        error_map["coordinates"][int(name[1:])] = value
     return fdi
 
 
@@ -41,7 +41,7 @@ def test_each_reason_is_counted():
     )  # fmt: skip
     assert (counted.watched, counted.frames, counted.from_s) == (8, 6, 0.5)
     assert (counted.late, counted.undiagnosed, counted.between) == (1, 1, 1)
-    beyond = np.zeros(N_PLACES)
+    beyond = np.zeros(N_MAP_COORDINATES)
     beyond[3], beyond[DENSITY] = 1, 3
     assert counted.beyond.tolist() == beyond.tolist()
     assert (counted.least[DENSITY], counted.greatest[DENSITY]) == (0.7, 1.25)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control.accommodation import MAX_EVENTS
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import accounts, assembly, frame, loop, outcome
+from beaver_ftc.loop import assembly, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import measure
@@ -217,7 +217,7 @@ def test_more_events_than_there_is_room_for_are_counted_and_the_last_is_kept():
     frames, room, stays = np.zeros(1, assembly.frame_dtype(4)), MAX_EVENTS, 150
     envelope = frames[0]["accounts"]["envelope"]
     for k in range(10 * stays):
-        accounts.note_envelope(envelope, k % 10 >= 7, float(k))
+        frame.note_envelope(envelope, k % 10 >= 7, float(k))
     frames["k"], frames["dt"] = 10 * stays - 1, 1.0
     exits = outcome._envelope_exits(frames[0])
     assert len(exits) == room

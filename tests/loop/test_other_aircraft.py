@@ -9,8 +9,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import design_record
+from beaver_ftc.design.model import DesignFunctions, design_record
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import FlightState, Plant

@@ -6,7 +6,7 @@ from math import inf, radians
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, UNANTICIPATED
 from beaver_ftc.loop.assembly import Trim, assemble
 from beaver_ftc.loop.outcome import Landing, guaranteed_delay_s, landing_of, verdict_of
@@ -17,7 +17,7 @@ SURFACES = ("aileron", "elevator", "rudder", "flap")
 TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0, 0.3])
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
 ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.detected_axis": 1}
-NAMED = ALARM | {"fdi.verdict.isolated": 1, "fdi.verdict.isolated_at_s": 2.5}
+NAMED = ALARM | {"fdi.verdict.isolated_estimator": 1, "fdi.verdict.isolated_at_s": 2.5}
 PILOT = {"autopilot.enabled": 1, "autopilot.commanded": [1, 1, 0, 1]}
 
 # Of each case the scenario's keys, and what is put into the record of its flight.
@@ -39,32 +39,37 @@ CASES = {
         "accounts.envelope.outside_frames": 150, "accounts.envelope.exit_at_s": [2.0, 8.0, 5.0],
         "accounts.envelope.return_at_s": [3.0, inf, 6.0],
     }),
-    "alarm": ({}, ALARM | {"fdi.bank.output.closest": [0.2, 0.7, 0.9], "fdi.bank.config.n": 2,
+    "alarm": ({}, ALARM | {"fdi.bank.output.max_threshold_ratio_so_far": [0.2, 0.7, 0.9],
+                           "fdi.bank.config.n_filters": 2,
                            "fdi.isolation.estimator.2.excluded": 1}),
     "named": ({}, NAMED | {"fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
-                           "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7], "fdi.bank.config.n": 0,
-                           "fdi.bank.output.closest": [0.3, 0.7]}),
+                           "fdi.isolation.estimator.1.theta": [-0.1, -0.4, -0.7],
+                           "fdi.bank.config.n_filters": 0,
+                           "fdi.bank.output.max_threshold_ratio_so_far": [0.3, 0.7]}),
     "a-damage-besides": ({"aircraft": "beaver", "fdi": {"fault_class": "published"}}, ALARM | {
-        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.config.taken": [0, 1, 0, 1],
+        "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.config.can_be_lost_by_damage": [0, 1, 0, 1],
     }),
     "a-damage-excluded": ({}, NAMED | {
         "fdi.isolation.estimator.0.excluded": 1, "fdi.isolation.estimator.2.excluded": 1,
-        "fdi.isolation.config.taken": [0, 1, 0, 1],
+        "fdi.isolation.config.can_be_lost_by_damage": [0, 1, 0, 1],
     }),
     "named-first": ({}, NAMED | {
-        "fdi.verdict.isolated": 0, "fdi.isolation.estimator.0.theta": [-0.3, -0.5, -0.7],
+        "fdi.verdict.isolated_estimator": 0, "fdi.isolation.estimator.0.theta": [-0.3, -0.5, -0.7],
     }),
     "nothing": ({}, {}),
     "alarm-at-once": ({}, ALARM | {"fdi.verdict.detected_at_s": 0.0}),
-    "unanticipated": ({}, ALARM | {"fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0}),
+    "unanticipated": ({}, ALARM | {"fdi.verdict.isolated_estimator": UNANTICIPATED,
+                                   "fdi.verdict.isolated_at_s": 3.0}),
     "withdrawn": ({}, ALARM | {
-        "fdi.verdict.isolated": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0, "fdi.verdict.n_withdrawn": 2,
-        "fdi.verdict.withdrawn.surface": [1, 3, 2], "fdi.verdict.withdrawn.from_s": [2.0, 2.5, 4.0],
-        "fdi.verdict.withdrawn.to_s": [2.25, 3.0, 5.0],
+        "fdi.verdict.isolated_estimator": UNANTICIPATED, "fdi.verdict.isolated_at_s": 3.0,
+        "fdi.verdict.n_withdrawn_isolations": 2,
+        "fdi.verdict.withdrawn_isolations.surface": [1, 3, 2],
+        "fdi.verdict.withdrawn_isolations.from_s": [2.0, 2.5, 4.0],
+        "fdi.verdict.withdrawn_isolations.to_s": [2.25, 3.0, 5.0],
     }),
     "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
-        "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.closest": 0.95,
-        "fdi.statistical.tests.alarm_level": 6.5,
+        "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.max_score_over_alarm_level": 0.95,
+        "fdi.statistical.test_config.alarm_level": 6.5,
     }),
     "engine": ({}, {
         "control.power.config.enabled": 1, "control.power.output.from_s": 0.0,
@@ -100,7 +105,7 @@ CASES = {
     "no-limits": ({}, {"autopilot.holding.from_s": [5.0, 3.0, 0.0]}),
     "instrument": ({"fdi": {"sensor_monitor": "always"}}, ALARM | {
         "t": 5.0, "fdi.sensor_monitor.output.alarmed": 1, "fdi.sensor_monitor.output.alarmed_at_s": 1.5,
-        "fdi.sensor_monitor.output.named": 1, "fdi.sensor_monitor.output.named_at_s": 1.75,
+        "fdi.sensor_monitor.output.isolated_sensor": 1, "fdi.sensor_monitor.output.isolated_at_s": 1.75,
     }),
 }  # fmt: skip
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import Loop
@@ -92,7 +92,9 @@ def test_what_is_taken_of_a_verdict(frame, verdict, taken):
     plugins, record = frame
     record["effectiveness"] = 7.0
     assert plugins._checked(verdict, record) is verdict
-    found = tuple(record[name].item() for name in ("detected", "axis", "isolated", "theta", "estimates"))
+    found = tuple(
+        record[name].item() for name in ("detected", "axis", "isolated", "theta", "has_effectiveness")
+    )
     assert found == taken
     expected = verdict.effectiveness if taken[-1] else [7.0] * 4
     assert record["effectiveness"].tolist() == list(expected)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.diagnosis.readout import OF_BLOCK
+from beaver_ftc.diagnosis.readout import RECORDED_BLOCK_FIELDS
 from beaver_ftc.loop import Stepping, recorded_always, recorded_until_alarm
 from beaver_ftc.plant.instruments import SENSORS
 
@@ -44,7 +44,7 @@ def test_a_frame_is_read_as_the_log_has_it(flown):
     assert (now.k, now.dt_s, now.since) == (flight.frames, 1.0 / flight.rate_hz, 0)
     assert now.rates_rad_s.tolist() == by_axis(row, "measured_rad_s")
     assert now.airspeed_mps == row["airspeed_mps"]
-    assert now.diagnosis.bound.eta_bar_rad_s2.tolist() == by_axis(row, "eta_bar_rad_s2")
+    assert now.diagnosis.declared_bounds.eta_bar_rad_s2.tolist() == by_axis(row, "eta_bar_rad_s2")
     assert now.alarmed == bool(row["detected"])
 
 
@@ -55,13 +55,13 @@ def test_the_diagnosis_is_read_as_the_log_has_it(flown):
     columns = [name for name in row if name.startswith("fie_") and name.endswith("_excluded")]
     names = [name.removeprefix("fie_").removesuffix("_excluded") for name in columns]
     assert diagnosis.detected_at_s == alarm_s
-    assert names[diagnosis.isolated].removesuffix("_position") == verdict.isolated
-    assert diagnosis.excluded.tolist() == [bool(row[f"fie_{name}_excluded"]) for name in names]
-    assert [one.excluded for one in diagnosis.estimators] == diagnosis.excluded.tolist()
-    assert (diagnosis.enabled, diagnosis.every_type) == (True, True)
+    assert names[diagnosis.isolated_estimator].removesuffix("_position") == verdict.isolated
+    assert diagnosis.is_estimator_excluded.tolist() == [bool(row[f"fie_{name}_excluded"]) for name in names]
+    assert [one.is_excluded for one in diagnosis.estimators] == diagnosis.is_estimator_excluded.tolist()
+    assert (diagnosis.enabled, diagnosis.diagnoses_all_types) == (True, True)
     aircraft = bf.load(FLIGHT).airframe
     for s, name in enumerate(aircraft.surfaces):
-        stops, actuator = aircraft.travel[name], diagnosis.surfaces[s].actuator
+        stops, actuator = aircraft.travel[name], diagnosis.surface_fault_types[s].actuator
         assert (actuator.travel_low_rad, actuator.travel_high_rad) == (stops.min_rad, stops.max_rad)
         assert names[diagnosis.layout.position_estimator[s]] == f"{name}_position"
         assert names[diagnosis.layout.loss_estimator[s]] == name
@@ -71,15 +71,17 @@ def test_the_diagnosis_is_read_as_the_log_has_it(flown):
 def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has_them(flown):
     _, _, now, row, _ = flown
     diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
-    shares = [one.score / diagnosis.alarm_level for block in diagnosis.blocks for one in block.hypotheses]
+    shares = [
+        one.score / diagnosis.alarm_level for block in diagnosis.filter_blocks for one in block.hypotheses
+    ]
     logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
     assert max(shares) == pytest.approx(max(logged), rel=1e-12)
-    for block in diagnosis.blocks:
-        assert block.lanes.score.shape[0] == len(block.hypotheses)
-        assert len(block.axes) in (1, 2)
+    for block in diagnosis.filter_blocks:
+        assert block.onset_tests.score.shape[0] == len(block.hypotheses)
+        assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled
-    assert (monitor.share, monitor.largest_test) == (row["watch_share"], row["watch_test"])
-    assert len(monitor.predicted) == len(SENSORS)
+    assert (monitor.worst_test_ratio, monitor.worst_test) == (row["watch_share"], row["watch_test"])
+    assert len(monitor.predicted_reading) == len(SENSORS)
 
 
 def test_a_readout_stays_when_the_flight_goes_on(flown):
@@ -101,7 +103,7 @@ def test_what_is_recorded_is_part_of_the_record(flown):
     flight, _, now, *_ = flown
     record, n = flight.records, len(now.diagnosis.estimators)
     always, early = recorded_always(record[0], n, True), recorded_until_alarm(record[0], n, True)
-    assert {*OF_BLOCK} < {*early}
+    assert {*RECORDED_BLOCK_FIELDS} < {*early}
     for name, view in (always | early).items():
         assert np.shares_memory(view, record), name
         assert view.base is not None

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.design.air import Dryden
+from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput
@@ -91,10 +91,10 @@ def test_what_a_plug_in_is_told_before_and_in_flight(loop, changed):
 
 @pytest.mark.parametrize(
     ("noise", "quantum", "looks"),
-    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, redundancy.NEVER_FROZEN)],
+    [(0.0, 0.0, 3), (1.0, 0.0, 3), (0.26, 1.0, 50), (0.25, 1.0, redundancy.NEVER_FROZEN_SAMPLES)],
 )
 def test_for_how_long_a_sound_instrument_may_stand_still(noise, quantum, looks):
-    assert redundancy.longest_identical(noise, quantum) == looks
+    assert redundancy.min_frozen_samples(noise, quantum) == looks
 
 
 def test_gusts_that_the_watch_reckons_with():
@@ -104,7 +104,7 @@ def test_gusts_that_the_watch_reckons_with():
     sigma = 7.4 * 0.3048
     assert speed == pytest.approx(GUST_LIMIT_SIGMA * sigma)
     per_s = GUST_LIMIT_SIGMA * sigma * sqrt(3.0 * 1.4 * 45.0 / 533.4)
-    expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in redundancy.POLES_PER_S]
+    expected = [per_s * sqrt(0.01 / (1 - exp(-2 * pole * 0.01))) for pole in redundancy.FILTER_POLES_PER_S]
     assert changes == pytest.approx(expected)
     assert redundancy.gust_bounds(Dryden("none"), 45.0, 0.01)[0] == 0.0
 
@@ -216,7 +216,7 @@ def test_where_the_ground_is(gear, told, altitude_m, ground_m):
 def test_the_command_and_the_engine_are_handed_over_through_python():
     loop = Loop(_scenario())
     frame = loop.frames[0]
-    frame["belief"]["commanded"] = [0.1, -0.2, 0.05, 0.3]
+    frame["prediction"]["commanded"] = [0.1, -0.2, 0.05, 0.3]
     frame["control"]["power"]["output"]["command"], before = (
         12.5,
         loop.plant.read(loop.aircraft.trim.throttle),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.control.base import row_of
+from beaver_ftc.control import row_of
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.loop import stream
 from beaver_ftc.loop.assembly import Trim, assemble
@@ -119,16 +119,22 @@ def test_delays_that_just_fit_are_taken(lines):
 
 def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
     frame, new = _frame("nominal"), _frame("nominal")
-    frame["fdi"]["bank"]["output"]["closest"], frame["fdi"]["statistical"]["alarm"]["closest"] = 0.5, 0.75
+    (
+        frame["fdi"]["bank"]["output"]["max_threshold_ratio_so_far"],
+        frame["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level"],
+    ) = 0.5, 0.75
     for same in (True, False):
-        new["fdi"]["bank"]["output"]["closest"], new["fdi"]["sensor_monitor"]["memory"]["substep"] = 0.0, 3
-        new["fdi"]["bank"]["config"]["n"] = frame["fdi"]["bank"]["config"]["n"] + (not same)
+        (
+            new["fdi"]["bank"]["output"]["max_threshold_ratio_so_far"],
+            new["fdi"]["sensor_monitor"]["memory"]["substep"],
+        ) = 0.0, 3
+        new["fdi"]["bank"]["config"]["n_filters"] = frame["fdi"]["bank"]["config"]["n_filters"] + (not same)
         then = frame.copy()
         take_diagnosis(then, new, 77)
         assert then["since"] == 77
         assert then["fdi"]["sensor_monitor"]["memory"]["substep"] == 0
-        assert then["fdi"]["statistical"]["alarm"]["closest"] == 0.75
-        assert set(then["fdi"]["bank"]["output"]["closest"]) == {0.5 if same else 0.0}
+        assert then["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level"] == 0.75
+        assert set(then["fdi"]["bank"]["output"]["max_threshold_ratio_so_far"]) == {0.5 if same else 0.0}
 
 
 def test_changes_are_due_at_their_frames():

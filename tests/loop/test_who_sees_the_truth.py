@@ -15,9 +15,9 @@ import pytest
 
 import beaver_ftc
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.schemes import diagnosis_dtype
-from beaver_ftc.loop.accounts import true_faults_dtype
+from beaver_ftc.loop.frame import true_faults_dtype
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.plant.sensing import truth_dtype
@@ -107,12 +107,12 @@ def test_no_kernel_is_given_the_truth(calls, folder):
 
 def test_what_is_meant_to_see_the_truth_does(calls):
     """The watch would notice: sensing, accounts and the log are given the record."""
-    for name in ("plant.sensing.measure", "loop.accounts.track", "loop.frame.record_truth"):
+    for name in ("plant.sensing.measure", "loop.frame.track", "loop.frame.record_truth"):
         assert ["truth", "record"] in calls[f"beaver_ftc.{name}"]
 
 
 def test_the_truth_has_a_type_of_its_own():
-    others = belief_dtype(4), diagnosis_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
+    others = prediction_dtype(4), diagnosis_dtype(4), control_dtype(4), true_faults_dtype(4), MEASURED
     assert truth_dtype(4) not in others
 
 

@@ -2,10 +2,10 @@
 
 A stage is configured at one of two instants, each of which is one function here:
 
-    configure_design   from the scenario alone: sensors, belief, thresholds, estimators, allocation,
-                       reference. Flights of one design share it: it is made once, and copied.
-    configure_at_trim  once the trim is known: what is linearised there, the law, the autopilot, the
-                       statistical detector, the sensor monitor.
+    configure_design   from the scenario alone: sensors, prediction, thresholds, estimators, allocation,
+                       reference, autopilot. Flights of one design share it: it is made once, and copied.
+    configure_at_trim  once the trim is known: what is linearised there, the law, the statistical detector,
+                       the sensor monitor.
 
 `assemble` does both. A change in flight assembles the record of its scenario from the same trim.
 
@@ -21,17 +21,20 @@ import numpy as np
 from beaver_ftc.compiled import record, sized
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import SUPERVISOR
-from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS
-from beaver_ftc.control.profile import set_up_autopilot
+from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS, set_up_autopilot
 from beaver_ftc.design.model import anchor, mass_of
-from beaver_ftc.diagnosis import expectation, schemes
+from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
-from beaver_ftc.diagnosis.detection import noise_model
-from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, RecordSize, size_for
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection.parity import (
+    USUAL_RECORD_SIZE,
+    StatisticalRecordSize,
+    required_record_size,
+)
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.accounts import accounts_dtype, true_faults_dtype
+from beaver_ftc.loop.frame import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import RUNNING
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
@@ -185,7 +188,7 @@ LOGGED = record(estimators=int, sensor_monitor=int, sampled=int, power=int, test
 
 
 @sized
-def frame_dtype(n: int, size: RecordSize = USUAL_SIZE, line: int = USUAL_LINE) -> np.dtype:
+def frame_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE, line: int = USUAL_LINE) -> np.dtype:
     """All that a flight of an aircraft with n surfaces remembers between frames; size: of its statistics;
     line: of its delay lines."""
     return record(
@@ -193,7 +196,7 @@ def frame_dtype(n: int, size: RecordSize = USUAL_SIZE, line: int = USUAL_LINE) -
         running=RUNNING,
         since=int, logged=LOGGED,  # the frame with which this diagnosis has begun
         truth=truth_dtype(n), instruments=instruments_dtype(line), measured=MEASURED,
-        belief=expectation.belief_dtype(n), fdi=schemes.diagnosis_dtype(n, size),
+        prediction=model_prediction.prediction_dtype(n), fdi=schemes.diagnosis_dtype(n, size),
         assessment=assessment_dtype(n), faults=true_faults_dtype(n), supervisor=SUPERVISOR,
         control=control.control_dtype(n), autopilot=AUTOPILOT,
         held=int, held_rad=n,  # whether another than the law commands, and what
@@ -201,7 +204,7 @@ def frame_dtype(n: int, size: RecordSize = USUAL_SIZE, line: int = USUAL_LINE) -
     )  # fmt: skip
 
 
-_DESIGN = ("fdi", "control", "design_model", "actuators", "sensors")
+_DESIGN = ("fdi", "control", "design_model", "actuators", "sensors", "autopilot")
 _MOST_DESIGNS = 32
 _designs: dict[tuple[object, ...], np.ndarray] = {}
 
@@ -242,19 +245,18 @@ def configure_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
     configure_diagnosis_at_trim(frame, scenario, trim)
     stage = frame["control"]
     stage["allocation"]["output"]["command"] = trim.u
-    control.configure_law(stage, frame["belief"], scenario, trim.y)
-    set_up_autopilot(frame["autopilot"], stage, scenario)
+    control.configure_law(stage, frame["prediction"], scenario, trim.y)
 
 
 def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) -> None:
-    """The same of a diagnosis without a law: belief, sensor monitor, statistical detector."""
-    belief, fdi, declared = frame["belief"], frame["fdi"], Declared.of(scenario)
-    design = belief["design"]
-    belief["u"] = belief["commanded"] = frame["control"]["layout"]["trim"] = trim.u
+    """The same of a diagnosis without a law: prediction, sensor monitor, statistical detector."""
+    prediction, fdi, declared = frame["prediction"], frame["fdi"], Declared.of(scenario)
+    design = prediction["design"]
+    prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.u
     anchor(design, *trim)
     redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
     mass = mass_of(scenario.design_model, scenario.airframe)
-    noise_model.configure_statistics(
+    statistical.configure_statistical_detector(
         fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz
     )
 
@@ -262,31 +264,32 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:
     """The record of a design, made again."""
     aircraft, dt = scenario.airframe, 1.0 / scenario.rate_hz
-    frames = taken_empty((1,), frame_dtype(aircraft.n, size_for(aircraft), line))
+    frames = taken_empty((1,), frame_dtype(aircraft.n, required_record_size(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
     truth, channels = frame["truth"], truth_read(scenario)
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     configure(frame["instruments"], scenario, instant_s)
-    expectation.configure(frame["belief"], scenario, travel)
-    schemes.configure_diagnosis(frame["fdi"], frame["belief"], scenario, travel)
+    model_prediction.configure_prediction(frame["prediction"], scenario, travel)
+    schemes.configure_diagnosis(frame["fdi"], frame["prediction"], scenario, travel)
     control.configure(frame["control"], scenario, travel)
+    set_up_autopilot(frame["autopilot"], frame["control"], scenario)
     return frames
 
 
 def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
-    first = ch.POS + 3 * frame["belief"]["u"].size
+    first = ch.POS + 3 * frame["prediction"]["u"].size
     return [ch.ALPHA, ch.BETA, ch.AIRSPEED, ch.QDYN, *range(first, first + int(frame["truth"]["declared"]))]
 
 
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:
     """Note in a flight's record what there are columns for; returns their names."""
     fdi, logged, profile = frame["fdi"], frame["logged"], bool(frame["autopilot"]["enabled"])
-    aircraft, tests = scenario.airframe, fdi["statistical"]["tests"]
+    aircraft, tests = scenario.airframe, fdi["statistical"]["test_config"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
-    logged["estimators"] = fdi["isolation"]["config"]["n"] if diagnoses_itself else 0
+    logged["estimators"] = fdi["isolation"]["config"]["n_estimators"] if diagnoses_itself else 0
     watched = logged["sensor_monitor"] = columns_of_the_monitor(scenario)
     sampled = reads_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0
@@ -294,6 +297,6 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     moved |= bool(frame["control"]["engines"]["config"]["n"])
     power = aircraft.power_setting if moved else ""
     logged["power"] = 1 + len(aircraft.effectors) if power else 0
-    logged["tests"] = tests["n_log_columns"] if tests["enabled"] else 0
+    logged["tests"] = tests["n_score_columns"] if tests["enabled"] else 0
     tested, columns = bool(tests["enabled"]), COLUMNS if profile else ()
     return ch.log_columns(aircraft, estimators, watched, power, columns, tested, sampled)

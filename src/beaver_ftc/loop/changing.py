@@ -2,7 +2,7 @@
 
 For each change the record of the flight is assembled once more, as the scenario says it from then on and from
 the same trim. At its frame the part that changes is taken from it: the law's, with what the surfaces and the
-reference stand at; the diagnosis', which restarts; or the instruments'. Truth, belief, supervisor,
+reference stand at; the diagnosis', which restarts; or the instruments'. Truth, prediction, supervisor,
 accounts and log go on, and so do plug-ins that are not changed.
 """
 
@@ -90,7 +90,7 @@ class Changing:
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
         statistical = frame["fdi"]["statistical"]
-        forces = statistical["forces"]["known"] or statistical["air"]["output"]["uses_accelerometers"]
+        forces = statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]
         if frame["fdi"]["sensor_monitor"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
             loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]

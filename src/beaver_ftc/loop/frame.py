@@ -5,47 +5,235 @@
     decide      control/accommodation.py  the mode
     command     control/                  the surfaces, and the engine
     outer loops control/autopilot.py      the reference of the next frame, if a profile is to be flown
-    record      accounts.py, frame.py     the metrics' sums, a row of the log
+    record      here                      the accounts of the flight, a row of the log
 
-Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only
-the kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame
-is in effect from the next on. In a row of the log, what is not there, or has not begun, is left as the row is
+Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only the
+kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame is in
+effect from the next on. In a row of the log, what is not there, or has not begun, is left as the row is
 given: not a number.
+
+The accounts are what the metrics are made of. They alone, and the oracle, see the truth. One of them is the
+instant from which detection is certain, whatever the uncertainty does: if
+|int e^{-lam (t - tau)} phi_i dtau| > 2 ebar_i for some i, the fault has been detected by t [Zhang2002]: at
+worst an admissible eta hides ebar_i of the fault's effect. With a bank of poles, the first of theirs. The
+effect phi is the truth's, so this is an analyst's figure: the diagnosis never sees it.
 """
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel
+from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, engines, laws, state
+from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.control.autopilot import SPEED, judge, steer
-from beaver_ftc.diagnosis import conclusion, schemes
+from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
+from beaver_ftc.diagnosis.bounds import N_MAP_COORDINATES, error_map_time_row, is_coordinate_outside_all_boxes
 from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
 from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.diagnosis.detection.filters import nearest_filter
-from beaver_ftc.diagnosis.expectation import (
-    accumulate_substep,
-    begin_sums,
-    evaluate_design,
-    evaluate_frame,
+from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
+from beaver_ftc.diagnosis.model_prediction import (
+    add_instant_to_frame,
+    begin_frame_sums,
+    evaluate_bound_and_frame_means,
+    evaluate_design_model,
     move_healthy_surfaces,
     predict_acceleration,
 )
-from beaver_ftc.diagnosis.monitors import engine_symmetry, sensor_monitor
-from beaver_ftc.diagnosis.schemes import record_named_surfaces
+from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import verdict
-from beaver_ftc.loop import accounts
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (
     NOT_FINITE,
     effective,
+    effectiveness,
     first_signal,
     flight_status,
     hand_over,
     measure,
     position,
 )
+from beaver_ftc.scenario.diagnosis import MAX_POLES
+
+GUARANTEE = record(
+    phi=3, phi_sum=3,  # effect of the faults, rad/s2: now, and over the frame
+    effect=(MAX_POLES, 3),  # filtered as the bank filters the innovation, rad/s
+    certain_after_s=float,
+)  # fmt: skip
+TRACKING = record(
+    before=3, frames_before=int,  # squared error before a fault, rad2/s2, and since
+    since=3, frames_since=int,
+)  # fmt: skip
+AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
+ENVELOPE = record(
+    outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
+)  # fmt: skip
+# Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
+# flight is
+# older than any that was measured. beyond: outside the map of the model's error in this quantity, which was
+# then
+# between least and greatest. between: inside the range of each quantity, but in no box of the map.
+INCONCLUSIVE = record(
+    watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
+    beyond=(int, N_MAP_COORDINATES), least=N_MAP_COORDINATES, greatest=N_MAP_COORDINATES,
+)  # fmt: skip
+
+
+@sized
+def accounts_dtype(n: int) -> np.dtype:
+    """Accounts of a flight with n surfaces; actuator_travel (n,) rad, actuator_energy
+    (n,) rad2/s: the integral of the speed's square."""
+    return record(
+        guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
+        inconclusive=INCONCLUSIVE,
+        saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
+    )  # fmt: skip
+
+
+@sized
+def true_faults_dtype(n: int) -> np.dtype:
+    """present: 1 from the first fault on. effectiveness (n,): 1 healthy. immovable (n,): does not follow its
+    command. effective (n,) rad: the deflection that acts. Cm_alpha3: the unanticipated pitching moment."""
+    return record(present=int, Cm_alpha3=float, effectiveness=n, immovable=(int, n), effective=n)
+
+
+@kernel
+def share_faults(truth, faults, informed):
+    """Fill `faults` (`true_faults_dtype`): for an informed law all, for others whether to account for
+    authority."""
+    faults.present = truth.faulted
+    if informed:
+        faults.Cm_alpha3 = truth.Cm_alpha3
+        for s in range(faults.effectiveness.size):
+            faults.effectiveness[s] = effectiveness(truth, s)
+            faults.effective[s] = effective(truth, s)
+            faults.immovable[s] = truth.immovable[s]
+
+
+@kernel
+def effect_of_faults(guarantee, truth, prediction, y):
+    """Fill guarantee.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
+    model weighs it."""
+    phi, G, u = guarantee.phi, prediction.G, prediction.u
+    phi[:] = 0.0
+    if truth.faulted:
+        for i in range(3):
+            for s in range(u.size):
+                phi[i] += G[i, s] * (effective(truth, s) - u[s])
+        phi[PITCH] += unanticipated_pitch(prediction.design, y, truth.Cm_alpha3)
+
+
+@kernel
+def add_effect(guarantee):
+    """Add the effect at an instant inside the frame."""
+    for i in range(3):
+        guarantee.phi_sum[i] += guarantee.phi[i]
+
+
+@kernel
+def follow_guarantee(guarantee, bank, dt, share, k, t):
+    """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
+
+    share: one over the instants in a frame. The sum then restarts with this instant. k: number of the
+    diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
+    """
+    if k == 0:
+        guarantee.effect[:], guarantee.phi_sum[:], guarantee.certain_after_s = 0.0, guarantee.phi, -1.0
+        return
+    for i in range(3):
+        mean = share * guarantee.phi_sum[i]
+        for m in range(bank.config.n_filters):
+            effect = bank.config.decay_factor[m] * guarantee.effect[m, i] + dt * mean
+            guarantee.effect[m, i] = effect
+            certain = abs(effect) > 2.0 * bank.output.threshold[m, i] > 0.0
+            if certain and guarantee.certain_after_s < 0.0:
+                guarantee.certain_after_s = t
+        guarantee.phi_sum[i] = guarantee.phi[i]
+
+
+@kernel
+def track(tracking, truth, model_rate):
+    """Add this frame's squared error of the rates, rad2/s2; model_rate (3,) rad/s."""
+    if truth.faulted:
+        sums = tracking.since
+        tracking.frames_since += 1
+    else:
+        sums = tracking.before
+        tracking.frames_before += 1
+    for i in range(3):
+        sums[i] += (model_rate[i] - truth.value[i]) ** 2
+
+
+@kernel
+def account_surfaces(accounts, truth, saturated, k, dt):
+    """How long each surface was saturated, how far it has actuator_travel and how fast."""
+    for s in range(saturated.size):
+        now = position(truth, s)
+        accounts.saturated_frames[s] += saturated[s]
+        if k > 0:
+            moved = now - accounts.position_then[s]
+            accounts.actuator_travel[s] += abs(moved)
+            accounts.actuator_energy[s] += moved * moved / dt
+        accounts.position_then[s] = now
+
+
+@kernel
+def account_authority(authority, axes):
+    """How much of what was demanded after the fault the surfaces could not give, and for how long not even
+    the rates could have been held."""
+    for i in range(3):
+        authority.demanded[i] += abs(axes.demand[i])
+        authority.lacking[i] += abs(axes.shortfall[i])
+        authority.beyond_frames[i] += axes.beyond[i]
+
+
+@kernel
+def note_envelope(envelope, outside, t):
+    """Note when the flight leaves the validated envelope and when it comes back; t s."""
+    envelope.outside_frames += outside
+    exits = outside and not envelope.outside
+    envelope.n_exits += exits
+    last = min(envelope.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays
+    if exits:
+        envelope.exit_at_s[last], envelope.return_at_s[last] = t, np.inf
+    elif envelope.outside and not outside:
+        envelope.return_at_s[last] = t
+    envelope.outside = outside
+
+
+@kernel
+def note_inconclusive(inconclusive, fdi, t):
+    """Count this frame, and why nothing can be concluded in it; t s."""
+    enabled, error_map = fdi.config.enabled, fdi.bound.model_error_map
+    inconclusive.watched += 1
+    if enabled and (error_map.n_boxes == 0 or not error_map.is_outside_all_boxes):
+        return
+    if inconclusive.frames == 0:
+        inconclusive.from_s = t
+    inconclusive.frames += 1
+    if not enabled:
+        inconclusive.undiagnosed += 1
+    elif error_map_time_row(error_map) < 0:
+        inconclusive.late += 1
+    else:
+        note_place(inconclusive, error_map)
+
+
+@kernel
+def note_place(inconclusive, error_map):
+    """Count the quantities in which this place is outside the map."""
+    explained = False
+    for i in range(error_map.coordinates.size):
+        if is_coordinate_outside_all_boxes(error_map, i):
+            now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
+            inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
+            inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
+            inconclusive.beyond[i] += 1
+            explained = True
+    inconclusive.between += not explained
+
 
 PER_ESTIMATOR = 10  # columns
 
@@ -93,8 +281,8 @@ def record_estimator(fie, started, row, column):
     """Residuals between their limits, once the estimators have started; and whether the fault is excluded."""
     if started:
         for i in range(3):
-            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.lower[i]
-            row[column + 3 * i + 2] = fie.upper[i]
+            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.lower_threshold[i]
+            row[column + 3 * i + 2] = fie.upper_threshold[i]
     row[column + PER_ESTIMATOR - 1] = fie.excluded
 
 
@@ -102,7 +290,7 @@ def record_estimator(fie, started, row, column):
 def record_alarm(bank, row, column):
     """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
     for i in range(3):
-        m = nearest_filter(bank, i)
+        m = filter_nearest_to_alarm(bank, i)
         row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
     return column + 6
 
@@ -120,8 +308,8 @@ def record_used(effectiveness, used, row, column):
 def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if monitor.config.enabled and monitor.memory.begun:
-        row[column], row[column + 1] = monitor.output.share, monitor.output.largest_test
+    if monitor.config.enabled and monitor.memory.start_stage:
+        row[column], row[column + 1] = monitor.output.worst_test_ratio, monitor.output.worst_test
     if columns > 2:
         for i in range(missing.size - 1, -1, -1):
             if missing[i]:
@@ -157,9 +345,9 @@ def monitor_sensors(frame):
     if engine.in_use:
         sensor_monitor.set_expected_manifold_pressure(monitor, engine.command[0])
     sensor_monitor.monitor_sensors(
-        monitor, frame.belief, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
+        monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
-    if monitor.output.alarmed and not (before or monitor.output.keeps_surface):
+    if monitor.output.alarmed and not (before or monitor.output.keeps_isolated_surface):
         reset_surface_diagnosis(fdi)
 
 
@@ -167,21 +355,21 @@ def monitor_sensors(frame):
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
     conclusion.discard_conclusion(fdi.verdict)
-    verdict.clear_modes(fdi.types.surface)
+    verdict.clear_all_accommodation_modes(fdi.types.surface)
     filters.reset_network(fdi.fdae.network)
 
 
 @kernel
 def sense(frame):
     """Measure, and see what the design model makes of this instant. Returns the flight's status."""
-    truth, belief, measured = frame.truth, frame.belief, frame.measured
+    truth, prediction, measured = frame.truth, frame.prediction, frame.measured
     measure(truth, frame.instruments, measured)
     if frame.fdi.sensor_monitor.config.enabled:
         monitor_sensors(frame)
     status = flight_status(truth.value, truth.ground_m, truth.slow_mps)
     if status != NOT_FINITE:
-        evaluate_design(belief, measured)
-        accounts.effect_of_faults(frame.accounts.guarantee, truth, belief, measured.y)
+        evaluate_design_model(prediction, measured)
+        effect_of_faults(frame.accounts.guarantee, truth, prediction, measured.y)
     return status
 
 
@@ -203,7 +391,7 @@ def begin(frame):
     start_clock(frame)
     status = sense(frame)
     if status != NOT_FINITE:
-        evaluate_frame(frame.belief, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+        evaluate_bound_and_frame_means(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
     return status
 
 
@@ -213,19 +401,27 @@ def diagnose(frame):
 
     The faults that the law already takes into account are expected: they are no innovation.
     """
-    fdi, belief, measured, k = frame.fdi, frame.belief, frame.measured, frame.k - frame.since
-    scheme, every_type, applied = fdi.config.scheme, fdi.config.every_type, frame.control.surfaces.output
-    engine_symmetry.disable_if_differential_thrust(fdi.engines, frame.control.power.output.command[1:])
+    fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
+    scheme, diagnoses_all_types, applied = (
+        fdi.config.scheme_number,
+        fdi.config.diagnoses_all_types,
+        frame.control.surfaces.output,
+    )
+    monitors.disable_if_differential_thrust(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
-        schemes.begin(scheme, fdi, belief, measured)
+        schemes.begin(scheme, fdi, prediction, measured)
     else:
-        predict_acceleration(belief, fdi.verdict.detected, applied.effectiveness, applied.offset, every_type)
-        schemes.predict(scheme, fdi, belief, measured, k, frame.t)
-    schemes.conclude(scheme, fdi, belief, measured, frame.t)
-    record_named_surfaces(fdi, frame.t)
-    schemes.prepare(scheme, fdi, belief, measured, k)
-    begin_sums(belief, fdi.bound, fdi.layout, every_type, measured)
-    accounts.follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, belief.share, k, frame.t)
+        predict_acceleration(
+            prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
+        )
+        schemes.predict(scheme, fdi, prediction, measured, k, frame.t)
+    schemes.conclude(scheme, fdi, prediction, measured, frame.t)
+    record_isolated_surfaces(fdi, frame.t)
+    schemes.prepare(scheme, fdi, prediction, measured, k)
+    begin_frame_sums(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
+    follow_guarantee(
+        frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.frame_share_per_instant, k, frame.t
+    )
     assess_faults(frame)
 
 
@@ -242,14 +438,16 @@ def assess_faults(frame):
 def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
-    schemes.accumulate(fdi.config.scheme, fdi, frame.belief, frame.measured)
-    accumulate_substep(frame.belief, fdi.bound, fdi.layout, fdi.config.every_type, frame.measured)
+    schemes.accumulate(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
+    add_instant_to_frame(
+        frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured
+    )
 
 
 @kernel
-def isolated_theta(fdi, s):
+def estimated_theta_of_isolated_loss(fdi, s):
     """Estimated theta of the isolated loss of surface s: see conclusion.py."""
-    return assessed.isolated_theta(
+    return assessed.estimated_theta_of_isolated_loss(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )
 
@@ -258,7 +456,7 @@ def isolated_theta(fdi, s):
 def decide(frame):
     """The mode for this frame."""
     control, layout, informed = frame.control, frame.control.layout, frame.control.config.informed
-    accounts.share_faults(frame.truth, frame.faults, informed)
+    share_faults(frame.truth, frame.faults, informed)
     if informed:
         wanted = accommodation.true_mode(layout.main[PITCH], frame.faults)
     else:
@@ -269,8 +467,8 @@ def decide(frame):
 @kernel
 def accommodate(frame):
     """How effective the law takes each surface to be."""
-    law, belief = frame.control.config.law, frame.belief
-    state.accommodate(law, frame.control, frame.assessment, frame.faults, belief, frame.measured)
+    law, prediction = frame.control.config.law, frame.prediction
+    state.accommodate(law, frame.control, frame.assessment, frame.faults, prediction, frame.measured)
 
 
 @kernel
@@ -289,7 +487,7 @@ def command(frame):
         return
     accommodate(frame)
     state.command(
-        control.config.law, control, frame.assessment, frame.faults, frame.belief, frame.measured, mode,
+        control.config.law, control, frame.assessment, frame.faults, frame.prediction, frame.measured, mode,
         frame.t,
     )  # fmt: skip
 
@@ -297,11 +495,16 @@ def command(frame):
 @apart
 def fly_profile(frame, commanded):
     """Add the outer loops' body rates to what is commanded (3,) rad/s, and set the engine."""
-    autopilot, control, belief, value = frame.autopilot, frame.control, frame.belief, frame.truth.value
+    autopilot, control, prediction, value = (
+        frame.autopilot,
+        frame.control,
+        frame.prediction,
+        frame.truth.value,
+    )
     unexplained, elevator = control.axes.disturbance[PITCH], control.layout.main[PITCH]
     if unexplained != 0.0:
-        unexplained /= belief.G[PITCH, elevator]  # rad of the elevator
-    steer(autopilot, control, belief.u, frame.measured, unexplained, frame.t)
+        unexplained /= prediction.G[PITCH, elevator]  # rad of the elevator
+    steer(autopilot, control, prediction.u, frame.measured, unexplained, frame.t)
     if autopilot.sets_power:
         engines.follow_autopilot(control.power, autopilot.setting, autopilot.power_airspeed)
     judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
@@ -313,37 +516,37 @@ def fly_profile(frame, commanded):
 def account(frame):
     """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
     control, truth, sums = frame.control, frame.truth, frame.accounts
-    accounts.track(sums.tracking, truth, control.reference.output.model_rate)
+    track(sums.tracking, truth, control.reference.output.model_rate)
     if truth.faulted:
-        accounts.account_authority(sums.authority, control.axes)
+        account_authority(sums.authority, control.axes)
     else:
-        filters.note_closest_approach(frame.fdi.bank)
-        statistical.note_closest_approach(frame.fdi.statistical.alarm)
+        filters.update_max_threshold_ratios(frame.fdi.bank)
+        statistical.update_max_score(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
-    accounts.account_surfaces(sums, truth, saturated, frame.k, dt)
-    accounts.note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
-    accounts.note_inconclusive(sums.inconclusive, frame.fdi, frame.t)
+    account_surfaces(sums, truth, saturated, frame.k, dt)
+    note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
+    note_inconclusive(sums.inconclusive, frame.fdi, frame.t)
 
 
 @kernel
-def record(frame, commanded, row):
+def record_row(frame, commanded, row):
     """Write the row of a frame in the order of channels.log_columns; commanded (3,) rad/s."""
-    control, fdi, belief, logged = frame.control, frame.fdi, frame.belief, frame.logged
+    control, fdi, prediction, logged = frame.control, frame.fdi, frame.prediction, frame.logged
     saturated, effectiveness = control.allocation.output.saturated, control.surfaces.output.effectiveness
     row[:] = np.nan
     column = record_truth(frame.truth, frame.t, row)
     column = put(row, column, frame.measured.x)
     column = put(row, column, commanded)
     column = put(row, column, control.reference.output.model_rate)
-    column = record_surfaces(frame.truth, belief.commanded, saturated, row, column)
+    column = record_surfaces(frame.truth, prediction.commanded, saturated, row, column)
     column = record_alarm(fdi.bank, row, column)
     column = put(row, column, fdi.fdae.output.residual)
     column = put(row, column, fdi.fdae.output.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
-    column = put(row, column, belief.means.acceleration)
+    column = put(row, column, prediction.frame_means.acceleration)
     for e in range(logged.estimators):
-        if e < fdi.isolation.config.n:  # else another diagnosis has taken their place
+        if e < fdi.isolation.config.n_estimators:  # else another diagnosis has taken their place
             record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
         column += PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
@@ -358,23 +561,25 @@ def record(frame, commanded, row):
     if frame.autopilot.enabled:
         record_profile(frame.autopilot, row, column)
     detector = fdi.statistical
-    if logged.tests and detector.tests.enabled:
+    if logged.tests and detector.test_config.enabled:
         views = detector.views[: detector.n_views]
-        statistical.log_scores(detector.tests, detector.block, views, detector.forces, detector.air, row)
+        statistical.write_scores_to_log_row(
+            detector.test_config, detector.block, views, detector.forces, detector.gust, row
+        )
 
 
 @kernel
 def finish(frame, commanded, row):
     """Account, record and hand the command over; the reference model moves on. commanded (3,) rad/s."""
-    control, belief = frame.control, frame.belief
+    control, prediction = frame.control, frame.prediction
     if frame.autopilot.enabled:
         fly_profile(frame, commanded)
     account(frame)
-    record(frame, commanded, row)
+    record_row(frame, commanded, row)
     laws.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
     laws.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
-    move_healthy_surfaces(belief, control.allocation.output.command)
-    hand_over(frame.truth, belief.commanded, control.power.output)
+    move_healthy_surfaces(prediction, control.allocation.output.command)
+    hand_over(frame.truth, prediction.commanded, control.power.output)
     advance_clock(frame)
     frame.row += 1

@@ -13,6 +13,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import direct
+from beaver_ftc.compiled.cache import expect
 from beaver_ftc.diagnosis.gusts import stop_accelerometers
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -35,8 +36,9 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample_frames
 
 if TYPE_CHECKING:
-    from beaver_ftc.control.base import Law
-    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.compiled.cache import Wanted
+    from beaver_ftc.control import Law
+    from beaver_ftc.diagnosis import Detector
     from beaver_ftc.loop.changing import Changing
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
@@ -77,7 +79,7 @@ class Cockpit:
 
     def write(self) -> None:
         """Hand the command over, through Python."""
-        self._write.write(self._frames["belief"]["commanded"][0])
+        self._write.write(self._frames["prediction"]["commanded"][0])
         power = self._frames["control"]["power"]["output"]
         if power["in_use"][0]:
             self._engine.write(power["command"][0, : len(self._engine.nodes)])
@@ -188,7 +190,7 @@ class Loop:
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
         self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz, has_engine)
-        self._turbulent = scenario.environment.severity is not None
+        self._turbulent = scenario.environment.is_turbulent
         self.frames["running"]["turbulent"] = self._turbulent
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
@@ -200,11 +202,19 @@ class Loop:
         self._order = np.zeros(2, np.int64)
         self._inside = 0  # JSBSim frames of the coming frame that have been flown already
         self.after_frame: Callable[[], None] | None = None  # called once a frame has been flown
+        expect(self._kernels)
         self.fly_with(self.plugin_frame)
         self.changing: Changing | None = None
         if scenario.changes:
             self.change(scenario, 0)
         set_origin(self.frames["truth"][0], self.plant, scenario.initial.altitude_m)
+
+    def _kernels(self) -> "Iterable[Wanted]":
+        """What this flight will call, if nothing is plugged in: asked for only if some of it is missing."""
+        from beaver_ftc.loop.stepping import kernels_flown
+
+        arrays = self.references, self.log, self._order
+        return () if self.plugin_frame else kernels_flown(self.frames, arrays)
 
     def change(self, scenario: Scenario, k: int) -> None:
         """Fly by a scenario that says what changes in flight, nothing of it before frame k, the next to fly.
@@ -247,7 +257,8 @@ class Loop:
         return landing_of(scenario or self.scenario, self.frames[0], self.columns, verdict, tuple(replaced))
 
     def release(self) -> None:
-        """Give aircraft and memory back for another flight: this one is over and not asked again."""
+        """Give aircraft and memory back for another flight. This flight cannot be used any more."""
+        expect(None)
         if self._may_fly_again:
             self._may_fly_again, self.changing = False, None  # which refers back: a collector's work
             give_back(self.plant)
@@ -319,10 +330,10 @@ class Loop:
         wanted = self.scenario.fdi.sensor_monitor != "never" and fdi["config"]["enabled"]
         if not wanted or fdi["sensor_monitor"]["config"]["enabled"]:
             return False
-        design = self.frames[0]["belief"]["design"]
+        design = self.frames[0]["prediction"]["design"]
         redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True)
-        stop_accelerometers(fdi["statistical"]["air"])
-        fdi["statistical"]["inertial_air"]["output"]["moving"] = 0
+        stop_accelerometers(fdi["statistical"]["gust"])
+        fdi["statistical"]["inertial_gust"]["output"]["is_turbulent"] = 0
         return True
 
     def read_more(self) -> None:

@@ -1,6 +1,6 @@
 """What a flight has yielded, read off its frame record: the verdict, the accounts, the promise of detection.
 
-The instant from which detection was certain is found by accounts.py for the worst-case filters of the
+The instant from which detection was certain is found by frame.py for the worst-case filters of the
 diagnosis in charge. It binds nobody where those filters raise no alarm (a plug-in, or the statistical test
 in sole authority), where they were not asked any more (an alarm before the fault, or of the watch over the
 instruments), and where what they are told is off by more than is declared (a broken instrument, undeclared
@@ -27,21 +27,16 @@ from beaver_ftc.control.autopilot import (
     SLOWEST,
     SPEED,
 )
-from beaver_ftc.design.air import altitude_of
+from beaver_ftc.design import altitude_of
 from beaver_ftc.design.model import AXES
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.monitors.redundancy import sensor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
-from beaver_ftc.diagnosis.types.verdict import estimate_of, fault_findings
-from beaver_ftc.loop.frame import isolated_theta
+from beaver_ftc.diagnosis.types.verdict import estimate_fault_size, fault_findings
+from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
-from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.scenario.diagnosis import MODES
-from beaver_ftc.scenario.faults import of_a_sensor
-from beaver_ftc.scenario.schema import Scenario, stages
-from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
-from beaver_ftc.scenario.warnings import (
+from beaver_ftc.scenario.declared import (
     ALTITUDE,
     BETWEEN,
     LATE,
@@ -51,7 +46,12 @@ from beaver_ftc.scenario.warnings import (
     measured_spans,
     outside,
     quantities,
+    undeclared,
 )
+from beaver_ftc.scenario.diagnosis import MODES
+from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.schema import Scenario, stages
+from beaver_ftc.scenario.signals import is_before
 
 SCHEME, NO_DIAGNOSIS = "scheme", "no diagnosis ran: fdi.scheme is none"
 Reason = dict[str, Any]
@@ -96,13 +96,15 @@ def _reason(quantity: str, frames: int, measured: Span | None, flown: Span | Non
 
 def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
     """Why the built-in diagnosis can conclude nothing at the frame just flown; empty if it can."""
-    error_map = frame["fdi"]["bound"]["error_map"]
+    error_map = frame["fdi"]["bound"]["model_error_map"]
     if not frame["fdi"]["config"]["enabled"]:
         return NO_DIAGNOSIS
-    if not error_map["n_boxes"] or not error_map["outside"]:
+    if not error_map["n_boxes"] or not error_map["is_outside_all_boxes"]:
         return ""
     spans, names = measured_spans(aircraft), quantities(aircraft)
-    place = dict(zip(names, error_map["place"].tolist(), strict=False)) | {LATE: float(error_map["time_s"])}
+    place = dict(zip(names, error_map["coordinates"].tolist(), strict=False)) | {
+        LATE: float(error_map["time_s"])
+    }
     place[ALTITUDE] = altitude_of(place[ALTITUDE])
     why = [outside(name, spans[name]) for name in lies_outside(place, spans)]
     return "; ".join(why) or outside(BETWEEN, None)
@@ -195,17 +197,17 @@ def _rms(square_sum: np.ndarray, frames: int) -> tuple[float, float, float] | No
 def _estimate(fdi: np.void, surface: int) -> float:
     """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
     takes a quarter of a second."""
-    if fdi["statistical"]["tests"]["enabled"]:
-        return float(isolated_theta(fdi, surface))
-    axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated"])
+    if fdi["statistical"]["test_config"]["enabled"]:
+        return float(estimated_theta_of_isolated_loss(fdi, surface))
+    axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated_estimator"])
     return float(fdi["isolation"]["estimator"][estimator]["theta"][axis])
 
 
 def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
-    if fdi["config"]["every_type"]:
+    if fdi["config"]["diagnoses_all_types"]:
         return fault_findings(fdi, surfaces)
-    isolated = int(fdi["verdict"]["isolated"])
+    isolated = int(fdi["verdict"]["isolated_estimator"])
     said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
     said["isolation_time_s"] = None
     if not fdi["verdict"]["detected"]:
@@ -213,11 +215,15 @@ def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     if isolated == UNANTICIPATED:
         said |= {"isolated": "unanticipated", "isolation_type": "unanticipated"}
     else:
-        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n"])]
+        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n_estimators"])]
         left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
         if isolated == NOT_ISOLATED:  # a loss that is excluded is no damage excluded
             left += [
-                s for s, taken in zip(surfaces, fdi["isolation"]["config"]["taken"], strict=True) if taken
+                s
+                for s, taken in zip(
+                    surfaces, fdi["isolation"]["config"]["can_be_lost_by_damage"], strict=True
+                )
+                if taken
             ]
         said["candidates"] = tuple(dict.fromkeys(left))
     if isolated >= 0:
@@ -269,7 +275,7 @@ def _left(frame: np.void, i: int) -> dict[str, float]:
     and healthy; and what the engines give beside them, where they are effectors."""
     stops = frame["control"]["layout"]["low"], frame["control"]["layout"]["high"]
     left = np.array([frame["control"]["axes"]["G"][i] * stop for stop in stops])
-    healthy = np.array([frame["belief"]["G"][i] * stop for stop in stops])
+    healthy = np.array([frame["prediction"]["G"][i] * stop for stop in stops])
     engines = frame["control"]["engines"]["output"]["authority"][:, i]
     given = {"engines_least_rad_s2": float(engines[0]), "engines_greatest_rad_s2": float(engines[1])}
     return {
@@ -340,13 +346,13 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
 
 def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     """What the statistical detector made of the flight, if there was one."""
-    tests, alarm = fdi["statistical"]["tests"], fdi["statistical"]["alarm"]
+    tests, alarm = fdi["statistical"]["test_config"], fdi["statistical"]["alarm"]
     if not tests["enabled"]:
         return None
     return {
         "time_s": _instant(alarm["detected_at_s"]),
         "alarm_level": float(tests["alarm_level"]),
-        "closest_approach": float(alarm["closest"]),
+        "closest_approach": float(alarm["max_score_over_alarm_level"]),
     }
 
 
@@ -371,7 +377,7 @@ def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
 
 def _withdrawn(fdi: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ...]:
     """Surfaces that were named and are not any more, as many as there is room for."""
-    gone = fdi["verdict"]["withdrawn"][: int(fdi["verdict"]["n_withdrawn"])]
+    gone = fdi["verdict"]["withdrawn_isolations"][: int(fdi["verdict"]["n_withdrawn_isolations"])]
     return tuple(
         {"fault": surfaces[int(one["surface"])], "from_s": float(one["from_s"]), "to_s": float(one["to_s"])}
         for one in gone
@@ -398,8 +404,8 @@ def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float 
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
     surface, types = surfaces.index(str(said.isolated)), fdi["types"]
     pairs = types["pair"]["enabled"]
-    named = types["surface"][surface]["status"] if pairs else fdi["verdict"]
-    return estimate_of(fdi, surface, int(named["type"]))
+    status = types["surface"][surface]["status"] if pairs else fdi["verdict"]
+    return estimate_fault_size(fdi, surface, int(status["fault_type"]))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict[str, Any]:
@@ -422,7 +428,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
     if certain_s < 0.0 or not truth["faulted"] or plugged:
         return None
     fault_s, verdict = float(truth["fault_at_s"]), fdi["verdict"]
-    early = verdict["detected"] and verdict["detected_at_s"] < fault_s - TIME_TOLERANCE_S
+    early = verdict["detected"] and is_before(verdict["detected_at_s"], fault_s)
     if (
         early
         or fdi["config"]["authority"] == STATISTICAL_DETECTOR
@@ -455,7 +461,10 @@ def landing_of(
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     closest = tuple(
-        float(share) for share in fdi["bank"]["output"]["closest"][: max(int(fdi["bank"]["config"]["n"]), 1)]
+        float(share)
+        for share in fdi["bank"]["output"]["max_threshold_ratio_so_far"][
+            : max(int(fdi["bank"]["config"]["n_filters"]), 1)
+        ]
     )
     return Landing(
         scenario=scenario,
@@ -473,7 +482,7 @@ def landing_of(
         end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
-        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["closest"])),
+        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["max_score_over_alarm_level"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),

@@ -3,7 +3,7 @@
     begin -> diagnose -> decide -> command | take_command -> finish
 
 are the stages of frame.py; left of the bar: built in, right of it: a plug-in's answer. A plug-in's verdict is
-taken by `diagnose` (adaptive_estimators.PLUGGED).
+taken by `diagnose` (adaptive_estimators.PYTHON_PLUGIN).
 """
 
 from collections.abc import Callable, Mapping
@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import direct
-from beaver_ftc.control.base import Law, Reference, has_kernels, row_of
-from beaver_ftc.design.context import Context, DesignFunctions
-from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds import variances_of
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_CLASS
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME, UNANTICIPATED
+from beaver_ftc.control import Law, Reference, has_kernels, row_of
+from beaver_ftc.design.context import Context
+from beaver_ftc.design.model import DesignFunctions
+from beaver_ftc.diagnosis import Detector, Measured, Verdict
+from beaver_ftc.diagnosis.bounds import declared_errors_for_plugin
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CASE_VARIANT
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import y_places
@@ -116,7 +117,7 @@ class PluginFrame:
     def _diagnose(self, frames: np.ndarray, measured: Measured) -> None:
         frame = frames[0]
         if self.detector is not None:
-            answer = self._ask(self._names[0], self.detector.step, measured, frame["belief"]["u"].copy())
+            answer = self._ask(self._names[0], self.detector.step, measured, frame["prediction"]["u"].copy())
             self.verdict = self._checked(answer, frame["fdi"]["plugin_verdict"])
         self._stage(stages.diagnose, frames)
 
@@ -159,7 +160,7 @@ class PluginFrame:
         estimate = 0.0 if verdict.estimate is None else verdict.estimate
         taken["detected"], taken["axis"] = bool(verdict.detected), _AXES[verdict.axis]
         taken["isolated"], taken["theta"] = self._isolated[verdict.isolated], estimate
-        taken["estimates"] = verdict.effectiveness is not None
+        taken["has_effectiveness"] = verdict.effectiveness is not None
         if verdict.effectiveness is not None:
             taken["effectiveness"] = self._a_number_each(name, "verdict.effectiveness", verdict.effectiveness)
         return verdict
@@ -185,8 +186,8 @@ def measured_of(frame: np.void) -> Measured:
         float(frame["t"]),
         frame["measured"]["x"].copy(),
         frame["measured"]["y"][: len(y_places(frame))].copy(),
-        frame["belief"]["means"]["acceleration"].copy(),
-        frame["belief"]["means"]["Gu"].copy(),
+        frame["prediction"]["frame_means"]["acceleration"].copy(),
+        frame["prediction"]["frame_means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),
     )
 
@@ -196,9 +197,9 @@ def context_of(
 ) -> Context:
     """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
     frame, aircraft = frames[0], scenario.airframe
-    layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["belief"]["design"]
-    trim_y, trim_rad, constant = start[y_places(frame)], layout["trim"].copy(), bound["constant"].copy()
-    if bound["error_map"]["n_boxes"]:
+    layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["prediction"]["design"]
+    trim_y, trim_rad, constant = start[y_places(frame)], layout["trim"].copy(), bound["constant_bound"].copy()
+    if bound["model_error_map"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(
         dt_s=float(frame["dt"]),
@@ -209,12 +210,14 @@ def context_of(
         trim_rad=trim_rad,
         travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=constant,
-        inertia_coupling=bound["inertia"].copy(),
+        inertia_coupling=bound["inertia_coupling"].copy(),
         seed=scenario.seed,
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=variances_of(Declared.of(scenario), scenario.actuators, design, trim_y, trim_rad),
+        declared=declared_errors_for_plugin(
+            Declared.of(scenario), scenario.actuators, design, trim_y, trim_rad
+        ),
     )
 
 
@@ -257,9 +260,14 @@ def plugged(
         return None
     if detector is not None:  # no built-in isolation; instead, one estimator a surface for its verdict
         fdi = frames["fdi"][0]
-        fdi["config"]["enabled"] = fdi["config"]["every_type"] = fdi["isolation"]["config"]["n"] = 0
-        fdi["statistical"]["tests"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme"], fdi["config"]["fault_class"] = PLUGIN_SCHEME, PUBLISHED_CLASS
+        fdi["config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = fdi["isolation"]["config"][
+            "n_estimators"
+        ] = 0
+        fdi["statistical"]["test_config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
+        fdi["config"]["scheme_number"], fdi["config"]["isolation_variant"] = (
+            PLUGIN_SCHEME_NUMBER,
+            PUBLISHED_WORST_CASE_VARIANT,
+        )
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)

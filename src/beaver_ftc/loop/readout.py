@@ -70,28 +70,28 @@ class FrameReadout:
     @cached_property
     def expected_u_rad(self) -> np.ndarray:
         """Positions that the actuators' model gives, (surfaces,) rad."""
-        return np.array(self._frame["belief"]["u"])
+        return np.array(self._frame["prediction"]["u"])
 
     @cached_property
     def actuators(self) -> Actuators:
         """The declared actuators."""
-        actuators = self._frame["belief"]["actuators"]
+        actuators = self._frame["prediction"]["actuators"]
         return Actuators(*(actuators[name].copy() for name in ("low", "high", "approach", "step")))
 
     @cached_property
     def G(self) -> np.ndarray:
         """Effectiveness by the design model at this instant, (3, surfaces) rad/s2 per rad."""
-        return np.array(self._frame["belief"]["G"])
+        return np.array(self._frame["prediction"]["G"])
 
     @cached_property
     def mean_G(self) -> np.ndarray:
         """The same, mean over the elapsed frame."""
-        return np.array(self._frame["belief"]["means"]["G"])
+        return np.array(self._frame["prediction"]["frame_means"]["G"])
 
     @cached_property
     def model_rad_s2(self) -> np.ndarray:
         """f + G u by the design model, mean over the elapsed frame, (3,) rad/s2."""
-        return np.array(self._frame["belief"]["means"]["acceleration"])
+        return np.array(self._frame["prediction"]["frame_means"]["acceleration"])
 
     @cached_property
     def inertia(self) -> InertiaCoefficients:
@@ -101,7 +101,7 @@ class FrameReadout:
     @cached_property
     def design(self) -> np.void:
         """The design model's record, not a copy, for the functions of `design.variants`."""
-        return self._frame["belief"]["design"]
+        return self._frame["prediction"]["design"]
 
     @cached_property
     def true_signals(self) -> np.ndarray:
@@ -172,27 +172,28 @@ def diagnosis_record(frame: np.void) -> np.void:
     return frame["fdi"]
 
 
-def recorded_always(frame: np.void, n: int, every_type: bool) -> dict[str, np.ndarray]:
+def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
-    acceleration, rad/s and rad/s2; the rest, and n and every_type: as `diagnosis.readout.recorded_always`."""
-    means = frame["belief"]["means"]
+    acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
+    `diagnosis.readout.recorded_always`."""
+    means = frame["prediction"]["frame_means"]
     own = {"x": frame["measured"]["x"], "model": means["acceleration"]}
-    return own | of_diagnosis.recorded_always(frame["fdi"], n, every_type)
+    return own | of_diagnosis.arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
 
 
 def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
     """Those of which it wants the frames up to the alarm: see `diagnosis.readout.recorded_until_alarm`."""
-    return of_diagnosis.recorded_until_alarm(frame["fdi"], n, statistical)
+    return of_diagnosis.arrays_until_alarm(frame["fdi"], n, statistical)
 
 
-def run_statistical_tests(frame: np.void, enabled: bool) -> None:
+def switch_statistical_tests(frame: np.void, enabled: bool) -> None:
     """Switch the statistical tests on or off, for every scheme."""
-    of_diagnosis.run_statistical_tests(frame["fdi"], enabled)
+    of_diagnosis.switch_statistical_tests(frame["fdi"], enabled)
 
 
 def stop_diagnosis(frame: np.void) -> None:
     """Stop the diagnosis of surfaces and sensors from the next frame on."""
-    of_diagnosis.disable(frame["fdi"])
+    of_diagnosis.disable_diagnosis(frame["fdi"])
 
 
 WITHHELD = {"verdict": ("uses_verdict", "reallocates"), "stand-in": ("reallocates",)}

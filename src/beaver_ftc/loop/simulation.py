@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from beaver_ftc.control.profile import set_up_profile
+from beaver_ftc.control.autopilot import set_up_profile
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing, inconclusive_now, verdict_of
@@ -30,8 +30,8 @@ from beaver_ftc.scenario.sensors import sensors_there
 from beaver_ftc.scenario.signals import RAD_PER_DEG, sample_deg_s
 
 if TYPE_CHECKING:
-    from beaver_ftc.control.base import Law
-    from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+    from beaver_ftc.control import Law
+    from beaver_ftc.diagnosis import Detector, Measured, Verdict
 
 Vector = NDArray[np.float64]
 
@@ -72,9 +72,9 @@ class Stepping:
         self._make_ready()
 
     def reset(self, *, seed: int | None = None) -> None:
-        """Put the aircraft back into trim, nothing broken, the log empty: the same scenario, or a seed of it.
+        """Start the same scenario again, in trim, without faults and with an empty log; `seed` is a new seed.
 
-        It is not loaded again, and flies as a freshly loaded one does, to the bit: see plant/conditions.py.
+        The aircraft is not loaded again, and flies as a newly loaded one, to the bit.
         """
         if seed is not None:
             self._given = self._given.with_({"seed": seed})
@@ -82,7 +82,7 @@ class Stepping:
         self._make_ready()
 
     def release(self) -> None:
-        """Give aircraft and memory back for another flight: this one is over and not asked again."""
+        """Give aircraft and memory back for another flight. This flight cannot be used any more."""
         with ONE_FLIES:
             self._loop.release()
 
@@ -196,11 +196,11 @@ class Stepping:
     def step(
         self, command: ArrayLike | None = None, *, frames: int = 1, stick: ArrayLike | None = None
     ) -> None:
-        """Fly one frame, or so many.
+        """Fly one frame, or `frames` frames.
 
-        command (surfaces,) rad: another's, in place of the law's, held over these frames and kept within the
-        travel. stick (3,) rad/s: added to the scenario's reference of these frames. Raises BadInput for what
-        is not that and once the flight is over, SimulationFailed when a value is not finite.
+        command (surfaces,) rad: replaces the command of the law in these frames, limited to the travel.
+        stick (3,) rad/s: added to the scenario's reference in these frames. Raises BadInput for a wrong shape
+        and after the end of the flight, SimulationFailed if a value is not finite.
         """
         if self.done:
             raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
@@ -220,9 +220,9 @@ class Stepping:
         self._fly_to(min(self._next + frames, self._loop.n_frames), rate_deg_s)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
-        """Break something now, from the next frame on: a fault as in a scenario file, without `at_s`.
+        """Inject a fault from the next frame on: a fault of a scenario file without `at_s`.
 
-        What is broken in just this way already cannot be broken again. Raises BadInput that names the key.
+        The same fault cannot be injected twice. Raises BadInput that names the key.
         """
         with checked_against(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
@@ -234,9 +234,10 @@ class Stepping:
         self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
-        """End now what is wrong with a surface, a sensor, the aerodynamics (`unanticipated`), or anything.
+        """End the faults of a surface, a sensor or the aerodynamics (`unanticipated`), or all faults.
 
-        Faults that are yet to come stay. Raises BadInput for a name that no fault can have.
+        Faults that have not begun yet stay in the scenario. Raises BadInput for a name that no fault can
+        have.
         """
         with checked_against(self._loop.aircraft):
             names = (
@@ -257,9 +258,9 @@ class Stepping:
         return tuple(fault for fault in self._faults if is_there(fault, self._next, self.rate_hz))
 
     def blow(self, gust: Mapping[str, Any]) -> None:
-        """Set a gust off now, from the next frame on: as one of `environment.gust`, without `at_s`.
+        """Start a gust in the next frame: an entry of `environment.gust` without `at_s`.
 
-        Raises BadInput that names the key, and while another one blows.
+        Raises BadInput for a wrong key, which it names, and if another gust is still blowing.
         """
         self._begin()
         self._scenario = interventions.with_gust(self._scenario, gust, self._now_s)
@@ -268,10 +269,10 @@ class Stepping:
         self._loop.gust, self._turn_at = GustSchedule(gusts, self._loop.plant, self.rate_hz), self._next
 
     def change(self, change: Mapping[str, Any]) -> None:
-        """Change law, diagnosis or sensors now, from the next frame on: as one of `changes`, without `at_s`.
+        """Change law, diagnosis or sensors from the next frame on: an entry of `changes` without `at_s`.
 
-        A diagnosis that is changed restarts; the log keeps its columns. Raises BadInput that names the
-        key, the flight going on as it was.
+        A changed diagnosis restarts; the log keeps its columns. Raises BadInput that names the key; the
+        flight then continues unchanged.
         """
         self._begin()
         scenario = interventions.with_change(self._scenario, change, self._now_s)
@@ -287,7 +288,7 @@ class Stepping:
         self._note_asked("aim", targets=dict(targets))
 
     def read(self, name: str) -> float:
-        """A property of JSBSim's, in the unit its name says. Raises BadInput if there is none such."""
+        """The value of a JSBSim property, in the unit of its name. Raises BadInput for an unknown one."""
         try:
             return self._loop.plant.read(name)
         except UnknownProperty:
@@ -318,12 +319,12 @@ class Stepping:
                 do(frames=some, **each.given)
 
     def scenario_flown(self) -> Scenario:
-        """The scenario that flies what has been flown, to the bit.
+        """The scenario that flies the same flight again, to the bit.
 
-        Faults are at the frames they were injected and repaired at, the stick's rates are tables, the
-        duration is the time flown.
+        Its faults begin and end at the frames at which they were injected and repaired. The rates of the
+        stick are tables, and the duration is the time flown.
 
-        Raises BadInput for a flight in which another commanded the surfaces: no scenario says that.
+        Raises BadInput for a flight with your own surface commands, because no scenario can contain them.
         """
         if self._by_hand:
             raise BadInput(

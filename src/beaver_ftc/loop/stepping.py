@@ -1,18 +1,32 @@
-"""The compiled frame as Python calls it: whole, many in a row, and what is looked at between two.
+"""The compiled frame as Python calls it: whole, many in a row, what is looked at between two, its kernels.
 
 Where a plug-in is between (plugin_frame.py), Python calls the frame's stages one by one: here they take
 arrays, since to look up the type of a whole record costs a call from Python a hundred frames.
 
+Which kernels a flight will call is listed here, and those that are not kept are compiled together
+(compiled/cache.py). Kernels with long code stand first. One that is missing in the list is compiled when it
+is first called; one that the flight does not call, because no alarm is raised, is ready for the next flight.
+
 frames (1,): of `frame_dtype` (assembly.py).
 """
 
-from beaver_ftc.compiled import apart, kernel, row_of
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from beaver_ftc.compiled import apart, borrows, kernel, row_of
+from beaver_ftc.compiled.cache import Wanted
+from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
+from beaver_ftc.control.state import in_charge
 from beaver_ftc.design.model import move
 from beaver_ftc.diagnosis.conclusion import uses_statistical_estimates
 from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import built_in_statistic as largest_statistic
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.accounts import add_effect
+from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over, sample_forces
 
@@ -70,7 +84,7 @@ def built_in_statistic(frames):
     fdi = frames[0].fdi
     alarm, authority = fdi.statistical.alarm, fdi.config.authority
     return largest_statistic(
-        fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.tests, authority)
+        fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.test_config, authority)
     )
 
 
@@ -78,12 +92,12 @@ def built_in_statistic(frames):
 def hold(frames):
     """Command frame.held_rad in the law's place, from the frame just flown on: nothing has moved since."""
     frame = frames[0]
-    belief = frame.belief
+    prediction = frame.prediction
     frame.held = 1
-    belief.commanded[:] = frame.held_rad
-    belief.u[:] = belief.u_before
-    move(belief.actuators, belief.commanded, belief.u)
-    hand_over(frame.truth, belief.commanded, frame.control.power.output)
+    prediction.commanded[:] = frame.held_rad
+    prediction.u[:] = prediction.u_before
+    move(prediction.actuators, prediction.commanded, prediction.u)
+    hand_over(frame.truth, prediction.commanded, frame.control.power.output)
 
 
 @kernel
@@ -140,3 +154,67 @@ def fly_on(frames, references, log, order):
         if status != FLYING:
             return status
     return FLYING
+
+
+_ROW, _AXES = types.Array(types.float64, 1, "C"), types.NestedArray(types.float64, (3,))
+_NUMBERS = {
+    "k": types.int64, "mode": types.int64, "isolation_has_run": types.int64, "by_observer": types.boolean,
+    "t": types.float64, "share": types.float64, "probe": types.float64,
+    "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,
+    "demand": _AXES, "hold": _AXES, "disturbance": _AXES,
+}  # fmt: skip
+
+
+def kernels_flown(frames: np.ndarray, arrays: tuple[np.ndarray, ...]) -> Iterator[Wanted]:
+    """What a flight calls that flies these frames by `fly_on` with these further arrays: see stepping.py."""
+    if not borrows():  # then they are all parts of one
+        return
+    from beaver_ftc.compiled.target import array_type  # there is none in every version of Numba
+
+    frame = frames[0]
+    yield Wanted.of(fly_one, _kinds(fly_one, frame))
+    yield Wanted.of(fly_on, tuple(array_type(each.dtype, each.ndim) for each in (frames, *arrays)))
+    wanted = (*_of_the_diagnosis(frame), *_of_the_law(frame))
+    for each in sorted(wanted, key=lambda wanted: -wanted.called.size):
+        yield Wanted.of(each, _kinds(each, frame))
+
+
+def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
+    fdi = frame["fdi"]
+    scheme = SCHEMES[fdi["config"]["scheme_number"]]
+    yield from (scheme.begin, scheme.predict, scheme.conclude, scheme.prepare)
+    if scheme.predict is adaptive_estimators.predict:
+        faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["isolation_variant"]]
+        yield from (faults.begin, faults.observe, faults.isolate)
+        if fdi["statistical"]["test_config"]["enabled"]:
+            yield from (adaptive_estimators.update_statistical_tests, adaptive_estimators.prepare_statistical)
+    if fdi["sensor_monitor"]["config"]["enabled"]:
+        yield whole.monitor_sensors
+
+
+def _of_the_law(frame: np.void) -> Iterator[Any]:
+    control = frame["control"]
+    law: CompiledLaw = in_charge(control)
+    yield from (law.accommodate or accommodation.accommodate, law.command)
+    yield from (laws.prepare, laws.command_surfaces, laws.complete)
+    if control["layout"]["general"]:
+        yield allocation.allocate_generally
+    if frame["autopilot"]["enabled"]:
+        yield whole.fly_profile
+
+
+def _kinds(wanted: Callable[..., Any], frame: np.void) -> tuple[Any, ...]:
+    """The types of its arguments, by their names: numbers, or parts of the frame or of its control."""
+    function = wanted.py_func  # type: ignore[attr-defined]
+    return tuple(
+        _kind(name, frame.dtype) for name in function.__code__.co_varnames[: function.__code__.co_argcount]
+    )
+
+
+def _kind(name: str, frame: np.dtype) -> Any:
+    if name in _NUMBERS:
+        return _NUMBERS[name]
+    from beaver_ftc.compiled.target import kind_of
+
+    kind = kind_of(frame, 0)
+    return kind if name == "frame" else kind.typeof(name) or kind.typeof("control").typeof(name)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import direct
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import Trim, configure_design, configure_diagnosis_at_trim
@@ -33,12 +33,12 @@ class Diagnosis:
         diagnosis = Diagnosis(aircraft("beaver"), rate_hz=100, fdi={"bounds": {"inertia": 0.05}})
         verdict = diagnosis.step(rates_rad_s, signals, command_rad)
 
-    aircraft: whose surfaces and stops. rate_hz: samples a second, evenly spaced. fdi: as in a scenario file.
-    actuators, design_model: likewise, if they are not ideal. start: rates, signals and surfaces of the trim
-    that what is linearised or statistical holds on to; the first sample, if it is left out. Raises BadInput
-    that names the key. Everything it remembers is one record of fixed size.
+    aircraft: the aircraft with its surfaces and stops. rate_hz: number of evenly spaced samples in a second.
+    fdi, actuators, design_model: as in a scenario file. start: rates, signals and surfaces in trim, which
+    linear and statistical parts need; left out: the first sample. Raises BadInput that names the key. Its
+    whole memory is one record of fixed size.
 
-    declared: what `fdi.bounds` declare, and who relies on it.
+    declared: the declarations of `fdi.bounds`, and the parts that use them.
     """
 
     def __init__(
@@ -72,20 +72,20 @@ class Diagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: the next sample is the first of a flight."""
+        """Delete the memory: the next sample is the first of a flight."""
         stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
         travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
         self._frames = configure_design(self._scenario, travel)
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
-        self._fdi["engines"]["config"]["n"] = 0  # nobody says where levers are
+        self._fdi["engine_monitor"]["config"]["n_engines"] = 0  # nobody says where levers are
         self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
         self._altitude = np.array([self._scenario.initial.altitude_m])
         self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
         self._diagnose = direct(stepping.diagnose, self._frames)
-        self._believe = direct(watching.believe, self._frames)
+        self._accommodate_and_advance = direct(watching.accommodate_and_advance, self._frames)
         self._known = np.zeros(watching.MEMORY, dtype=np.int64)
         self._news = direct(watching.news, self._frames, self._known)
         self._theta = direct(watching.theta, self._frames)
@@ -105,14 +105,14 @@ class Diagnosis:
         attitude_rad: ArrayLike | None = None,
         altitude_m: float | None = None,
     ) -> Verdict:
-        """Take a sample and say what it shows.
+        """Diagnose with one further sample.
 
         rates_rad_s (3,): p, q, r. signals: alpha rad, beta rad, airspeed m/s, dynamic pressure Pa, then the
-        aircraft's own (of the Beaver dpt). command_rad (surfaces,): in effect since the sample before; with
-        the first sample, the surfaces in trim. attitude_rad (3,): roll, pitch, yaw, wanted only where
-        `fdi.bounds` declares turbulence. altitude_m: as measured above sea level; near the ground declared
-        turbulence depends on it. Without it the altitude before stays, at first 1828.8 m. Raises BadInput for
-        what has another shape or is not finite; such a sample is not taken.
+        aircraft's own (of the Beaver dpt). command_rad (surfaces,): command since the previous sample; for
+        the first sample, the surfaces in trim. attitude_rad (3,): roll, pitch, yaw; needed only if
+        `fdi.bounds` declares turbulence. altitude_m: measured altitude above sea level, on which declared
+        turbulence near the ground depends; left out: the altitude before, at first 1828.8 m. Raises BadInput
+        for a wrong shape or a value that is not finite; such a sample is ignored.
         """
         _put("rates_rad_s", rates_rad_s, self._x)
         _put("signals", signals, self._signals)
@@ -130,7 +130,7 @@ class Diagnosis:
         if not (np.isfinite(self._altitude[0]) and self._take(*flown)):
             raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
         self._diagnose(self._frames)
-        self._believe(self._frames)
+        self._accommodate_and_advance(self._frames)
         if self._news(self._frames, self._known):  # its words are looked for only when there are others
             self._said = verdict_of(self._frame, self._aircraft.surfaces)
         elif self._said.estimate is not None:
@@ -148,19 +148,22 @@ class Diagnosis:
         return self.innovation()
 
     def innovation(self) -> tuple[Vector, Vector, Vector]:
-        """Of the frame that ended with the last sample: the innovation (3,), its declared bound (3,), and the
-        predicted effect of each surface (3, surfaces), rad/s2."""
-        innovation, bound = self._fdi["bank"]["output"]["innovation"], self._fdi["bound"]["frame"]
-        return innovation.copy(), bound.copy(), self._frame["belief"]["means"]["Gu"].copy()
+        """For the frame that ended with the last sample: the innovation (3,), its declared bound (3,), and
+        the predicted effect of each surface (3, surfaces), rad/s2."""
+        innovation, bound = (
+            self._fdi["bank"]["output"]["innovation"],
+            self._fdi["bound"]["frame_innovation_bound"],
+        )
+        return innovation.copy(), bound.copy(), self._frame["prediction"]["frame_means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:
         """The design model at the last sample: f (3,) rad/s2 and G (3, surfaces) rad/s2 per rad, of
         xdot = f + G u."""
-        belief = self._frame["belief"]
-        return belief["f"].copy(), belief["G"].copy()
+        prediction = self._frame["prediction"]
+        return prediction["f"].copy(), prediction["G"].copy()
 
     def inside(self) -> tuple[np.ndarray, Scenario]:
-        """Its record, of `frame_dtype`, since the last reset, and the scenario it stands for."""
+        """Its memory since the last reset, a structured array (1,), and the scenario that it represents."""
         return self._frames, self._scenario
 
     def _estimate(self) -> float | None:

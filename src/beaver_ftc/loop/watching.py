@@ -1,14 +1,18 @@
 """The compiled diagnosis fed from outside: what is measured comes as arguments, nothing is read or written.
 
-take -> stepping.diagnose -> believe
+take -> stepping.diagnose -> accommodate_and_advance
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import isolated_surface
-from beaver_ftc.diagnosis.expectation import evaluate_design, evaluate_frame, move_healthy_surfaces
-from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
+from beaver_ftc.diagnosis.model_prediction import (
+    evaluate_bound_and_frame_means,
+    evaluate_design_model,
+    move_healthy_surfaces,
+)
+from beaver_ftc.loop.frame import accommodate, advance_clock, estimated_theta_of_isolated_loss, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
@@ -24,13 +28,13 @@ def take(frames, x, y, command, attitude):
     if not (finite(x) and finite(y) and finite(command) and finite(attitude)):
         return False
     frame = frames[0]
-    belief, measured = frame.belief, frame.measured
+    prediction, measured = frame.prediction, frame.measured
     start_clock(frame)
     if frame.k > 0:
-        move_healthy_surfaces(belief, command)
+        move_healthy_surfaces(prediction, command)
     take_sample(measured, x, y, attitude)
-    evaluate_design(belief, measured)
-    evaluate_frame(belief, frame.fdi.bound, measured, frame.k, frame.dt)
+    evaluate_design_model(prediction, measured)
+    evaluate_bound_and_frame_means(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
     return True
 
 
@@ -44,8 +48,8 @@ def finite(values):
 
 
 @kernel
-def believe(frames):
-    """What the diagnosis knows of the surfaces goes into its own next prediction."""
+def accommodate_and_advance(frames):
+    """Give the estimated state of the surfaces to the next prediction, and advance the clock."""
     frame = frames[0]
     accommodate(frame)
     advance_clock(frame)
@@ -55,7 +59,7 @@ def believe(frames):
 def theta(frames):
     """The estimate of the isolated loss of effectiveness, of the published class."""
     fdi = frames[0].fdi
-    return isolated_theta(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
+    return estimated_theta_of_isolated_loss(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
 
 
 @kernel
@@ -68,28 +72,32 @@ def news(frames, known):
     changed = replace(known, 0, fdi.verdict.detected)
     if not fdi.verdict.detected:
         return changed
-    changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(known, 2, fdi.verdict.isolated)
+    changed |= replace(known, 1, fdi.verdict.detected_axis) | replace(
+        known, 2, fdi.verdict.isolated_estimator
+    )
     excluded = 0
-    for i in range(fdi.isolation.config.n):
+    for i in range(fdi.isolation.config.n_estimators):
         excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
-    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.type)
-    if fdi.config.every_type:
-        for plane in range(fdi.types.pair.alarmed.size):
-            changed |= replace(known, 5 + plane, fdi.types.pair.alarmed[plane])
+    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.fault_type)
+    if fdi.config.diagnoses_all_types:
+        for plane in range(fdi.types.pair.group_has_alarm.size):
+            changed |= replace(known, 5 + plane, fdi.types.pair.group_has_alarm[plane])
         for s in range(fdi.types.surface.size):
-            changed |= news_of(fdi.types.surface[s], fdi.types.config.half_cycle_frames, known[8 + 5 * s :])
+            changed |= news_of(
+                fdi.types.surface[s], fdi.types.config.slowest_half_cycle_frames, known[8 + 5 * s :]
+            )
     return changed
 
 
 @kernel
-def news_of(surface, half_cycle_frames, known):
+def news_of(surface, slowest_half_cycle_frames, known):
     """The same of one surface, where every type is asked for; known (5 and more,): its own."""
     bits = 0
-    for kind in range(surface.feasible.excluded.size):
-        bits = 2 * bits + surface.feasible.excluded[kind]
-    early = surface.evidence.frames - surface.evidence.rest_frames < half_cycle_frames
-    changed = replace(known, 0, surface.status.named) | replace(known, 1, surface.status.decided_by)
-    changed |= replace(known, 2, surface.status.type) | replace(known, 3, bits)
+    for kind in range(surface.feasible_sets.excluded.size):
+        bits = 2 * bits + surface.feasible_sets.excluded[kind]
+    early = surface.evidence.n_anomalous_frames - surface.evidence.n_rest_frames < slowest_half_cycle_frames
+    changed = replace(known, 0, surface.status.is_isolated) | replace(known, 1, surface.status.decision_basis)
+    changed |= replace(known, 2, surface.status.fault_type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)
 
 

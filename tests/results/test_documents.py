@@ -17,7 +17,7 @@ from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog, unit_of, units
 from beaver_ftc.results.metrics import as_json, fault_free_s, hints, measure, metrics
-from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.model import Expectation, Judged, Metrics
 from beaver_ftc.results.report import register_section, render
 from beaver_ftc.results.style import MODE_COLOURS
 from kept import in_short
@@ -321,20 +321,18 @@ def _say_where(folder):
     return f"<em>in {folder.name}</em>"
 
 
-MISSED = [
-    {"name": "a", "passed": False, "expected": 1, "actual": None},
-    {"name": "b", "passed": True, "expected": 1, "actual": 1},
-    {"name": "c", "passed": False, "expected": "x" * 20_000, "actual": []},
-]
+MISSED = (
+    Expectation("a", False, 1, None), Expectation("b", True, 1, 1), Expectation("c", False, "x" * 20_000, []),
+)  # fmt: skip
 
 
 def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
-    write_junit([{"scenario": "two", "took_s": 1.0, "expectations": MISSED}], tmp_path / "deep" / "junit.xml")
+    write_junit([Judged("two", expectations=MISSED, took_s=1.0)], tmp_path / "deep" / "junit.xml")
     text = (tmp_path / "deep" / "junit.xml").read_text(encoding="utf-8")
     assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites")
     assert 9_900 < text.count("x") < 10_100
     assert 'tests="3" failures="2" errors="0"' in text
-    write_junit([{"scenario": "one", "error": "cannot\x07 be\ntrimmed \ud800"}], tmp_path / "junit.xml")
+    write_junit([Judged("one", error="cannot\x07 be\ntrimmed \ud800")], tmp_path / "junit.xml")
     assert "cannot\\x07 be&#10;trimmed \\ud800" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
     (tmp_path / "file").write_text("")
     with pytest.raises(SimulationFailed, match=r"cannot write .*junit.xml: "):

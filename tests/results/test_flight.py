@@ -82,12 +82,6 @@ class TestFlown:
         assert opened.log.attrs == flight.log.attrs
         assert files(opened.save(tmp_path)) == files(folder)
 
-    @pytest.mark.parametrize("folder", ["nowhere", "."])
-    def test_what_is_no_run_is_refused(self, folder, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        with pytest.raises(bf.BadInput, match=r"no metrics\.json can be read there"):
-            bf.open_run(folder)
-
 
 class TestViews:
     def test_a_closeup_is_around_the_fault(self, flight):

@@ -11,7 +11,7 @@ import pytest
 
 from beaver_ftc.results import figures
 from beaver_ftc.results import painters as module
-from beaver_ftc.results.figures import pictures_of, write_figures
+from beaver_ftc.results.figures import pictures_of, save
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.painters import drawing, painters, share
 
@@ -25,12 +25,27 @@ def pictures(log_path, flight, tmp_path, monkeypatch):
     return pictures_of(log_path, measure(flight), tmp_path / "beside")[-3:]
 
 
+@pytest.fixture(scope="module")
+def drawn_here():
+    """By name the bytes of each of these pictures, drawn here once: their flight is always the same."""
+    kept = {}
+
+    def drawn(pictures, folder):
+        if not kept:
+            for picture in pictures:
+                save(replace(picture, path=folder / picture.path.name))
+            kept.update(bytes_of(folder))
+        return kept
+
+    return drawn
+
+
 def bytes_of(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize("killed", [0, 1, 2])
-def test_figures_are_the_same_whoever_draws_them(killed, pictures, log_path, flight, tmp_path):
+def test_figures_are_the_same_whoever_draws_them(killed, pictures, drawn_here, tmp_path):
     others = children()  # of tests before this one
     with painters() as at_work:
         assert len(at_work) == 2
@@ -41,9 +56,8 @@ def test_figures_are_the_same_whoever_draws_them(killed, pictures, log_path, fli
             for child in [each for each in children() if each not in others][:killed]:
                 os.kill(child, signal.SIGKILL)
     assert children() == others
-    write_figures(log_path, measure(flight), tmp_path / "here")
-    here = bytes_of(tmp_path / "here")
-    assert bytes_of(tmp_path / "beside") == {p.path.name: here[p.path.name] for p in pictures}
+    (tmp_path / "here").mkdir()
+    assert bytes_of(tmp_path / "beside") == drawn_here(pictures, tmp_path / "here")
 
 
 def children():

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 from beaver_ftc.results import model, verdict
 from beaver_ftc.results.log import Log, MemoryLog, StoredLog
 from beaver_ftc.results.metrics import metrics
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from beaver_ftc.control.base import Law
-    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.control import Law
+    from beaver_ftc.diagnosis import Detector
     from beaver_ftc.loop.outcome import Landing
 
 
@@ -38,10 +38,10 @@ class Proof(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Flight:
-    """A flight that has been flown.
+    """A finished flight.
 
-    scenario: what was flown. metrics: the document of metrics.json. The typed parts of it are attributes:
-    fault, detection, isolation, tracking, supervisor, departure, expectations, passed.
+    scenario: the scenario that was flown. metrics: the document of metrics.json. Its typed parts are
+    attributes: fault, detection, isolation, tracking, supervisor, departure, expectations, passed.
     """
 
     scenario: Scenario
@@ -61,7 +61,7 @@ class Flight:
         """
         from beaver_ftc.results.log import log_frame
 
-        return log_frame(self._kept(), self.metrics)
+        return log_frame(self._kept(), self._typed)
 
     @property
     def name(self) -> str:
@@ -118,7 +118,7 @@ class Flight:
         return self._typed.passed
 
     def views(self) -> tuple[str, ...]:
-        """What `plot` can show of this flight."""
+        """The names of the views that `plot` can draw of this flight."""
         return tuple(self._views())
 
     def plot(
@@ -126,9 +126,9 @@ class Flight:
     ) -> "Figure":
         """One view as a matplotlib Figure.
 
-        closeup: only around the fault. style: "paper" is 8.4 cm wide, with letters of 8 points at most, and
-        300 dots per inch where it is no vector graphic. Raises BadInput for a view or style that there is
-        not.
+        closeup: show only the time around the fault. style: "paper" is 8.4 cm wide, with letters of at most 8
+        points, and 300 dots per inch if it is not a vector graphic. Raises BadInput for an unknown view or
+        style.
         """
         from beaver_ftc.results.figures import STYLES, draw
         from beaver_ftc.results.style import closeup_window, marks
@@ -139,7 +139,7 @@ class Flight:
             raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
         if style not in STYLES:
             raise BadInput(f"style: {style!r:.60} is not known, allowed: {', '.join(STYLES)}")
-        instants = marks(model.Metrics.of(self.metrics))
+        instants = marks(self._typed)
         window = (closeup_window(instants) if closeup else None) or WHOLE
         series = series_of(self._kept(), known[view].columns, window)
         return draw(known[view], series, instants, self.name, style)
@@ -147,21 +147,22 @@ class Flight:
     def certificate(self) -> Document:
         """The document of certificate.json: alarm and exclusions, each with the inequality that proves it.
 
-        It is flown once more for it. Raises BadInput for a flight without a log, or not of our scheme.
+        The scenario is flown again for it. Raises BadInput for a flight without a log, or with another
+        scheme.
         """
         return self.proof().certificate
 
     def proof(self) -> Proof:
-        """The same with what it is checked against: the flight's log, which has further columns for it, and
-        the text of its scenario."""
+        """The certificate together with the data for its check: the log of the flight, with further columns,
+        and the text of the scenario."""
         found: Proof = required("proof", "certificate")(self.scenario, self._kept())
         return found
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
-        """Write `out/<name>/` as `beaver-ftc run` does, whole or not at all; returns that folder.
+        """Write `out/<name>/` as `beaver-ftc run` does, completely or not at all; return this folder.
 
-        report: with report.html and the figures. Raises BadInput for a flight without a log,
-        SimulationFailed where the folder cannot be written.
+        report: also write report.html and the figures. Raises BadInput for a flight without a log,
+        SimulationFailed if the folder cannot be written.
         """
         from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 
@@ -186,7 +187,7 @@ class Flight:
 
     def __repr__(self) -> str:
         lines = [f"{what:12} {how}" for what, how in self._facts()]
-        return "\n".join([verdict.title(model.Metrics.of(self.metrics)), *(f"  {line}" for line in lines)])
+        return "\n".join([verdict.title(self._typed), *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         cell = "style='text-align:left'"
@@ -194,19 +195,15 @@ class Flight:
             f"<tr><th {cell}>{escape(what)}</th><td {cell}>{escape(how)}</td></tr>"
             for what, how in self._facts()
         )
-        return f"<b>{escape(verdict.title(model.Metrics.of(self.metrics)))}</b><table>{rows}</table>"
+        return f"<b>{escape(verdict.title(self._typed))}</b><table>{rows}</table>"
 
     def _facts(self) -> list[tuple[str, str]]:
         tracked = [
             ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
-            for when, p, q, r in verdict.tracking(model.Metrics.of(self.metrics))
+            for when, p, q, r in verdict.tracking(self._typed)
         ]
-        missed = [
-            ("missed", held.sentence)
-            for held in verdict.expectations(model.Metrics.of(self.metrics))
-            if not held.passed
-        ]
-        return [*verdict.facts(model.Metrics.of(self.metrics)), *tracked, *missed]
+        missed = [("missed", held.sentence) for held in verdict.expectations(self._typed) if not held.passed]
+        return [*verdict.facts(self._typed), *tracked, *missed]
 
 
 def fly(
@@ -219,9 +216,9 @@ def fly(
 ) -> Flight:
     """Fly a scenario: a name, a path, a mapping or a Scenario.
 
-    log: keep one row a frame in memory, 0.8 kB each. detector, law: plug-in objects to fly with, in place of
-    those the scenario names. progress: called with the share flown, 0 to 1. Raises BadInput when the flight
-    cannot be trimmed or asks for what there is not, SimulationFailed when a value is not finite.
+    log: keep one row for each frame in memory, 0.8 kB each. detector, law: plug-in objects that replace those
+    of the scenario. progress: called with the share flown, 0 to 1. Raises BadInput if the flight cannot be
+    trimmed or a name does not exist, SimulationFailed if a value is not finite.
     """
     from beaver_ftc.loop.loop import fly as fly_loop
 
@@ -232,9 +229,9 @@ def fly(
 
 
 def open_run(folder: str | PathLike[str]) -> Flight:
-    """The flight in a result folder, `runs/<name>`; its log is read when it is asked for.
+    """Open the flight in a result folder, `runs/<name>`. Its log is read at the first use.
 
-    Raises BadInput for a folder that is no result of a run.
+    Raises BadInput for a folder that is not the result of a run.
     """
     if not isinstance(folder, str | PathLike):
         raise BadInput(f"{folder!r:.60} is no folder, allowed: the result folder of a run")

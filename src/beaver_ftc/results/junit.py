@@ -10,17 +10,14 @@ from xml.etree import ElementTree
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.validation import one_line
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Expectation, Judged
 
 _LONGEST = 10_000  # characters of one line
 
 
-def write_junit(runs: Sequence[Document], path: Path) -> None:
-    """Write the runs: {scenario, expectations} or, of what could not be flown, {scenario, error}.
-
-    `took_s` of each is the time that flying it took, 0 where it is left out.
-    """
-    took_s = sum(run.get("took_s", 0.0) for run in runs)
+def write_junit(runs: Sequence[Judged], path: Path) -> None:
+    """Write what has been judged, or could not be flown."""
+    took_s = sum(run.took_s for run in runs)
     root = ElementTree.Element("testsuites", name="beaver-ftc", time=_seconds(took_s))
     for run in runs:
         _add_suite(root, run)
@@ -32,36 +29,34 @@ def write_junit(runs: Sequence[Document], path: Path) -> None:
         raise SimulationFailed(f"cannot write {path}: {error.strerror}") from error
 
 
-def _add_suite(root: ElementTree.Element, run: Document) -> None:
-    name = run["scenario"]
-    cases = [_case(name, expectation) for expectation in run.get("expectations", [])] or [_flight(name, run)]
+def _add_suite(root: ElementTree.Element, run: Judged) -> None:
+    name = run.name
+    cases = [_case(name, expectation) for expectation in run.expectations] or [_flight(run)]
     failures = sum(case.find("failure") is not None for case in cases)
     errors = sum(case.find("error") is not None for case in cases)
     counts = {"name": name, "tests": str(len(cases)), "failures": str(failures), "errors": str(errors)}
-    took_s = run.get("took_s", 0.0)
     for case in cases:
-        case.set("time", _seconds(took_s / len(cases)))
-    ElementTree.SubElement(root, "testsuite", counts, time=_seconds(took_s)).extend(cases)
+        case.set("time", _seconds(run.took_s / len(cases)))
+    ElementTree.SubElement(root, "testsuite", counts, time=_seconds(run.took_s)).extend(cases)
 
 
 def _seconds(took_s: float) -> str:
     return f"{took_s:.6f}"
 
 
-def _case(name: str, expectation: Document) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", classname=name, name=expectation["name"])
-    if not expectation["passed"]:
-        says = f"expected {expectation['expected']}, actual {expectation['actual']}"
-        says += f": {expectation['reason']}" if expectation.get("reason") else ""
+def _case(name: str, expectation: Expectation) -> ElementTree.Element:
+    case = ElementTree.Element("testcase", classname=name, name=expectation.name)
+    if not expectation.passed:
+        says = expectation.both_values + (f": {expectation.reason}" if expectation.reason else "")
         ElementTree.SubElement(case, "failure", message=_text(says), type="ExpectationMissed")
     return case
 
 
-def _flight(name: str, run: Document) -> ElementTree.Element:
+def _flight(run: Judged) -> ElementTree.Element:
     """The case of a scenario that expects nothing, or could not be flown."""
-    case = ElementTree.Element("testcase", classname=name, name="completes")
-    if "error" in run:
-        ElementTree.SubElement(case, "error", message=_text(run["error"]), type="NotFlown")
+    case = ElementTree.Element("testcase", classname=run.name, name="completes")
+    if run.error is not None:
+        ElementTree.SubElement(case, "error", message=_text(run.error), type="NotFlown")
     return case
 
 

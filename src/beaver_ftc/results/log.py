@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.model import Metrics
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -22,7 +23,7 @@ ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, sm
 _BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
 _MOST_ROWS_AT_ONCE = 1_000_000
 _UNITS = (  # ending of a column's name, unit; the longest endings first
-    ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2 s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
+    ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
     ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
     ("_hz", "Hz"), ("_m", "m"), ("_s", "s"),
 )  # fmt: skip
@@ -296,7 +297,7 @@ def unit_of(column: str) -> str:
     return next((unit for part in parts for ending, unit in _UNITS if part.endswith(ending)), "1")
 
 
-def log_frame(log: "Log", metrics: dict[str, Any]) -> "DataFrame":
+def log_frame(log: "Log", found: Metrics) -> "DataFrame":
     """The log as a DataFrame, float64, with scenario, seed, verdict and units in `attrs`."""
     from pandas import DataFrame
 
@@ -306,17 +307,17 @@ def log_frame(log: "Log", metrics: dict[str, Any]) -> "DataFrame":
         chunks = list(log.read_chunks())
         table = DataFrame({name: np.concatenate([chunk[name] for chunk in chunks]) for name in log.columns})
     table.attrs = {
-        "scenario": metrics["scenario"], "seed": metrics["seed"], "verdict": _said(metrics),
+        "scenario": found.scenario, "seed": found.seed, "verdict": _said(found),
         "units": units(log.columns),
     }  # fmt: skip
     return table
 
 
-def _said(metrics: dict[str, Any]) -> dict[str, Any]:
-    detection, isolation = metrics["detection"], metrics["isolation"]
+def _said(found: Metrics) -> dict[str, Any]:
+    detection, isolation = found.detection, found.isolation
     return {
-        "passed": metrics["passed"], "false_alarm": metrics["false_alarm"],
-        "detected": detection["detected"], "detection_delay_s": detection["delay_s"],
-        "isolated": isolation["fault"], "type": isolation["type"], "isolation_delay_s": isolation["delay_s"],
-        "departed": metrics["departure"] is not None,
+        "passed": found.passed, "false_alarm": found.false_alarm,
+        "detected": detection.detected, "detection_delay_s": detection.delay_s,
+        "isolated": isolation.fault, "type": isolation.type, "isolation_delay_s": isolation.delay_s,
+        "departed": found.departure is not None,
     }  # fmt: skip

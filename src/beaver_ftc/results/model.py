@@ -4,7 +4,7 @@ A record's fields are the keys of its section of the document, in their order. T
 the flight, delays s since the first frame with the fault, rates deg/s; None is what there is not.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cache
 from types import UnionType
@@ -27,10 +27,10 @@ class Part:
     def of(cls, document: Mapping[str, Any]) -> Self:
         """From a section as JSON has it; a key that is not there is None, or an empty list."""
         part: Any = cls
-        return cls(**{name: _read(hint, document.get(name)) for name, hint in _hints(part).items()})
+        return cls(**{name: read(document.get(name)) for name, read in _readers(part)})
 
     def document(self) -> Document:
-        """The section, key by key."""
+        """The section as a mapping of keys to values."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
         left_out = {one.name for one in fields(self) if "left_out" in one.metadata}
         return {
@@ -38,9 +38,13 @@ class Part:
         }
 
 
+Reader = Callable[[Any], Any]
+
+
 @cache
-def _hints(part: Any) -> dict[str, Any]:
-    return get_type_hints(part)
+def _readers(part: Any) -> tuple[tuple[str, Reader], ...]:
+    """The fields of a section, and how each is read."""
+    return tuple((name, _reader(hint)) for name, hint in get_type_hints(part).items())
 
 
 def without_none(hint: Any) -> Any:
@@ -50,18 +54,32 @@ def without_none(hint: Any) -> Any:
     return next(one for one in get_args(hint) if one is not type(None))
 
 
-def _read(hint: Any, value: Any) -> Any:
-    """A value of JSON as a field of this type has it."""
-    may_be_none, hint = without_none(hint) is not hint, without_none(hint)
-    inner = get_args(hint)
-    if value is None and (may_be_none or get_origin(hint) not in (tuple, dict)):
-        return None
-    if get_origin(hint) is tuple:
-        return tuple(_read(inner[0], entry) for entry in value or ())
-    if get_origin(hint) is dict:
-        return {key: _read(inner[1], entry) for key, entry in (value or {}).items()}
-    if isinstance(hint, type) and issubclass(hint, Part):
-        return hint.of(value)
+def _reader(hint: Any) -> Reader:
+    """How a value of JSON becomes a field of this type: the type is looked into once, not for each flight."""
+    bare = without_none(hint)
+    kind, inner = get_origin(bare), get_args(bare)
+    if kind is tuple:
+        read = _entries(_reader(inner[0]))
+    elif kind is dict:
+        read = _mapping(_reader(inner[1]))
+    else:
+        return _or_none(bare.of if isinstance(bare, type) and issubclass(bare, Part) else _without_lists)
+    return read if bare is hint else _or_none(read)
+
+
+def _entries(entry: Reader) -> Reader:
+    return lambda values: tuple(map(entry, values or ()))
+
+
+def _mapping(entry: Reader) -> Reader:
+    return lambda values: {key: entry(value) for key, value in (values or {}).items()}
+
+
+def _or_none(read: Reader) -> Reader:
+    return lambda value: None if value is None else read(value)
+
+
+def _without_lists(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -88,8 +106,8 @@ class Condition(Part):
 
 @dataclass(frozen=True)
 class Fault(Part):
-    """The first fault declared; actuator is None for an unanticipated one, and for that of an instrument,
-    which has a sensor."""
+    """The first fault of the scenario; actuator is None for an unanticipated fault, and for the fault of an
+    instrument, which has `sensor`."""
 
     actuator: str | None
     sensor: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
@@ -128,7 +146,7 @@ class Inconclusive(Part):
 
 @dataclass(frozen=True)
 class Detection(Part):
-    """The alarm. guaranteed_delay_s: from the fault to the instant from which it was certain."""
+    """The alarm. guaranteed_delay_s: time from the fault to the instant from which an alarm was certain."""
 
     detected: bool
     time_s: float | None
@@ -173,7 +191,7 @@ class Withdrawn(Part):
 
 @dataclass(frozen=True)
 class Isolation(Part):
-    """What was named: as in `Named`. names: all names given, in the order of the faults."""
+    """The named fault, as in `Named`. names: all names that were given, in the order of the faults."""
 
     isolated: bool
     fault: str | None
@@ -198,7 +216,7 @@ class Isolation(Part):
 
 @dataclass(frozen=True)
 class Rates(Part):
-    """One number an axis, deg/s."""
+    """One number for each axis, deg/s."""
 
     p: float | None
     q: float | None
@@ -207,7 +225,7 @@ class Rates(Part):
 
 @dataclass(frozen=True)
 class Tracking(Part):
-    """RMS tracking errors, deg/s; None where there was no such time. Path and energy by surface."""
+    """RMS tracking errors, deg/s, None if there was no such time; path and energy of each surface."""
 
     pre_fault_rms_deg_s: Rates | None
     post_fault_rms_deg_s: Rates | None
@@ -217,7 +235,7 @@ class Tracking(Part):
 
 @dataclass(frozen=True)
 class ModeChange(Part):
-    """Who is in charge from when on."""
+    """A mode of the supervisor, and the time from which it is active."""
 
     time_s: float
     mode: str
@@ -267,7 +285,7 @@ class Envelope(Part):
 
 @dataclass(frozen=True)
 class Departure(Part):
-    """When the aircraft was lost, and which signal left its limits."""
+    """Time at which the aircraft was lost, and the signal that left its limits."""
 
     time_s: float
     signal: str
@@ -346,14 +364,31 @@ class Limit(Part):
 
 @dataclass(frozen=True)
 class Expectation(Part):
-    """One of the scenario's expectations, and what came out; the reason of one that is not met, if it is
-    known."""
+    """One expectation of the scenario, and its result; if it is not met, the reason, if it is known."""
 
     name: str
     passed: bool
     expected: Any
     actual: Any
     reason: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+
+    @property
+    def both_values(self) -> str:
+        """What was expected and what came out, as tests and CI show them."""
+        expected, actual = map(_plain, (self.expected, self.actual))
+        return f"expected {expected}, actual {actual}"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Whether a flight, a sweep or a plan did as expected. error: why it could not be flown; took_s: the time
+    that it took."""
+
+    name: str
+    passed: bool = False
+    expectations: tuple[Expectation, ...] = ()
+    error: str | None = None
+    took_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -384,7 +419,9 @@ class Interval(Part):
 
 @dataclass(frozen=True)
 class Link(Part):
-    """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times."""
+    """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times.
+    diagnosed_from_s: when the diagnosis began; speed: multiple of real time, and how far behind it the flight
+    was; said: what the ground station was told."""
 
     protocol: str
     packets_hz: float
@@ -400,6 +437,11 @@ class Link(Part):
     silences: int
     latency_ms: Latency
     interval_ms: Interval
+    longest_silence_s: float
+    diagnosed_from_s: float | None
+    speed: float
+    late_ms: float
+    said: tuple[Document, ...]
 
 
 @dataclass(frozen=True)
@@ -437,3 +479,18 @@ class Metrics(Part):
     interrupted_s: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
     link: Link | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
     certificate: Certified | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+
+    @property
+    def judged(self) -> Judged:
+        """Whether the flight did as expected."""
+        return Judged(self.scenario, self.passed, self.expectations)
+
+    @property
+    def fault_found_s(self) -> float | None:
+        """From the fault to its alarm; None without one, or where a false alarm came before."""
+        return None if self.false_alarm else self.detection.delay_s
+
+    @property
+    def fault_named(self) -> bool:
+        """Whether the fault was named rightly, and no false alarm came before."""
+        return bool(self.isolation.correct) and not self.false_alarm

@@ -16,15 +16,15 @@ from beaver_ftc.scenario.schema import ScenarioLike, load
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from beaver_ftc.control.base import Law
-    from beaver_ftc.diagnosis.base import Detector
+    from beaver_ftc.control import Law
+    from beaver_ftc.diagnosis import Detector
     from beaver_ftc.plant.adapter import Plant
 
 PLUGS = ("detector", "law")
 
 
 class Simulation(Stepping):
-    """A flight in progress: step it, look, break and repair things, command it yourself.
+    """A flight in progress, frame by frame, with your own commands, faults and repairs.
 
         sim = Simulation("elevator-partial-loss")
         while not sim.done:
@@ -32,9 +32,11 @@ class Simulation(Stepping):
         sim.land()
 
     scenario: a name, a path, a mapping or a Scenario. detector, law: plug-in objects to fly with. log: keep
-    one row a frame in memory, or in the log given, for instance a SpooledLog. prepare: called with the
-    trimmed plant before the flight. Frame 0, in which the trimmed flight is measured, is flown with the first
-    step.
+    one row for each frame in memory, or in the given log. prepare: called with the trimmed plant before the
+    flight. The first step also flies frame 0, which measures the trimmed flight.
+
+    `done`, `t_s`, `mode`, `measured` and `verdict` tell the present state. `readout` has further values of
+    the frame just flown, with names and units.
     """
 
     def __init__(
@@ -57,23 +59,23 @@ class Simulation(Stepping):
         return self.land().log
 
     def snapshot(self) -> "Snapshot":
-        """The flight as it is now, to be continued from here any number of times, each to the bit."""
+        """The present state of the flight. It can be continued any number of times, each time to the bit."""
         plugged = tuple(name for name, of in zip(PLUGS, self._plug_ins, strict=True) if of is not None)
         made = partial(type(self), self._given, log=self._kept is not None, prepare=self._prepare)
         return Snapshot(self.frames, self.t_s, tuple(self._asked), made, plugged)
 
     def clone(self) -> Self:
-        """Another flight in the same state, of which each goes its own way: `snapshot().resume()`."""
+        """A second flight in the same state, independent of the first: `snapshot().resume()`."""
         return cast("Self", self.snapshot().resume())
 
     def land(self) -> Flight:
-        """What the flight has yielded so far, as `fly` would say it; the flight may go on."""
+        """The flight so far, as `fly` would return it; the flight may continue."""
         outcome = self._outcome()
         self._flush()
         return Flight.landed(outcome, self._kept and self._kept.so_far())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
-        """Write what has been flown so far as a result folder; see `Flight.save`."""
+        """Write the flight so far as a result folder; see `Flight.save`."""
         return self.land().save(out, report=report)
 
 

@@ -21,7 +21,7 @@ from beaver_ftc.results.model import (
     Named,
     Withdrawn,
 )
-from beaver_ftc.scenario.warnings import in_words
+from beaver_ftc.scenario.declared import in_words
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document, Metrics

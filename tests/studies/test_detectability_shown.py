@@ -29,7 +29,7 @@ from beaver_ftc.studies.detectability import (
     survey_name,
     text,
 )
-from beaver_ftc.studies.isolability import DOUBLET, SHOWN
+from beaver_ftc.studies.isolability import DOUBLET_COLUMNS, LOSS_COLUMNS
 from beaver_ftc.studies.present.page import contents, write_files
 from flying import loss, scenario
 from kept import in_short, picture
@@ -67,7 +67,7 @@ def pairs_made():
                 "fault": fault,
                 "other": other,
             }
-            values = dict(zip((*SHOWN, *DOUBLET), (*seen, *told), strict=True))
+            values = dict(zip((*LOSS_COLUMNS, *DOUBLET_COLUMNS), (*seen, *told), strict=True))
             found.append(place | values)
     return found
 
@@ -256,7 +256,7 @@ def test_a_point_that_cannot_be_flown_says_so_of_every_surface(monkeypatch):
     assert {(row["fault"], row["other"]) for row in found["pairs"]} == {
         *permutations(scenario().airframe.class_of_losses, 2)
     }
-    nothing = dict.fromkeys((*SHOWN, *DOUBLET)) | {"why": "no trim"}
+    nothing = dict.fromkeys((*LOSS_COLUMNS, *DOUBLET_COLUMNS)) | {"why": "no trim"}
     assert all(row | place | nothing == row for row in found["pairs"])
 
 

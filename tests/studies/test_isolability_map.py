@@ -12,7 +12,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.studies import isolability
 from beaver_ftc.studies.detectability import SETTLED_S, Excitation, excitation, judge, pairs_of
-from beaver_ftc.studies.isolability import doublets, shown
+from beaver_ftc.studies.isolability import loss_limits, smallest_doublets
 from flying import loss, scenario
 from samples import samples
 
@@ -22,22 +22,22 @@ FAULTS = ("aileron", "elevator", "rudder")
 def test_a_surface_that_tells_in_every_third_frame():
     """Of frames that exclude from 0.4, never, never, 0.8, never, never, 0.4, ..., two are to be enough."""
     least = np.array([0.4, inf, inf, 0.8, inf, inf] * 3 + [0.4])
-    found = shown(least, 2, 0.1)
+    found = loss_limits(least, 2, 0.1)
     assert found["magnitude"] is None  # two frames of nothing
     assert found["longest_s"] == pytest.approx(0.3)
-    found = shown(least, 3, 0.1)
+    found = loss_limits(least, 3, 0.1)
     assert (found["magnitude"], found["magnitude_median"]) == (0.8, 0.8)  # 0.4 in 8 of 17 instants
     # struck with the frame that tells, one before, two before: one, two, three frames
     assert (found["longest_s"], found["median_s"]) == (pytest.approx(0.3), pytest.approx(0.2))
 
 
 def test_what_no_frame_tells_is_never_told():
-    assert set(shown(np.full(20, inf), 5, 0.01).values()) == {None}
+    assert set(loss_limits(np.full(20, inf), 5, 0.01).values()) == {None}
 
 
 @given(st.lists(st.one_of(st.just(inf), st.floats(0.01, 1.0)), min_size=4, max_size=30), st.integers(1, 4))
 def test_a_total_loss_takes_no_longer_than_the_window_exactly_where_some_loss_is_certain(least, frames):
-    found = shown(np.array(least), frames, 1.0)
+    found = loss_limits(np.array(least), frames, 1.0)
     soon = found["longest_s"] is not None and found["longest_s"] <= frames
     assert (found["magnitude"] is not None) == soon
     if found["median_s"] is not None and found["longest_s"] is not None:
@@ -85,7 +85,7 @@ def test_another_surface_is_excluded_no_later_than_the_map_says():
 
 def test_without_a_package_that_finds_doublets_the_map_says_so(monkeypatch):
     monkeypatch.setattr(isolability, "offered", lambda service: None)
-    found = doublets(scenario(), SETTLED_S)
+    found = smallest_doublets(scenario(), SETTLED_S)
     assert set(found) == {(a, b) for pair in combinations(FAULTS, 2) for a, b in (pair, pair[::-1])}
     assert {(told["doublet_deg"], told["doublet_s"]) for told in found.values()} == {(None, None)}
     assert {told["why"] for told in found.values()} == {"no installed package offers 'doublets'"}

@@ -56,7 +56,7 @@ TOO_SHORT = "the flight ends before a fault could be isolated"
 MOTION = {"p": "roll", "q": "pitch", "r": "yaw"}
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
 PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault and another
-PAIRS = (*PLACE, "fault", "other", *isolability.SHOWN, *isolability.DOUBLET)
+PAIRS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
 SUMMARY = ("fault", "reference scale", "all onsets: places", "loss", "half of onsets: places", "loss")
 CERTAIN = (
     "Places: grid points where a loss of some size is certain to be detected and isolated in time, whenever\n"
@@ -96,19 +96,33 @@ def excitation(scenario: Scenario) -> Excitation:
     """
     log = Columns()
     fly(scenario.model_copy(update={"faults": ()}), log)
+    first = int(SETTLED_S * scenario.rate_hz)
+    moment, bound, G = moments_of(scenario, log)
+    of = {name: along[first:] for name, along in moment.items()}
+    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz, G[first])
+
+
+def moments_of(
+    scenario: Scenario, log: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Along a flight of n frames, by the design model: the moment of each surface that leads an axis, (n, 3)
+    rad/s2 by its name; the bound (n, 3) rad/s2; and G (n, 3, surfaces) rad/s2 per rad."""
     aircraft = scenario.airframe
-    y = np.zeros((len(log.read("t_s")), N_Y))
-    seen = log.read("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
+    y = np.zeros((len(log["t_s"]), N_Y))
+    seen = _side_by_side(log, "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
     y[:, : seen.shape[1]] = seen
-    u = log.read(*(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
-    bound = log.read(*(f"{axis}_eta_bar_rad_s2" for axis in AXES))
+    u = _side_by_side(log, *(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
+    bound = _side_by_side(log, *(f"{axis}_eta_bar_rad_s2" for axis in AXES))
     design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
     for row, at in zip(y, G, strict=True):
         both_responses(design, np.zeros(3), row, np.zeros(3), at)
-    first = int(SETTLED_S * scenario.rate_hz)
-    moment = (G * u[:, None, :])[first:]
+    moment = G * u[:, None, :]
     of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.class_of_losses}
-    return Excitation(of, bound[first:], 1.0 / scenario.rate_hz, G[first])
+    return of, bound, G
+
+
+def _side_by_side(log: Mapping[str, np.ndarray], *names: str) -> np.ndarray:
+    return np.column_stack([log[name] for name in names])
 
 
 def detection_magnitude(z: np.ndarray, bound: np.ndarray) -> np.ndarray:
@@ -329,11 +343,11 @@ def _point(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, l
     place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
     try:
         seen = excitation(there)
-        doublets = isolability.doublets(at(there, *point[:2], 0.0), SETTLED_S)
+        doublets = isolability.smallest_doublets(at(there, *point[:2], 0.0), SETTLED_S)
     except BeaverFtcError as error:
         faults = scenario.airframe.class_of_losses
         none = [{"fault": fault, **_nothing(str(error))} for fault in faults]
-        found = {"points": none, "pairs": isolability.nothing(faults, str(error))}
+        found = {"points": none, "pairs": isolability.rows_without_result(faults, str(error))}
     else:
         pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
         found = {"points": [{"fault": fault, **judge(seen, fault)} for fault in seen.moment], "pairs": pairs}
@@ -386,9 +400,9 @@ def _windows(seen: Excitation) -> tuple[int, int]:
 def pairs_of(seen: Excitation) -> list[Document]:
     """Of each fault and each other, what a flight shows: how small, and how soon."""
     if len(seen.bound) < _windows(seen)[1]:
-        return isolability.nothing([*seen.moment], TOO_SHORT)
+        return isolability.rows_without_result([*seen.moment], TOO_SHORT)
     return [
-        {"fault": fault, "other": other, **isolability.shown(least, _windows(seen)[1], seen.dt)}
+        {"fault": fault, "other": other, **isolability.loss_limits(least, _windows(seen)[1], seen.dt)}
         for fault, of_others in seen.excluding.items()
         for other, least in of_others.items()
     ]
@@ -444,9 +458,9 @@ def _page(document: Document, folder: Path) -> str:
         Table(SUMMARY, _summary(document["points"])),
         CERTAIN,
         Heading("Isolability"),
-        isolability.SAYS,
+        isolability.TABLE_CAPTION,
         Pictures([("smallest loss that is distinguished from each other surface", "isolability")]),
-        Table(isolability.HEAD, isolability.table(document["pairs"])),
+        Table(isolability.TABLE_HEAD, isolability.table(document["pairs"])),
     ]
     figures = {stem: folder / f"{stem}.png" for stem in ("detectability", "isolability")}
     return as_html(f"Detectability: {document['scenario']}", parts, figures)
@@ -504,7 +518,7 @@ def text(rows: Sequence[Document], pairs: Sequence[Document] = ()) -> str:
     head = f"{place}{'detected':>10}{'median':>8}{'isolated':>10}{'median':>8}   limited by"
     lines = [*_conclusions(rows), "", aligned([SUMMARY, *_summary(rows)]), CERTAIN]
     if pairs:
-        lines += ["", aligned([isolability.HEAD, *isolability.table(pairs)]), isolability.SAYS]
+        lines += ["", aligned([isolability.TABLE_HEAD, *isolability.table(pairs)]), isolability.TABLE_CAPTION]
     return "\n".join([*lines, "", head, *map(_line, rows)])
 
 
@@ -551,19 +565,21 @@ def _line(row: Document) -> str:
 class Detectability(StudyCommand):
     """Compute the smallest fault that is certain to be isolated.
 
-    Over airspeed, altitude and excitation. A sentence for each surface comes first, the tables follow.
+    The command varies airspeed, altitude and the size of the references. It prints a sentence for each
+    surface, and then the tables.
 
-    Certain: detected within 0.5 s and isolated within 1 s, whatever the declared uncertainty does, along the
-    scenario's references scaled by 0.25 to 2. `median`: for half of the possible start times of the fault.
-    With --surface: one sentence for each place.
+    A fault is certain if it is detected within 0.5 s and isolated within 1 s under every admissible error,
+    with the scenario's references scaled by 0.25 to 2. `median`: for half of the possible start times of the
+    fault.
+    With --surface, the command prints one sentence for each place.
 
     The map of isolability lists, for each pair of surfaces, the smallest loss that is distinguished, its
     delay, and the smallest doublet that distinguishes it.
 
     The same command resumes an interrupted run.
 
-    airspeed: Airspeed, m/s; once for each.
-    altitude: Altitude above sea level, m; once for each.
+    airspeed: Airspeed, m/s. Repeat the option for several.
+    altitude: Altitude above sea level, m. Repeat the option for several.
     aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     surface: Only this surface; print one sentence for each place.
     out: Folder for the maps, a page, CSV and JSON.

@@ -15,14 +15,15 @@ from beaver_ftc.studies import handling, margins
 class Linearise(StudyCommand):
     """Linearise the closed loop and print its margins.
 
-    Over the airspeeds of the envelope. Aircraft, actuators, sensors' lag and delay, frame rate and the
-    default law, broken at each surface in turn; healthy, and with losses of each surface that the law
-    knows.
+    The loop contains the aircraft, the actuators, lag and delay of the sensors, the frame rate and the
+    default law. It is opened at each surface in turn, at the airspeeds of the envelope: healthy, and with
+    losses of each surface that the law knows.
 
-    And the handling qualities of the aircraft alone: short period, phugoid, Dutch roll, roll and spiral mode
-    against the levels of MIL-F-8785C; of a scenario in which something breaks, also where its flight ends.
+    The command also prints the handling qualities of the aircraft alone: short period, phugoid, Dutch roll,
+    roll and spiral mode, and their levels of MIL-F-8785C. If the scenario has a fault, it prints them for the
+    end of the flight as well.
 
-    scenario: Take sensors, actuators and law from it.
+    scenario: Scenario with the sensors, actuators and law.
     """
 
     scenario: Annotated[str | None, typer.Argument(metavar="SCENARIO")] = None

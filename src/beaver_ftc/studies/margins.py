@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.control.base import flown_by
-from beaver_ftc.control.laws.gains import margins
-from beaver_ftc.control.laws.rejecting import STAND_IN
+from beaver_ftc.control import flown_by
+from beaver_ftc.control.laws.rejecting import STAND_IN, margins
 from beaver_ftc.control.readout import Schedule
 from beaver_ftc.design.model import QDYN, jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW

@@ -23,9 +23,8 @@ from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.results.metrics import fault_free_s
+from beaver_ftc.results.metrics import Truth, fault_free_s, is_late
 from beaver_ftc.scenario.faults import LossOfEffectiveness
-from beaver_ftc.scenario.judgement import Truth, is_late
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within

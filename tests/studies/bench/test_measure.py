@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.bench import measure
 from beaver_ftc.studies.bench.contenders import Bare, InnovationDetector, ProportionalInversion, take_over

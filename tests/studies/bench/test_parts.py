@@ -52,7 +52,7 @@ def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():
     assert now["k"][0] == before["k"][0] + 20
     for untouched in ("fdi", "control", "accounts"):
         assert now[untouched].tobytes() == before[untouched].tobytes()
-    for untouched in ("f", "G", "sums", "means"):
-        assert now["belief"][untouched].tobytes() == before["belief"][untouched].tobytes()
+    for untouched in ("f", "G", "sums", "frame_means"):
+        assert now["prediction"][untouched].tobytes() == before["prediction"][untouched].tobytes()
     assert np.isnan(loop.log).all()
     assert loop.plant.read("fcs/elevator-cmd-rad") == 0.01 != commands[1]

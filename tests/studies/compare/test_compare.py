@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.diagnosis.rivals import GRADES
+from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import load_sweep
@@ -234,7 +234,7 @@ def test_the_leaderboard_keeps_what_was_written_by_hand(tmp_path, compared):
     assert "What loses:" in text
 
 
-CALIBRATED_ON = [CALIBRATION + grade for grade in GRADES]
+CALIBRATED_ON = [CALIBRATION + grade for grade in FLIGHT_GRADES]
 
 
 @pytest.mark.parametrize("name", [*set_names(), *CALIBRATED_ON])

@@ -2,13 +2,14 @@
 
 import json
 from math import inf, nan
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.scenario.judgement import Onset
+from beaver_ftc.results.metrics import Onset
 from beaver_ftc.studies.compare import leaderboard, runs
 from beaver_ftc.studies.compare.leaderboard import (
     MARK,
@@ -155,29 +156,29 @@ BEFORE = {"p": 0.1, "q": 0.2, "r": 0.3}
 BIASED = {"sensor": "p", "type": "bias", "bias_deg_s": 1, "abrupt": True, "at_s": 2}
 
 
-def run_of(folder, **changes):
-    run = {
-        "folder": str(folder), "scenario": "first", "seed": 7, "false_alarm": False, "passed": True,
-        "flown": {"initial": {"airspeed_mps": 45.0, "altitude_m": 1828.8}, "control": {"law": "nominal"},
-                  "fdi": {"scheme": "none"}, "faults": [LIMITED, BIASED]},
+FLOWN = {
+    "initial": {"airspeed_mps": 45.0, "altitude_m": 1828.8}, "control": {"law": "nominal"},
+    "fdi": {"scheme": "none"}, "faults": [LIMITED, BIASED],
+}  # fmt: skip
+
+
+def run_of(folder, faults=FLOWN["faults"], **changes):
+    metrics = {
+        "scenario": "first", "seed": 7, "false_alarm": False, "passed": True,
         "detection": {"delay_s": 0.25, "guaranteed_delay_s": None},
         "isolation": {"fault": "elevator", "delay_s": 0.5, "estimate": -0.412},
         "tracking": {"pre_fault_rms_deg_s": BEFORE, "post_fault_rms_deg_s": {"p": 1.0}},
         "envelope_exits": [{"start_s": 3.0, "end_s": 4.5}, {"start_s": 6.0, "end_s": 6.25}],
         "departure": None, "fault": {"at_s": 12.0},
     }  # fmt: skip
-    return run | changes
+    return runs.Run(Path(folder), metrics | changes, FLOWN | {"faults": faults})
 
 
 def test_runs_side_by_side(changed, tmp_path):
     lost = {"departure": {"signal": "alpha_rad", "time_s": 20.456}, "passed": False, "false_alarm": True}
-    healthy = run_of(tmp_path / "b", fault=None, **lost)
-    healthy["flown"] = {**healthy["flown"], "faults": []}
-    healthy["isolation"] = {"fault": None, "delay_s": None, "estimate": None}
-    healthy["tracking"] = {
-        "pre_fault_rms_deg_s": {"p": 0.1, "q": 0.2, "r": 0.3},
-        "post_fault_rms_deg_s": None,
-    }
+    tracked = {"pre_fault_rms_deg_s": BEFORE, "post_fault_rms_deg_s": None}
+    nothing = {"fault": None, "delay_s": None, "estimate": None}
+    healthy = run_of(tmp_path / "b", [], fault=None, isolation=nothing, tracking=tracked, **lost)
     assert not changed(runs.as_text([run_of(tmp_path / "a"), healthy]).splitlines())
     assert runs.labels([run_of("x/a"), run_of("y/a")]) == ["x/a", "y/a"]
 
@@ -211,7 +212,9 @@ def test_runs_leave_a_figure_a_document_and_a_report(monkeypatch, tmp_path):
     monkeypatch.setattr("beaver_ftc.results.report.write_report", lambda *given: reports.append(given))
     found = runs.write_runs(tmp_path / "out", folders)
     there = tmp_path / "out" / "runs"
-    assert json.loads((there / "runs.json").read_text()) == found == [run_of(folder) for folder in folders]
+    assert found == [run_of(folder) for folder in folders]
+    read = [run.metrics | {"folder": str(run.folder), "flown": FLOWN} for run in found]
+    assert json.loads((there / "runs.json").read_text()) == read
     assert (there / "runs.png").read_bytes()[1:4] == b"PNG"
     assert [(path.name, *rest) for path, *rest in reports] == [("runs.html", folders, ["a", "b"])]
 

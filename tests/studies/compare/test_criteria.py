@@ -69,8 +69,8 @@ MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", 
 @pytest.fixture
 def law(monkeypatch):
     """A law on four faulted flights; the oracle's errors and the default law's effort are made up."""
-    monkeypatch.setattr(criteria, "flights", lambda grade, most: CASES)
-    monkeypatch.setattr(criteria, "yardsticks", lambda grade, most: ((1.0, 2.0, 4.0, 1.0), 2.0))
+    monkeypatch.setattr(criteria, "flights", lambda *_: CASES)
+    monkeypatch.setattr(criteria, "yardsticks", lambda *_: ((1.0, 2.0, 4.0, 1.0), 2.0))
     monkeypatch.setattr(criteria, "margins_of", lambda scenario: MARGINS)
     return LawCost("lqr", "exact", None)
 
@@ -132,7 +132,7 @@ def test_kinds_of_flights_take_turns():
 
 def test_the_yardsticks_are_the_oracle_and_the_default_law(monkeypatch):
     """On the faulted flights alone."""
-    monkeypatch.setattr(criteria, "flights", lambda grade, most: CASES[:3])
+    monkeypatch.setattr(criteria, "flights", lambda *_: CASES[:3])
     asked = given(monkeypatch, [replace(SOUND, rms_deg_s=3.0), SOUND, SOUND, SOUND])
     assert criteria.yardsticks.__wrapped__("exact", None) == ((3.0, 2.0), 2.0)
     assert [entry.law for entry, _, _ in asked] == [ORACLE, ORACLE, LAW, LAW]

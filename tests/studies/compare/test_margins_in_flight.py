@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control.laws.rejecting import margins
 from beaver_ftc.studies.compare import margins_in_flight
 from beaver_ftc.studies.compare.margins_in_flight import _measured, in_trim, margins_of
 from beaver_ftc.studies.margins import at

@@ -2,23 +2,39 @@
 
 import json
 from dataclasses import asdict
+from itertools import pairwise
 
 import pytest
 
-from beaver_ftc.diagnosis.rivals import GRADES, KINDS, TUNED, tuned, values_of
+from beaver_ftc.diagnosis.rivals import (
+    FLIGHT_GRADES,
+    TUNED_FILE,
+    TUNED_GROUP_NAMES,
+    tuned_parameters,
+    tuned_values,
+)
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, registered, tunable
 from beaver_ftc.studies.compare import tune as tuning
+from beaver_ftc.studies.compare.criteria import INADMISSIBLE
 from beaver_ftc.studies.compare.search import EDGE, Found, on_scale
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL
-from beaver_ftc.studies.compare.tune import Method, as_text, methods_of, read_tuned, tune, write_tuned
+from beaver_ftc.studies.compare.tune import (
+    LEAST_GAIN,
+    Method,
+    as_text,
+    methods_of,
+    read_tuned,
+    tune,
+    write_tuned,
+)
 from commands import beaver
 from flying import scenario
 
-SHIPPED = json.loads(TUNED.read_text())
+SHIPPED = json.loads(TUNED_FILE.read_text())
 ROWS = [pytest.param(row, id=f"{row['grade']}-{row['kind']}-{row['name']}") for row in SHIPPED["methods"]]
-GROUPS = {kind: group for group, kind in KINDS.items()}
+GROUPS = {kind: group for group, kind in TUNED_GROUP_NAMES.items()}
 MINE = """
 from beaver_ftc.diagnosis.rivals.observer import ConstantThresholdObserver
 
@@ -42,8 +58,19 @@ def test_no_value_that_ships_is_on_the_edge_of_its_range(row):
         assert max(places) < 1.0 - EDGE
 
 
+@pytest.mark.parametrize("row", ROWS)
+def test_a_method_that_is_tuned_again_gains_at_most_5_percent(row):
+    """On flights that chose neither the values that ship nor those that the second tuning finds."""
+    *adopted, last = row["again"]
+    used = [(again["draw"], again["draw"] + again["judged"]) for again in row["again"]]
+    assert all(end < begin for (_, end), (begin, _) in pairwise(used))
+    assert all(again["gain"] > LEAST_GAIN for again in adopted)
+    assert last.get("gain", 0.0) <= LEAST_GAIN
+    assert ("gain" in last) == (row["cost"] < INADMISSIBLE)
+
+
 def test_everybody_is_tuned_with_the_same_budget_on_every_grade():
-    everybody = methods_of([*registered(DETECTORS), STATISTICAL], list(registered(LAWS)), GRADES)
+    everybody = methods_of([*registered(DETECTORS), STATISTICAL], list(registered(LAWS)), FLIGHT_GRADES)
     rows = {(GROUPS[row["kind"]], row["name"], row["grade"]): row for row in SHIPPED["methods"]}
     assert set(rows) == {(each.group, each.name, each.grade) for each in everybody}
     assert {SCHEME, LAW} < {each.name for each in everybody}
@@ -51,7 +78,9 @@ def test_everybody_is_tuned_with_the_same_budget_on_every_grade():
         searches = 1 + len(row["widened"])
         assert row["trials"] <= SHIPPED["trials"] * searches
         assert row["trials"] >= SHIPPED["trials"] - len(row["ranges"])
-        assert row["values"] == values_of(tuned(), row["grade"], GROUPS[row["kind"]], row["name"])
+        assert row["values"] == tuned_values(
+            tuned_parameters(), row["grade"], GROUPS[row["kind"]], row["name"]
+        )
 
 
 def test_rivals_fly_with_what_was_chosen_for_their_grade():
@@ -62,8 +91,8 @@ def test_rivals_fly_with_what_was_chosen_for_their_grade():
         ("errors", {"fdi": errors}),
     ):
         given["fdi"] = {"scheme": "augmented-ekf", **given.get("fdi", {})}
-        flown = Loop(scenario(duration_s=1, **given)).plugin_frame.detector.option
-        assert values_of(tuned(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
+        flown = Loop(scenario(duration_s=1, **given)).plugin_frame.detector.options
+        assert tuned_values(tuned_parameters(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
 
 
 @pytest.mark.parametrize(("cost", "kept"), [(0.96, True), (0.94, False)])
@@ -79,7 +108,7 @@ def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
 
 
 def test_a_method_starts_with_what_ships_or_its_defaults():
-    assert Method(LAWS, "lqr", "exact").start() == values_of(tuned(), "exact", LAWS, "lqr")
+    assert Method(LAWS, "lqr", "exact").start() == tuned_values(tuned_parameters(), "exact", LAWS, "lqr")
     ours = Method(DETECTORS, STATISTICAL, "nowhere").start()
     assert ours == {"fdi.statistical.false_alarms_per_h": 1e-3, "fdi.statistical.misnaming": 1e-4}
     assert Method(LAWS, "zhang2005", "nowhere").start()["network_gain"] == 40.0

@@ -7,9 +7,8 @@ import pytest
 
 from beaver_ftc import load as load_scenario
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import design_of, inertia_coefficients, inertial
-from beaver_ftc.diagnosis.informed_test import healthy_positions, term_accelerations
+from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
+from beaver_ftc.diagnosis.informed_test import healthy_surface_positions, unit_term_acceleration
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.results.log import Columns
@@ -50,14 +49,14 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
     x = np.column_stack([kept[f"{axis}_rad_s"] for axis in "pqr"])
     y = np.column_stack([kept[name] for name in ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")])
     found = sum(
-        t.value * term_accelerations(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface
+        t.value * unit_term_acceleration(AIRCRAFT, t, kept, None) for t in AIRCRAFT.moments if not t.surface
     )
     turning = inertial(inertia_coefficients(AIRCRAFT.mass), x)
     expected = [model.f(*each) for each in zip(x, y, strict=True)]
     assert found + turning == pytest.approx(np.array(expected), rel=1e-9)
     for s, surface in enumerate(AIRCRAFT.surfaces):
         of_it = [term for term in AIRCRAFT.moments if term.surface == surface]
-        found = sum(term.value * term_accelerations(AIRCRAFT, term, kept, deflection) for term in of_it)
+        found = sum(term.value * unit_term_acceleration(AIRCRAFT, term, kept, deflection) for term in of_it)
         expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
         assert found == pytest.approx(np.array(expected), rel=1e-9)
 
@@ -74,7 +73,7 @@ def test_a_healthy_surface_is_where_the_truth_has_it(lost):
         before = kept["t_s"] < until_s
         true = kept[f"{surface}_effective_rad"]
         step = context.declared.rate_limit_rad_s[0] * context.dt_s
-        assert np.abs(healthy_positions(context, kept, surface) - true)[before].max() <= step
+        assert np.abs(healthy_surface_positions(context, kept, surface) - true)[before].max() <= step
 
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
@@ -96,7 +95,7 @@ def test_the_time_since_the_fault_and_the_air_as_the_vanes_show_it(lost, monkeyp
     monkeypatch.setattr(clairvoyant, "with_measured_gust", lambda context, std: seen.append(std) or context)
     clairvoyant._declared(rough)
     frames = Loop(rough).frames
-    variance = FrameReadout(frames[0]).diagnosis.model_noise
+    variance = FrameReadout(frames[0]).diagnosis.input_noise_variance
     apart(variance=variance)
     assert seen[-1] ** 2 == pytest.approx(variance)
 
@@ -137,4 +136,4 @@ def test_an_aircraft_with_signals_of_its_own_keeps_those():
     assert "dpt" not in kept
     for term in scenario.airframe.moments:
         moved = kept.get(f"{term.surface}_cmd_rad")
-        assert np.isfinite(term_accelerations(scenario.airframe, term, kept, moved)).all()
+        assert np.isfinite(unit_term_acceleration(scenario.airframe, term, kept, moved)).all()

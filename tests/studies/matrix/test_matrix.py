@@ -96,7 +96,11 @@ class TestVerdict:
     def of(self, fault, kind, candidates=(), detected=True, false_alarm=False, true_type="stuck"):
         type_correct = None if kind is None else kind == true_type
         isolation = SimpleNamespace(
-            fault=fault, type=kind, candidates=tuple(candidates), type_correct=type_correct
+            fault=fault,
+            type=kind,
+            candidates=tuple(candidates),
+            correct=fault == "elevator",
+            type_correct=type_correct,
         )
         detection = SimpleNamespace(detected=detected)
         found = SimpleNamespace(detection=detection, false_alarm=false_alarm, isolation=isolation)

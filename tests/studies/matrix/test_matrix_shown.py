@@ -205,11 +205,11 @@ def test_a_run_of_the_whole_matrix(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("isolation", "said"),
     [
-        ({"fault": "elevator", "type": None, "candidates": []}, "surface"),
-        ({"fault": "elevator", "type": "stuck", "type_correct": None}, "named"),
+        ({"fault": "elevator", "correct": True, "type": None, "candidates": []}, "surface"),
+        ({"fault": "elevator", "correct": True, "type": "stuck", "type_correct": None}, "named"),
         ({"candidates": ["elevator"]}, "open"),
         ({"candidates": ["elevator:bias"]}, "WRONG"),
-        ({"fault": "flap", "candidates": ["stuck"]}, "WRONG"),
+        ({"fault": "flap", "correct": False, "candidates": ["stuck"]}, "WRONG"),
     ],
 )
 def test_a_verdict(isolation, said):

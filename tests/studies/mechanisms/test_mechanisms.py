@@ -244,9 +244,11 @@ def test_findings_in_sentences(few_cells):
         "In all of these flights worst-case detectors raise 1 false alarms; 1 of them have an undeclared"
     )
     row = document["mechanisms"][0] | {"names": {"value": -0.12, "low": -0.2, "high": -0.04}}
-    assert finding(row | {"same_verdict": 1}).endswith(
-        "(published): without it, 12.0 % fewer flights have lost names."
-    )
+    assert finding(row | {"same_verdict": 1}).endswith("(published): without it, lost names -12.0 points.")
+    plain = document["mechanisms"][1] | {"same_tracking": 0}
+    ends = "(published): without it {}, and no criterion changes beyond chance."
+    assert finding(plain).endswith(ends.format("no verdict differs"))
+    assert finding(plain | {"same_verdict": 1}).endswith(ends.format("1 of 2 verdicts differ"))
 
 
 @needs.service("proof")

@@ -49,7 +49,7 @@ def test_turbulence_is_its_own_source_and_leaves_nothing():
     assert np.abs(states.x_air - states.x).max() > 1e-3
     case = Models(CALM, states[:1])
     contributions, _ = instantaneous(case, states)
-    designed = case.belief.acceleration(states.x_measured, states.y_measured, states.u)
+    designed = case.design_model.acceleration(states.x_measured, states.y_measured, states.u)
     rest = states.xdot - designed - sum(contributions.values())
     assert np.abs(contributions["wind_turbulence"]).max() > 1e-3
     assert np.abs(rest).max() <= ROUNDING
@@ -73,7 +73,7 @@ def test_an_erring_sensor_shows_as_the_model_at_the_true_state_less_that_at_the_
     plain, _ = split(CALM, [columns])
     off = columns | {measured_name(column): columns[column] + error}
     states = states_of(off)
-    designed = Models(CALM, states[:1]).belief
+    designed = Models(CALM, states[:1]).design_model
     made_of_it = designed.acceleration(states.x_measured, states.y_measured, states.u)
     for i, axis in enumerate("pqr"):  # what the diagnosis would have logged, one row later
         off[f"{axis}_design_rad_s2"] = np.concatenate([[0.0], made_of_it[:-1, i]])

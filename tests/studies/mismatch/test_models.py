@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import anchor, anchored, design_of, inertia_coefficients, response
 from beaver_ftc.studies.mismatch import models
-from beaver_ftc.studies.mismatch.models import Belief, designed_moments
+from beaver_ftc.studies.mismatch.models import DesignModelOfFlight, designed_moments
 from beaver_ftc.studies.mismatch.sources import (
     EARTH_RATE_RAD_S,
     HealthyActuators,
@@ -47,7 +47,7 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
     x, y, u = random_states()
     design = design_of(case.design_model)[0]
     anchor(design, x[0], y[0], u[0])
-    found = Belief(designed_moments(case), anchored(design))
+    found = DesignModelOfFlight(designed_moments(case), anchored(design))
     record = np.array([design]).view(np.recarray)[0]
     for k in range(len(x)):
         f, G = np.zeros(3), np.zeros((3, 4))

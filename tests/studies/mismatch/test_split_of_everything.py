@@ -183,7 +183,7 @@ def test_who_struck_last_has_the_surface_also_after_its_repair():
     states = States(t, none, none, none, y, y, position, position, position, none, none, t, t, none, none)
     G = np.zeros((6, 3, 4))
     G[:, 1, 1] = 10.0
-    found = fault_effects(SimpleNamespace(scenario=case, belief=None), states, G, healthy)
+    found = fault_effects(SimpleNamespace(scenario=case, design_model=None), states, G, healthy)
     assert {name: of[:, 1].tolist() for name, of in found.items()} == {
         "elevator loss of effectiveness at 1.5 s": pytest.approx([0.0, -1.0, -1.0, -1.0, -1.0, -1.0]),
         "elevator loss of effectiveness at 2.5 s": pytest.approx([0.0, 0.0, -0.4, -0.4, -0.4, -0.4]),

@@ -1,4 +1,4 @@
-"""The test that is told the fault: against one big Gaussian problem, and against counting."""
+"""The informed test: against one big Gaussian problem, and against counting."""
 
 from dataclasses import replace
 from statistics import NormalDist
@@ -6,7 +6,11 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.informed_test import UNEXPLAINED_S, Whitening, detection_probability
+from beaver_ftc.diagnosis.informed_test import (
+    UNEXPLAINED_ACCELERATION_MEMORY_S,
+    WhiteningFilter,
+    detection_probability,
+)
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.studies.compare.replay import Recorder, record
 from beaver_ftc.studies.power.survey import Block, Condition, deflections, loss, scenario_of, strikes_at_s
@@ -33,7 +37,7 @@ def covariance(context, n):
         gust = process(declared.gust_rad_s[j], declared.gust_time_s[j])
         effect = declared.gust_effect[:, j]
         accelerations += np.einsum("a,b,kl->akbl", effect, effect, gust)
-        unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_S)
+        unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_ACCELERATION_MEMORY_S)
         accelerations[j, :, j] += unexplained + declared.model_rad_s2[j] ** 2 * np.eye(n)
     summed = DT * np.tril(np.ones((n, n)), -1)
     rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed, optimize=True)
@@ -51,7 +55,7 @@ def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
     mean[:, before:] = DT * np.cumsum(phi, axis=0).T
     C = covariance(context, before + after)
     expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
-    assert Whitening(context).deflection(phi)[-1] == pytest.approx(expected, rel=0.01)
+    assert WhiteningFilter(context).deflection_coefficient(phi)[-1] == pytest.approx(expected, rel=0.01)
 
 
 def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
@@ -73,19 +77,19 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     R[:, before:] = known.reshape(3, n, 2)
     C, R = C.reshape(3 * (before + n), -1), R.reshape(-1, 2)
     expected = np.sqrt(late.ravel() @ np.linalg.solve(C + R @ R.T, late.ravel()))
-    whitening = Whitening(context)
-    found = whitening.deflection_with_unknowns(phi, regressors, sigma)
+    whitening = WhiteningFilter(context)
+    found = whitening.deflection_coefficient_with_unknowns(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)
-    assert found < 0.98 * whitening.deflection(phi)[-1]
-    nothing = whitening.deflection_with_unknowns(phi, regressors[..., :0], sigma[:0])
-    assert nothing == pytest.approx(whitening.deflection(phi)[-1])
+    assert found < 0.98 * whitening.deflection_coefficient(phi)[-1]
+    nothing = whitening.deflection_coefficient_with_unknowns(phi, regressors[..., :0], sigma[:0])
+    assert nothing == pytest.approx(whitening.deflection_coefficient(phi)[-1])
 
 
 def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):
     phi = np.random.default_rng(0).normal(size=(50, 3))
-    whitening = Whitening(context)
-    d = whitening.deflection(phi)
-    assert whitening.deflection(2.0 * phi) == pytest.approx(2.0 * d)
+    whitening = WhiteningFilter(context)
+    d = whitening.deflection_coefficient(phi)
+    assert whitening.deflection_coefficient(2.0 * phi) == pytest.approx(2.0 * d)
     assert (np.diff(d) >= 0.0).all()
 
 
@@ -93,7 +97,7 @@ def test_rougher_air_hides_more(context):
     phi = np.full((100, 3), 0.1)
     rough = replace(context, declared=replace(context.declared, gust_rad_s=3.0 * context.declared.gust_rad_s))
     still = replace(context, declared=replace(context.declared, gust_rad_s=np.zeros(3)))
-    found = [Whitening(one).deflection(phi)[-1] for one in (rough, context, still)]
+    found = [WhiteningFilter(one).deflection_coefficient(phi)[-1] for one in (rough, context, still)]
     assert found[0] < 0.6 * found[1] < 0.6 * found[2]
 
 
@@ -104,7 +108,7 @@ def test_of_a_flight_it_takes_what_the_surface_gave(context):
     seen = [measured for measured, _ in recording.seen]
     frames = round(at_s * 100)
     effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])
-    d = Whitening(recording.context).deflection(effect)
+    d = WhiteningFilter(recording.context).deflection_coefficient(effect)
     assert deflections(recording, "elevator", 0.7, (0.5, 1.0)) == pytest.approx([d[49], d[-1]])
     assert not effect[:, [0, 2]].any()
 

@@ -44,11 +44,13 @@ NOT_BORNE_OUT = {
     "An active system has the potential for superior performance.",
     "The bounding function bounds the modelling uncertainty.",
     "Switching continuously improves the transient performance.",
+    "Body rates are much faster than the outer loops.",
 }
 NOT_FOR_ITS_MECHANISM = {
     "Without a fault the nominal law, PI on a linearised inversion, is stable and tracks.",
     "The residuals of the estimator of the true fault stay below their thresholds.",
     "No residual of the elevator's estimator ever exceeds its threshold.",
+    "Aileron and rudder could be replaced likewise if there were a second surface.",
 }
 CHANGES = {"": {}} | {ablation.name: ablation.changes for ablation in ABLATIONS}
 MUST_BITE = {  # ablations, each of which breaks a statement

@@ -1,13 +1,23 @@
 """The reproduction of made flights, whole: its statements, document, pages, and what each figure is of."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.studies.reproduce import beside, cases, measures, reproduction, truth_and_design, words
-from beaver_ftc.studies.reproduce.cases import BEYOND, OURS, PUBLISHED, VARIANTS, Changed, Flown
+from beaver_ftc.studies.reproduce.cases import (
+    BEYOND,
+    CASES,
+    OURS,
+    PUBLISHED,
+    VARIANTS,
+    Changed,
+    Flown,
+    keys_of,
+)
 from beaver_ftc.studies.reproduce.choices import CHOICES, scenario
 from beaver_ftc.studies.reproduce.claims import ABLATIONS, CLAIMS, MEASURED
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, figures_of, margins_figure
@@ -20,6 +30,8 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
     """A log in which each signal is a wave of its own, and the estimators go one after the other."""
     t = T_S[until_s + 1e-9 >= T_S]
     log = {"t_s": t, "detected": (t >= detected_s - 1e-9).astype(float)}
+    air = {"alpha_rad": 0.05, "beta_rad": 0.0, "airspeed_mps": 45.0, "qdyn_pa": 1000.0, "dpt": 0.1}
+    log |= {signal: value + 0.0 * t for signal, value in air.items()}
     struck = t >= 12.0
     for i, axis in enumerate("pqr", 1):
         rate = 0.01 * i * np.sin(t)
@@ -44,11 +56,12 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
         log[f"{surface}_effectiveness_used"] = 1.0 + 0.1 * struck * (surface == "rudder" == fault)
     for i, surface in enumerate(("aileron", "elevator", "rudder", "flap"), 1):
         log |= {f"{surface}_{what}_rad": 0.01 * i * np.sin(i * t) for what in ("cmd", "effective")}
-    named = None if fault is None else {"fault": fault, "time_s": 12.31, "delay_s": 0.31}
+    right = {"fault": fault, "time_s": 12.31, "delay_s": 0.31, "correct": fault == name}
+    other = {"fault": "unanticipated", "time_s": 14.0, "delay_s": 2.0, "correct": True}
     document = {
         "scenario": name, "departure": departure, "fault": {"at_s": 12.0}, "false_alarm": False,
         "detection": {"delay_s": 0.2, "time_s": detected_s},
-        "isolation": named or {"fault": "unanticipated", "time_s": 14.0, "delay_s": 2.0},
+        "isolation": right if fault else other,
         "supervisor": [
             {"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": detected_s + 0.01},
             {"mode": "reallocated", "time_s": 12.32},
@@ -61,7 +74,7 @@ def flown(name="elevator", fault="elevator", departure=None, detected_s=12.2, un
             "surface_energy_deg2_s": {"aileron": 100.0, "elevator": 200.0},
         },
     }  # fmt: skip
-    return Flown(Metrics.of(document), log)
+    return Flown(Metrics.of(document), log, scenario("made", keys_of(CASES[fault or "elevator"], {})))
 
 
 @pytest.fixture
@@ -97,7 +110,7 @@ def test_what_a_flight_says_of_itself(changed):
 
 def but(found, **changes):
     """The same flight, but for this in its metrics."""
-    return Flown(Metrics.of(found.metrics.document() | changes), found.log)
+    return replace(found, metrics=Metrics.of(found.metrics.document() | changes))
 
 
 def without_alarm():
@@ -112,7 +125,7 @@ def without_alarm():
         "detection": {"delay_s": None, "time_s": None}, "supervisor": [],
         "isolation": {"fault": None, "time_s": None},
     }  # fmt: skip
-    return Flown(Metrics.of(metrics), found.log | silent)
+    return replace(found, metrics=Metrics.of(metrics), log=found.log | silent)
 
 
 @pytest.mark.parametrize(
@@ -139,6 +152,28 @@ def test_an_aircraft_that_is_lost_tracks_nothing(flights):
         assert measure(lost, "elevator") == np.inf
     assert measures.healthy_tracking(lost, "elevator") == measures.unapproximated(lost, "elevator") == np.inf
     assert measures.tracking(lost, "elevator", "q") == np.inf
+
+
+@pytest.mark.parametrize(
+    ("turned_s", "rudder_out_s", "frames"),
+    [(12.5, 12.3, 0), (12.5, 12.6, 10), (12.1, 12.6, 40), (31.0, 12.6, np.inf)],
+)  # fmt: skip
+def test_an_estimator_is_late_from_the_alarm_and_a_mismatch_beyond_1_on(turned_s, rudder_out_s, frames):
+    """The elevator stands still, without any effect, until it turns; the alarm is at 12.2 s."""
+    found = flown()
+    found.log["elevator_cmd_rad"] = 0.2 * (found.log["t_s"] >= turned_s - 1e-9)
+    found.log["fie_rudder_excluded"] = (found.log["t_s"] >= rudder_out_s - 1e-9).astype(float)
+    assert measures.after_mismatch({"elevator": found}, "elevator") == frames
+    assert measures.after_mismatch({"elevator": without_alarm()}, "elevator") == np.inf
+
+
+def test_body_rates_without_damping_are_the_slower_ones(monkeypatch):
+    """Poles of 2, 3 and 4 1/s beside one of 0.5 1/s."""
+    states = ("p", "alpha", "q", "r")
+    linear = SimpleNamespace(states=states, A=np.diag([-2.0, -0.5, -3.0, 4.0]))
+    monkeypatch.setattr(measures, "trimmed", lambda flown: (None, None))
+    monkeypatch.setattr(measures, "differences", lambda plant, point: linear)
+    assert measures.separation({"healthy": flown()}, "healthy") == pytest.approx(4.0)
 
 
 def test_a_flap_that_stands_still_carries_nothing():
@@ -305,7 +340,8 @@ def test_numbers_of_a_setting_are_of_its_own_flights_each_flown_once(monkeypatch
         "('control.options.projection', 0)",
     }
     flown_without = {change for change in without if any(change in keys for keys in asked)}
-    assert without - flown_without == {*built, "('design_model.engine_terms', True)"}
+    refuted = {repr(*reproduction.WITHOUT[name].changes.items()) for name in ("engine", "damping")}
+    assert without - flown_without == built | refuted
 
 
 def test_what_is_flown_to_be_shown(monkeypatch):
@@ -348,5 +384,5 @@ def test_the_slower_of_the_others_is_what_an_exclusion_lags_by(flights):
         log[f"fie_{surface}_q_residual_rad_s"] = 0.02 * (log["t_s"] >= beyond_s - 1e-9)
         for axis in "pr":
             log[f"fie_{surface}_{axis}_residual_rad_s"] *= 0.0
-    found = Flown(flights["elevator"].metrics, log)
+    found = replace(flights["elevator"], log=log)
     assert measures.exclusion_lag({"elevator": found}, "elevator") == pytest.approx(5.0)  # 0.05 s, not 0.03

@@ -2,6 +2,8 @@
 
 import pytest
 
+from beaver_ftc.diagnosis.schemes.published import N_CENTRES_PER_INPUT
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce import beside, truth_and_design, words
 
 CLAIMS = [
@@ -148,13 +150,14 @@ def test_both_schemes_and_both_designs_in_rows():
 
 def test_the_outcome_in_a_sentence():
     assert words.headline(DOCUMENT) == (
-        "Of 5 testable statements 2 hold, 1 of them also in 2 settings that the paper did not fly. 2 do not "
-        "hold. 1 hold, but also when the mechanism that the statement credits is removed. "
-        "Of 7 statements that the code makes "
-        "true by its construction 6 hold; 11 give nothing to measure."
+        "Of 5 testable statements, 2 hold, 2 do not hold, and 1 hold even without the mechanism that the "
+        "statement credits. 1 of the 2 also hold in every one of 2 settings that the paper did not fly. A "
+        "further 7 statements should be true by the construction of the code, and 6 of them are. A further "
+        "11 statements contain nothing that can be measured."
     )
     assert words.summary(DOCUMENT).endswith(
-        "10 of 12 flights with a fault have the same alarm, the same name and the same time."
+        "10 of 12 flights with a fault have the same alarm, the same name and the same time as with "
+        "adaptation."
     )
 
 
@@ -178,3 +181,11 @@ def test_what_is_not_borne_out_is_red_and_where_it_stands_is_there():
     coloured = words.as_text(DOCUMENT, "out", colour=True)
     assert "\x1b[1;31mnot borne out" in coloured
     assert "\x1b[32mborne out, elsewhere too" in coloured
+
+
+def test_the_listed_deviations_have_the_numbers_of_the_code():
+    """The sizes of the networks are no options, so that the list alone says them."""
+    listed = " ".join(words._SAYS["deviations from the paper"])
+    assert f"{N_CENTRES_PER_INPUT[0]} x {N_CENTRES_PER_INPUT[1]} x {N_CENTRES_PER_INPUT[2]} centres" in listed
+    assert f"{Scenario(name='x').control.least_effectiveness} by default" in listed
+    assert all(word in listed for word in ("spread", "Earth's rotation", "rounding"))

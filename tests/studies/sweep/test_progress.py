@@ -2,8 +2,8 @@ from collections import Counter
 
 import pytest
 
-from beaver_ftc.cli import shared as shown
-from beaver_ftc.cli.shared import live_progress
+from beaver_ftc import cli as shown
+from beaver_ftc.cli import live_progress
 
 
 class Clock:

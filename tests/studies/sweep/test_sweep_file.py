@@ -5,9 +5,9 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents.validation import ScenarioError, UnusableKeyError, parse_key, with_values
 from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.builtin import builtin_sweeps
+from beaver_ftc.scenario.builtin import builtin_sweeps, is_sweep
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweeps import SweepFile, is_sweep, load_sweep, load_sweep_text
+from beaver_ftc.scenario.sweeps import SweepFile, load_sweep, load_sweep_text
 from beaver_ftc.studies.sweep.sampling import Plan
 
 HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "

@@ -71,7 +71,7 @@ def test_each_thing_worth_knowing_is_said():
         ("false alarms", f"3 in 2.5 h without a fault: 1.2/h (0.25 to 3.5); {RESIDUALS}"),
         ("guarantee", "2 of 5 faults detected later than guaranteed"),
         ("departures", "18.2 % (25 % to 87.5 %): 2 of 11 flights lost"),
-        ("delay follows", ", ".join(f"{key} (rank correlation explains {n} %)" for key, n in RANKS)),
+        ("delay follows", ", ".join(f"{key} (explains {n} % of the ranks)" for key, n in RANKS)),
     ]  # fmt: skip
 
 

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from beaver_ftc.control.base import Law, Reference
+from beaver_ftc.control import Law, Reference
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.fdc import SURFACES
-from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import FlightState, Plant

@@ -321,10 +321,10 @@ def _line(what: str, figures: Document, us: str = "us") -> str:
 class Bench(StudyCommand):
     """Time the closed loop against the bare aircraft.
 
-    Side by side, and part by part. The first time, the frame is compiled once more for each part that
-    is taken out: about two minutes.
+    Both are timed in turn, and the loop also part by part. The first run compiles the frame again for
+    each part that is left out, which takes about two minutes.
 
-    rounds: How often everything is timed.
+    rounds: Number of repetitions.
     no_parts: Time the whole loop only, not part by part.
     """
 

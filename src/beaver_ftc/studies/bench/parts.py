@@ -30,7 +30,7 @@ def flying(value, ground_m, slow_mps):
 
 
 def unlimited(bound, eta_bar, decay, dt):
-    """Stands in for `filters.bound_step`."""
+    """Stands in for `filters.advance_residual_bound`."""
     return UNLIMITED_RAD_S
 
 
@@ -46,8 +46,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "reading": {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying},
     # the design model, the detection estimator and its bank of filters
     "fdae": {
-        "design.model.response": nothing, "loop.accounts.effect_of_faults": nothing,
-        "diagnosis.expectation.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
+        "design.model.response": nothing, "loop.frame.effect_of_faults": nothing,
+        "diagnosis.model_prediction.evaluate_bound_and_frame_means": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
     "fies": {
@@ -59,9 +59,9 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the bound on the uncertainty, and every threshold that follows from it
     "thresholds": {
         "diagnosis.bounds.add_published_bound": nothing,
-        "diagnosis.detection.filters.bound_step": unlimited,
-        "diagnosis.detection.filters.interval_limits": all_residuals,
-        "diagnosis.detection.filters.norm_limits": all_residuals,
+        "diagnosis.detection.filters.advance_residual_bound": unlimited,
+        "diagnosis.detection.filters.residual_interval": all_residuals,
+        "diagnosis.detection.filters.norm_bound_interval": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
     "network": {
@@ -75,7 +75,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # reference model, feedback linearisation, accommodation, allocation, anti-windup
     "law": {"loop.frame.command": nothing, "control.laws.follow": nothing},
     # every column of the log, and the sums of the metrics
-    "logging": {"loop.frame.record": nothing, "loop.frame.account": nothing},
+    "logging": {"loop.frame.record_row": nothing, "loop.frame.account": nothing},
 }  # fmt: skip
 
 

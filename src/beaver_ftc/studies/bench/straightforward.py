@@ -11,7 +11,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.laws import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES, BETA_CENTRES, N_BASIS
+from beaver_ftc.diagnosis.detection.filters import ALPHA_CENTRES_RAD, BETA_CENTRES_RAD, N_BASIS_FUNCTIONS
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -68,8 +68,8 @@ class Estimators:
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
         self.x_hat, self.threshold, self.residual = np.zeros(3), np.zeros(3), np.zeros(3)
-        self.weights = np.zeros((3, N_BASIS))
-        self.basis = np.zeros(N_BASIS)
+        self.weights = np.zeros((3, N_BASIS_FUNCTIONS))
+        self.basis = np.zeros(N_BASIS_FUNCTIONS)
         self.detected = False
         self.excluded = np.zeros(3, bool)
         self.fie = np.zeros((3, 3))
@@ -143,8 +143,10 @@ class Estimators:
 
 def _basis(alpha: float, beta: float) -> np.ndarray:
     """Normalised radial basis functions along alpha and along beta, each as wide as its spacing."""
-    along_alpha = np.exp(-0.5 * ((alpha - ALPHA_CENTRES) / (ALPHA_CENTRES[1] - ALPHA_CENTRES[0])) ** 2)
-    along_beta = np.exp(-0.5 * ((beta - BETA_CENTRES) / (BETA_CENTRES[1] - BETA_CENTRES[0])) ** 2)
+    along_alpha = np.exp(
+        -0.5 * ((alpha - ALPHA_CENTRES_RAD) / (ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0])) ** 2
+    )
+    along_beta = np.exp(-0.5 * ((beta - BETA_CENTRES_RAD) / (BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0])) ** 2)
     both = np.concatenate([along_alpha, along_beta])
     return both / np.linalg.norm(both)
 

@@ -61,10 +61,10 @@ Values = Mapping[str, float]
 
 
 @cache
-def flights(grade: str, most: int | None) -> tuple[SetFlight, ...]:
-    """The flights that a grade's methods are tuned on; kinds of flights take turns."""
+def flights(grade: str, most: int | None, draw: int = 0) -> tuple[SetFlight, ...]:
+    """The flights that a grade's methods are tuned on; kinds of flights take turns. draw: see `of_sweep`."""
     of_kind: dict[str, list[SetFlight]] = {}
-    for case in of_set(CALIBRATION + grade, most):
+    for case in of_set(CALIBRATION + grade, most, draw):
         of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
     placed = [
         ((i + 0.5) / len(cases), k, case)
@@ -100,6 +100,10 @@ class DetectorCost:
         self._lowest = total
         return total
 
+    def parts(self, values: Values) -> list[float]:
+        """What each flight adds to J with these values."""
+        return [self._of_flight(flown(case, self._entry, DETECTORS, values)) for case in self._cases]
+
     def _of_flight(self, result: Result) -> float:
         """What one flight adds to J."""
         cost = result.false_alarm / len(self._cases)
@@ -116,10 +120,10 @@ def delay_cost(delay_s: float) -> float:
 class LawCost:
     """J of a law, with what makes a candidate inadmissible."""
 
-    def __init__(self, name: str, grade: str, most: int | None) -> None:
+    def __init__(self, name: str, grade: str, most: int | None, draw: int = 0) -> None:
         self._entry = Entry(SCHEME, name)
-        self._cases = [case for case in flights(grade, most) if case.scenario.faults]
-        self._oracle, self._effort_allowed = yardsticks(grade, most)
+        self._cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
+        self._oracle, self._effort_allowed = yardsticks(grade, most, draw)
         self._lowest = inf
 
     def __call__(self, values: Values) -> float:
@@ -129,6 +133,11 @@ class LawCost:
             return INADMISSIBLE * (1.0 + short) if short else self._tracking(values)
         except BeaverFtcError:
             return FAILED
+
+    def parts(self, values: Values) -> list[float]:
+        """The logarithm of the error over the oracle's in each flight with these values: J is exp(mean)."""
+        results = [flown(case, self._entry, LAWS, values) for case in self._cases]
+        return [log(_ratio(result, best)) for result, best in zip(results, self._oracle, strict=True)]
 
     def margins(self, values: Values) -> list[Margin]:
         """Of the healthy loop."""
@@ -171,9 +180,9 @@ def _ratio(result: Result, oracle_deg_s: float) -> float:
 
 
 @cache
-def yardsticks(grade: str, most: int | None) -> tuple[tuple[float, ...], float]:
+def yardsticks(grade: str, most: int | None, draw: int = 0) -> tuple[tuple[float, ...], float]:
     """Of each faulted flight the oracle's error, deg/s; and the default law's RMS surface rate, deg/s."""
-    cases = [case for case in flights(grade, most) if case.scenario.faults]
+    cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
     oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
     return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
 

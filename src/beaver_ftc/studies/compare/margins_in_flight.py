@@ -15,8 +15,8 @@ from itertools import takewhile
 
 import numpy as np
 
-from beaver_ftc.control.base import flown_by
-from beaver_ftc.control.laws.gains import margins
+from beaver_ftc.control import flown_by
+from beaver_ftc.control.laws.rejecting import margins
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import margins as closed_form

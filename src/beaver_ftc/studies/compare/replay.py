@@ -14,13 +14,12 @@ from time import process_time
 import numpy as np
 
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis import informed_test
-from beaver_ftc.diagnosis.base import Detector, Measured, Verdict
+from beaver_ftc.diagnosis import Detector, Measured, Verdict, informed_test
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.readout import FrameReadout, run_statistical_tests
+from beaver_ftc.loop.readout import FrameReadout, switch_statistical_tests
 from beaver_ftc.loop.stepping import built_in_statistic
 from beaver_ftc.plugins import DETECTORS, made
-from beaver_ftc.scenario.judgement import Onset, Truth
+from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
 
 
@@ -108,16 +107,16 @@ def record(scenario: Scenario) -> Recording:
     air, known, error = list[np.ndarray](), list[bool](), list[np.ndarray]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
     fly_frame = loop.plugin_frame
-    run_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
+    switch_statistical_tests(loop.frames[0], scenario.fdi.statistical is not None)
     assert fly_frame is not None
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
-        air.append(FrameReadout(frames[0]).diagnosis.air.acceleration_rad_s2)
+        air.append(FrameReadout(frames[0]).diagnosis.gust.gust_acceleration_rad_s2)
         status = fly_frame(frames, references, log)
         built_in.append(built_in_statistic(frames))
         mapped = FrameReadout(frames[0]).diagnosis.mapped_error
-        known.append(mapped.known)
-        error.append(mapped.bound_rad_s2)
+        known.append(mapped.is_inside_map)
+        error.append(mapped.error_bound_rad_s2)
         return status
 
     loop.fly_frame = fly_and_note
@@ -126,8 +125,8 @@ def record(scenario: Scenario) -> Recording:
     by_frame = np.array(built_in), Truth.of(scenario).onset, np.array(known), np.array(error)
     recording = Recording(recorder.context, recorder.seen, *by_frame)
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
-    if scenario.fdi.statistical is not None and diagnosis.air.seen:
-        recording.air, recording.air_noise = np.array(air), np.sqrt(diagnosis.model_noise)
+    if scenario.fdi.statistical is not None and diagnosis.gust.is_gust_measured:
+        recording.air, recording.air_noise = np.array(air), np.sqrt(diagnosis.input_noise_variance)
     return recording
 
 

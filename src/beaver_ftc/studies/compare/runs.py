@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import one_line
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.page import save
@@ -23,23 +25,41 @@ STAR = "* differs between the runs"
 _ALLOWED = "allowed: a result folder of beaver-ftc run"
 
 
-def read_runs(folders: Sequence[Path]) -> list[Document]:
-    """The metrics of result folders, each with its `folder`. Raises BadInput with a line a folder that is
-    none."""
+@dataclass(frozen=True)
+class Run:
+    """A finished run. metrics, flown: its metrics.json and scenario.yaml as they are."""
+
+    folder: Path
+    metrics: Document
+    flown: Document
+
+    @cached_property
+    def found(self) -> Metrics:
+        """The metrics, typed."""
+        return Metrics.of(self.metrics)
+
+    @property
+    def document(self) -> Document:
+        """All of it, as `runs.json` has it."""
+        return self.metrics | {"folder": str(self.folder), "flown": self.flown}
+
+
+def read_runs(folders: Sequence[Path]) -> list[Run]:
+    """The runs in result folders. Raises BadInput with a line a folder that is none."""
     runs, mistakes = [], []
     for folder in folders:
         try:
             runs.append(_read(folder))
         except OSError as error:
             mistakes.append(f"{folder}: holds no {Path(error.filename).name}, {_ALLOWED}")
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError):
             mistakes.append(f"{folder}: metrics.json or scenario.yaml cannot be read, {_ALLOWED}")
     if mistakes:
         raise BadInput("\n".join(mistakes))
     return runs
 
 
-def _read(folder: Path) -> Document:
+def _read(folder: Path) -> Run:
     import yaml
 
     document = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
@@ -48,38 +68,39 @@ def _read(folder: Path) -> Document:
         flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
         raise ValueError("no YAML") from error
-    run = document | {"folder": str(folder), "flown": flown}
-    rows_of(run)  # a document that lacks a key is refused here
+    run = Run(folder, document, flown)
+    rows_of(run)  # a document that lacks a section is refused here
     return run
 
 
-def rows_of(run: Document) -> dict[str, str]:
+def rows_of(run: Run) -> dict[str, str]:
     """What is compared of a run, name -> text: what was flown, then what came of it."""
-    detection, isolation, tracking = run["detection"], run["isolation"], run["tracking"]
-    flown, departure = run["flown"], run["departure"]
+    found, flown = run.found, run.flown
+    detection, isolation, departure = found.detection, found.isolation, found.departure
+    rms_deg_s = {"pre": found.tracking.pre_fault_rms_deg_s, "post": found.tracking.post_fault_rms_deg_s}
     initial = flown["initial"]
-    outside_s = sum(stay["end_s"] - stay["start_s"] for stay in run["envelope_exits"])
+    outside_s = sum(stay.end_s - stay.start_s for stay in found.envelope_exits)
     return {
-        "scenario": run["scenario"],
+        "scenario": found.scenario,
         "law": flown["control"]["law"],
         "scheme": flown["fdi"]["scheme"],
         "flight condition": f"{initial['airspeed_mps']:g} m/s, {initial['altitude_m']:g} m",
-        "seed": str(run["seed"]),
+        "seed": str(found.seed),
         "faults": "; ".join(map(fault_words, flown.get("faults", []))) or NOTHING,
-        "detection delay, s": number(detection["delay_s"]),
-        "guaranteed delay, s": number(detection["guaranteed_delay_s"]),
-        "isolated": isolation["fault"] or NOTHING,
-        "isolation delay, s": number(isolation["delay_s"]),
-        "estimate": number(isolation["estimate"]),
-        "false alarm": "yes" if run["false_alarm"] else "no",
+        "detection delay, s": number(detection.delay_s),
+        "guaranteed delay, s": number(detection.guaranteed_delay_s),
+        "isolated": isolation.fault or NOTHING,
+        "isolation delay, s": number(isolation.delay_s),
+        "estimate": number(isolation.estimate),
+        "false alarm": "yes" if found.false_alarm else "no",
         **{
-            f"{when} RMS {axis}, deg/s": number((tracking[f"{when}_fault_rms_deg_s"] or {}).get(axis))
-            for when in ("pre", "post")
+            f"{when} RMS {axis}, deg/s": number(getattr(rms, axis) if rms else None)
+            for when, rms in rms_deg_s.items()
             for axis in AXES
         },
         "outside the envelope, s": number(outside_s),
-        "departure": f"{departure['signal']} at {departure['time_s']:.2f} s" if departure else NOTHING,
-        "passed": "yes" if run["passed"] else "no",
+        "departure": f"{departure.signal} at {departure.time_s:.2f} s" if departure else NOTHING,
+        "passed": "yes" if found.passed else "no",
     }
 
 
@@ -94,7 +115,7 @@ def fault_words(fault: Document) -> str:
     return " ".join(filter(None, [where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s"]))
 
 
-def as_text(runs: Sequence[Document]) -> str:
+def as_text(runs: Sequence[Run]) -> str:
     """A column a run; what differs between them is marked with a star."""
     columns = [rows_of(run) for run in runs]
     table = [["", *labels(runs)]]
@@ -104,21 +125,21 @@ def as_text(runs: Sequence[Document]) -> str:
     return f"{aligned(table)}\n\n{STAR}"
 
 
-def labels(runs: Sequence[Document]) -> list[str]:
+def labels(runs: Sequence[Run]) -> list[str]:
     """What to call each run: its folder's name, or the whole path where names repeat."""
-    names = [Path(run["folder"]).resolve().name for run in runs]
+    names = [run.folder.resolve().name for run in runs]
     distinct = len(set(names)) == len(names)
-    return [one_line(name, 200) for name in (names if distinct else [run["folder"] for run in runs])]
+    return [one_line(name, 200) for name in (names if distinct else [str(run.folder) for run in runs])]
 
 
-def figure_of(runs: Sequence[Document]) -> "Figure":
+def figure_of(runs: Sequence[Run]) -> "Figure":
     """Tracking errors of all runs over time, one axis above the other; dotted: a fault begins."""
     figure, grid = panels(3, 1, 11.0, 9.0, dpi=120, sharex=True)
     figure.suptitle(f"Tracking errors of {', '.join(labels(runs))}", fontsize=11, wrap=True)
     axes = grid[:, 0]
     for run, label in zip(runs, labels(runs), strict=True):
-        _draw(axes, Path(run["folder"]), label)
-    struck = sorted({run["fault"]["at_s"] for run in runs if run["fault"]})
+        _draw(axes, run.folder, label)
+    struck = sorted({run.found.fault.at_s for run in runs if run.found.fault})
     for axis, letter in zip(axes, AXES, strict=True):
         for at_s in struck:
             axis.axvline(at_s, color=BLACK, linewidth=0.9, linestyle=":")
@@ -134,7 +155,7 @@ def figure_of(runs: Sequence[Document]) -> "Figure":
     return figure
 
 
-def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
+def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
     """Write `out/runs/` (figure, JSON, report) of finished runs; return what was read of them."""
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
@@ -145,7 +166,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Document]:
     show_in_reports()
     with result_folder(out, "runs") as folder:
         save(figure_of(runs), folder / "runs.png")
-        (folder / "runs.json").write_text(as_json(runs), encoding="utf-8")
+        (folder / "runs.json").write_text(as_json([run.document for run in runs]), encoding="utf-8")
         write_report(folder / "runs.html", folders, labels(runs))
     return runs
 

@@ -1,18 +1,24 @@
 """Fly one case with every scheme and every law that is compared, and say what came of each."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot, inf
 from pathlib import Path
 from time import thread_time
 
-from beaver_ftc.diagnosis.rivals import GRADES, Tuned, grade, tuned, values_of
+from beaver_ftc.diagnosis.rivals import (
+    FLIGHT_GRADES,
+    TunedValues,
+    flight_grade,
+    tuned_parameters,
+    tuned_values,
+)
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
-from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.metrics import measure, strikes_within
 from beaver_ftc.results.model import Rates
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
@@ -20,6 +26,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
 
 CALIBRATION = "calibration-"  # and the grade: the sets that methods are tuned on
+DRAW = 1000  # between the seeds of two draws of a set: the seeds of all sets are smaller
 
 
 @dataclass(frozen=True)
@@ -30,13 +37,20 @@ class SetFlight:
     scenario: Scenario
 
 
-def of_sweep(path: str | Path, set_name: str | None = None, most: int | None = None) -> list[SetFlight]:
-    """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it."""
+def of_sweep(
+    path: str | Path, set_name: str | None = None, most: int | None = None, draw: int = 0
+) -> list[SetFlight]:
+    """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it.
+
+    draw: 0 has the seed of the file; each other number has a seed, and so flights, of its own.
+    """
     from beaver_ftc.scenario.sweeps import load_sweep
     from beaver_ftc.studies.sweep.one_flight import scenario_of
     from beaver_ftc.studies.sweep.sampling import Plan
 
     sweep = load_sweep(path)
+    if draw:
+        sweep = replace(sweep, file=sweep.file.model_copy(update={"seed": sweep.file.seed + DRAW * draw}))
     count = sweep.flights if most is None else min(most, sweep.flights)
     assignments = Plan(sweep).assignments(range(count))
     return [SetFlight(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
@@ -53,13 +67,13 @@ def set_names() -> list[str]:
     return [name for name in folders if not name.startswith(CALIBRATION)]
 
 
-def of_set(name: str, most: int | None = None) -> list[SetFlight]:
-    """The flights of a standard set; of each of its sweeps, the first `most`."""
+def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]:
+    """The flights of a standard set; of each of its sweeps, the first `most`. draw: see `of_sweep`."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
-        allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in GRADES)])
+        allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)])
         raise BadInput(f"no benchmark set {name!r}, allowed: {allowed}")
-    return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most)]
+    return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most, draw)]
 
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
@@ -119,7 +133,7 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
     return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
 
 
-def with_entry(scenario: Scenario, entry: Entry, chosen: Tuned | None = None) -> Scenario:
+def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValues | None = None) -> Scenario:
     """The scenario with this scheme and this law, each with the values chosen for it on such flights.
 
     chosen: as tuned.json has them; without it, each flies with its defaults. What the scenario says of the
@@ -133,7 +147,7 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: Tuned | None = None) ->
     control = scenario.control.model_copy(update={"law": entry.law, "options": kept})
     flown, of = scenario.model_copy(update={"fdi": fdi, "control": control}), grade_of(scenario)
     for group, name in ((DETECTORS, entry.scheme), (LAWS, entry.law)):
-        values = values_of(chosen or {}, of, group, name)
+        values = tuned_values(chosen or {}, of, group, name)
         flown = with_values(flown, group, {k: v for k, v in values.items() if not _says(scenario, k, group)})
     return flown
 
@@ -155,7 +169,7 @@ def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> 
 
 def grade_of(scenario: Scenario) -> str:
     """Which grade of flights a scenario belongs to."""
-    return grade(not Declared.of(scenario).is_noise_free, scenario.actuators.is_ideal)
+    return flight_grade(not Declared.of(scenario).is_noise_free, scenario.actuators.is_ideal)
 
 
 def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
@@ -164,13 +178,13 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
 
 
 def fly_case(
-    case: SetFlight, entries: Sequence[Entry], chosen: Tuned | None = None, trade_off: bool = True
+    case: SetFlight, entries: Sequence[Entry], chosen: TunedValues | None = None, trade_off: bool = True
 ) -> Trial:
     """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme.
 
     chosen: values of schemes and laws; those that ship without it. trade_off: whether it is asked for.
     """
-    chosen = tuned() if chosen is None else chosen
+    chosen = tuned_parameters() if chosen is None else chosen
     trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
     if not trade_off:
         return trial
@@ -192,7 +206,7 @@ def fly_case(
     return trial
 
 
-def _fly(scenario: Scenario, entry: Entry, chosen: Tuned) -> Result:
+def _fly(scenario: Scenario, entry: Entry, chosen: TunedValues) -> Result:
     try:
         loop = Loop(with_entry(scenario, entry, chosen))
         began = thread_time()
@@ -211,18 +225,17 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     found = measure(flight)
     fault, isolation, tracking = found.fault, found.isolation, found.tracking
     end_s, departed = flight.frames / flight.scenario.rate_hz, found.departure is not None
-    correct = bool(isolation.correct) and not found.false_alarm
     before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
     whole = before if tracking.post_fault_rms_deg_s is None else after
     return Result(
         entry=entry,
         false_alarm=found.false_alarm,
         fault_free_s=found.fault_free_s,
-        faulted=fault is not None and end_s > fault.at_s,
+        faulted=fault is not None and strikes_within(fault.at_s, end_s),
         delay_s=_or_never(found.detection.delay_s),
         isolated=isolation.fault,
-        correct=correct,
-        isolation_delay_s=_or_never(isolation.delay_s) if correct else inf,
+        correct=found.fault_named,
+        isolation_delay_s=_or_never(isolation.delay_s) if found.fault_named else inf,
         rms_deg_s=inf if departed else whole,
         before_deg_s=inf if departed and fault is None else before,
         after_deg_s=inf if departed else after,

@@ -4,7 +4,8 @@ The same search (search.py) with the same number of trials from the same seed, b
 flights of the sets `calibration-GRADE`, whose seeds are in no set that is compared. Each grade of flights is
 tuned by itself: exact sensors and ideal actuators; actuators that lag; errors of sensors and air. What may be
 tuned is `tunable` in plugins.yaml, or in the class of a plug-in. A method keeps the values that it starts
-with unless the search finds some that cost `LEAST_GAIN` less: the rule is the same for ours and for rivals.
+with unless the search finds some that cost `LEAST_GAIN` less. Each is tuned again on other draws (gain.py)
+until that gains no more than `LEAST_GAIN`. Both rules are the same for ours and for rivals.
 """
 
 import json
@@ -14,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.diagnosis.rivals import GRADES, KINDS, tuned, values_of
+from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES, TUNED_GROUP_NAMES, tuned_parameters, tuned_values
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, is_compiled, options_of, plugin_class, tunable
 from beaver_ftc.results.model import Document
@@ -27,6 +28,7 @@ from beaver_ftc.studies.compare.criteria import (
     flights,
     least_margins,
 )
+from beaver_ftc.studies.compare.gain import gain_of
 from beaver_ftc.studies.compare.search import Found, Values, search, value_at
 from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
@@ -35,6 +37,8 @@ from beaver_ftc.studies.present.tables import aligned
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
 NAME = "tuned.json"
+HEAD = ("grade", "method", "cost at the start", "cost found", "margins dB, deg")
+GAIN_HEAD = ("cost, built in", "cost, retuned", "gain, %", "from, %", "to, %")
 OF_STATISTICAL = {
     "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),
     "fdi.statistical.misnaming": Range(1e-9, 0.49),
@@ -55,7 +59,7 @@ class Method:
 
     def start(self) -> Values:
         """The values it starts with: those it ships with, its defaults, or the middle of their ranges."""
-        shipped = values_of(tuned(), self.grade, self.group, self.name)
+        shipped = tuned_values(tuned_parameters(), self.grade, self.group, self.name)
         return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
 
     def _default(self, key: str, of: Range) -> float:
@@ -84,39 +88,53 @@ def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str
 
 def tune(
     methods: Sequence[Method], trials: int, seed: int, most: int | None, workers: int,
-    progress: Progress | None,
+    progress: Progress | None, draw: int = 0,
 ) -> Document:  # fmt: skip
-    """The document of tuned.json. most: flights of each calibration sweep; None is all of them."""
+    """The document of tuned.json. most: flights of each calibration sweep; None is all of them.
+
+    draw: of the calibration sets; 0 chooses the values that ship, another number measures the gain over them.
+    """
     if not methods:
         raise BadInput("compare --tune: nothing to tune, allowed: methods that declare `tunable`")
-    rows = fly_all(partial(tune_method, trials=trials, seed=seed, most=most), methods, workers, progress)
+    rows = fly_all(
+        partial(tune_method, trials=trials, seed=seed, most=most, draw=draw), methods, workers, progress
+    )
     grades: Document = {}
     for method, row in zip(methods, rows, strict=True):
-        of_kind = grades.setdefault(method.grade, {}).setdefault(KINDS[method.group], {})
+        of_kind = grades.setdefault(method.grade, {}).setdefault(TUNED_GROUP_NAMES[method.group], {})
         of_kind[method.name] = row["values"]
     counts = {grade: len(flights(grade, most)) for grade in grades}
-    how = {"procedure": PROCEDURE, "trials": trials, "seed": seed}
+    how = {"procedure": PROCEDURE, "trials": trials, "seed": seed, "draw": draw}
     return how | {"flights": counts, "grades": grades, "methods": rows}
 
 
-def tune_method(method: Method, trials: int, seed: int, most: int | None) -> Document:
-    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, margins."""
+def tune_method(method: Method, trials: int, seed: int, most: int | None, draw: int = 0) -> Document:
+    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, margins; on a
+    draw that does not choose what ships, the gain."""
     cost = (
-        DetectorCost(method.name, flights(method.grade, most))
+        DetectorCost(method.name, flights(method.grade, most, draw))
         if method.group == DETECTORS
-        else LawCost(method.name, method.grade, most)
+        else LawCost(method.name, method.grade, most, draw)
     )
     start = method.start()
     found = search(cost, method.ranges(), start, trials, seed)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
     values = found.values if gains else start
-    return {**_row(method, found), "values": values, **_margins(cost, values)}
+    row = {**_row(method, found), "values": values, **_margins(cost, values)}
+    if draw and min(found.cost, found.start_cost) < INADMISSIBLE:
+        row |= gain_of(method.group, method.name, method.grade, (start, values), draw)
+    return row
+
+
+def is_adopted(again: Document) -> bool:
+    """Whether the values of a second tuning replace those that ship: its gain decides, not the interval."""
+    return bool(again.get("gain", 0.0) > LEAST_GAIN)
 
 
 def _row(method: Method, found: Found) -> Document:
     return {
         "grade": method.grade,
-        "kind": KINDS[method.group],
+        "kind": TUNED_GROUP_NAMES[method.group],
         "name": method.name,
         "start_cost": found.start_cost,
         "cost": found.cost,
@@ -146,7 +164,7 @@ def read_tuned(path: Path) -> Document:
     """The values in a file that `compare --tune` wrote. Raises BadInput."""
     try:
         grades: Document = json.loads(path.read_text(encoding="utf-8"))["grades"]
-        assert set(grades) <= set(GRADES)
+        assert set(grades) <= set(FLIGHT_GRADES)
         return grades
     except (OSError, ValueError, KeyError, TypeError, AssertionError) as error:
         raise BadInput(f"{path}: cannot be read, allowed: a file that compare --tune wrote") from error
@@ -154,21 +172,30 @@ def read_tuned(path: Path) -> Document:
 
 def as_text(document: Document) -> str:
     """A line a method and grade; then where ranges were widened."""
-    rows = [["grade", "method", "cost at the start", "cost found", "margins dB, deg", "values"]]
-    rows += [list(_cells(row)) for row in document["methods"]]
+    rows = [[*HEAD, *(GAIN_HEAD if document["draw"] else ()), "values"]]
+    rows += [list(_cells(row, document["draw"])) for row in document["methods"]]
     edges = [(row["name"], row["grade"], row["widened"]) for row in document["methods"] if row["widened"]]
     widened = [f"{name}, {of}: on the edge of its range, widened: {', '.join(at)}" for name, of, at in edges]
     head = f"{document['trials']} trials a method and grade, seed {document['seed']}"
     return "\n".join([head, "", aligned(rows), *widened])
 
 
-def _cells(row: Document) -> Iterator[str]:
+def _cells(row: Document, draw: int) -> Iterator[str]:
     yield row["grade"]
     yield row["name"]
     yield _cost(row["start_cost"])
     yield _cost(row["cost"])
     yield f"{row['gain_margin_db']:.1f}, {row['phase_margin_deg']:.0f}" if "gain_margin_db" in row else "-"
+    yield from gain_cells(row) if draw else ()
     yield ", ".join(f"{key} {value:.4g}" for key, value in row["values"].items())
+
+
+def gain_cells(row: Document) -> tuple[str, ...]:
+    """Of a method that was tuned again: both costs on other flights, and the gain with its interval, %."""
+    if "gain" not in row:
+        return ("-",) * len(GAIN_HEAD)
+    costs = (_cost(row[key]) for key in ("built_in", "retuned"))
+    return *costs, *(f"{100.0 * row[key]:.1f}" for key in ("gain", "gain_low", "gain_high"))
 
 
 def _cost(cost: float) -> str:

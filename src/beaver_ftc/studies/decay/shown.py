@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import curve_look, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, as_html, versions_line
 from beaver_ftc.studies.present.tables import aligned, as_csv, number
@@ -23,7 +24,11 @@ CAPTION = (
     "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
     "the healthy part of a flight takes."
 )
-SHOWN = (("false_alarm", "false alarms, %"), ("named", "named rightly, %"), ("tracking_deg_s", "RMS, deg/s"))
+SHOWN = (
+    ("false_alarm", "false alarms, %"),
+    ("named", "named rightly, %"),
+    ("tracking_deg_s", "tracking RMS, deg/s"),
+)
 
 
 def as_text(document: Document) -> str:
@@ -97,20 +102,22 @@ def figure_of(document: Document) -> "Figure":
     """A panel a quantity, a curve an error, over the factor; bars are intervals."""
     figure, grid = panels(1, len(SHOWN), 12.0, 4.2, f"{document['scenario']}: beyond what is declared")
     for panel, (quantity, label) in zip(grid[0], SHOWN, strict=True):
-        for i, rows in enumerate(_by_error(document)):
-            _curve(panel, rows, quantity, i)
+        *alone, together = _by_error(document)
+        for i, rows in enumerate(alone):
+            _curve(panel, rows, quantity, i, curve_look(i))
+        _curve(panel, together, quantity, len(alone), {"color": BLACK})
         panel.set_xscale("log", base=2)
         panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
         panel.minorticks_off()
         panel.set_title(label, fontsize=9)
         panel.grid(color="#dddddd", linewidth=0.6)
-    label_edges(grid, "times what is declared")
+    label_edges(grid, "size of the error / declared size or unit")
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
     return figure
 
 
-def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int) -> None:
+def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int, look: Document) -> None:
     times = 1.0 if quantity.endswith("_deg_s") else 100.0
     known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
     at = [row["factor"] * (1.0 + 0.015 * (place - 3)) for row in known]  # beside one another
@@ -124,7 +131,8 @@ def _curve(panel: Any, rows: Sequence[Document], quantity: str, place: int) -> N
     ]
     panel.errorbar(
         at, value, bars, marker=marker(place), markersize=4, linewidth=1.2, elinewidth=0.7, capsize=2,
-        label=f"{rows[0]['error']} ({rows[0]['declared']})", **curve_look(place),
+        label=f"{rows[0]['error']} ({rows[0]['declared']})",
+        **look,
     )  # fmt: skip
 
 

@@ -104,11 +104,11 @@ def row_of(found: Metrics | None, bound_used: float = 0.0) -> Document:
     return {
         "failed": False,
         "false_alarm": found.false_alarm,
-        "detected": found.detection.delay_s is not None and not found.false_alarm,
+        "detected": found.fault_found_s is not None,
         "named": bool(isolation.correct),
         "misnamed": isolation.isolated and not isolation.correct,
         "lost": found.departure is not None,
-        "delay_s": None if found.false_alarm else found.detection.delay_s,
+        "delay_s": found.fault_found_s,
         "tracking_deg_s": None if found.departure or rms is None else max(rms.p or 0, rms.q or 0, rms.r or 0),
         "bound_used": bound_used,
     }
@@ -189,20 +189,20 @@ def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
 
 @dataclass(frozen=True)
 class Decay(StudyCommand):
-    """Fly how a verdict changes beyond what is declared.
+    """Measure how verdicts degrade when errors exceed the declared bounds.
 
-    Each error that `fdi.bounds` can declare at 1, 1.5, 2 and 4 times what is declared, alone and all
-    together: false alarms, detection, right and wrong names and tracking, each with its 95 % interval. Every
-    error is flown at its limit, with signs that are drawn; an error that is not declared is flown in units
-    of its own, alone.
+    Each error that `fdi.bounds` can declare is flown at 1, 1.5, 2 and 4 times its declared size, alone and
+    with all others. The command reports false alarms, detection, right and wrong names and tracking, each
+    with its 95 % interval. Only the sign of an error is random. An error that is not declared is flown
+    alone, in multiples of a unit.
 
-    Stopped or killed, it goes on where it was with the same command.
+    The same command resumes an interrupted run.
 
     Examples:
       beaver-ftc decay elevator-loss-in-turbulence
 
     flights: Flights of each row.
-    seed: Of everything drawn.
+    seed: Seed of all random draws.
     out: Folder for the results: SCENARIO-decay in it, with a page, a figure, CSV and JSON.
     """
 

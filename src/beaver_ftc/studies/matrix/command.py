@@ -2,12 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from beaver_ftc.aircraft import DEFAULT
-from beaver_ftc.commands import AirspeedsOption, Document, Reporter, StudyCommand, TurbulenceName
+from beaver_ftc.commands import (
+    AirspeedsOption,
+    Document,
+    Reporter,
+    StudyCommand,
+    TurbulenceName,
+    WorkersOption,
+)
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.matrix import fault_matrix
 from beaver_ftc.studies.matrix import pitch_lost as lost
@@ -22,14 +26,13 @@ class Matrix(StudyCommand):
     named.
 
     Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if an aircraft is lost
-    with engine power and kept without it.
+    with engine power but kept without it.
 
     The same command resumes an interrupted run.
 
-    out: Folder for the results: `fault-matrix`, with what is declared, or `pitch-lost`.
-    airspeed: Airspeed, m/s; once for each.
-    workers: Processes.
-    pitch_lost: Elevator and flap lost at once instead, with engine power and without.
+    out: Folder for the results: `fault-matrix` or `pitch-lost` in it.
+    airspeed: Airspeed, m/s. Repeat the option for several.
+    pitch_lost: Instead, lose elevator and flap together, with and without control by engine power.
     declared: Simulate tactical-grade sensors, servos and, where the model allows it, 5 % wrong moment
       coefficients, and declare them to the diagnosis.
     turbulence: Turbulence to simulate and to declare to the diagnosis (with --declared).
@@ -38,7 +41,7 @@ class Matrix(StudyCommand):
 
     out: Path = Path("runs")
     airspeed: AirspeedsOption = None
-    workers: Annotated[int, typer.Option(min=1)] = 1
+    workers: WorkersOption = None
     pitch_lost: bool = False
     declared: bool = False
     turbulence: TurbulenceName = TurbulenceName.none
@@ -58,11 +61,11 @@ class Matrix(StudyCommand):
         reporter.progress(0.0)
         if self.pitch_lost:
             name = lost.NAME
-            document = lost.run_pitch_lost(self.out, speeds_mps, self.workers, reporter.progress)
+            document = lost.run_pitch_lost(self.out, speeds_mps, self.processes, reporter.progress)
         else:
             name = fault_matrix.name_of(self.declared, self.turbulence)
             document = fault_matrix.run_matrix(
-                self.out, speeds_mps, self.workers, reporter.progress, self.declared,
+                self.out, speeds_mps, self.processes, reporter.progress, self.declared,
                 self.aircraft or DEFAULT, self.turbulence.value,
             )  # fmt: skip
         return document | {"folder": str(self.out / name)}

@@ -190,7 +190,7 @@ def verdict(found: Metrics, surface: str, true_type: str) -> str:
     if isolation.fault is None:
         left = isolation.candidates
         return "open" if surface in left or f"{surface}:{true_type}" in left else "WRONG"
-    if isolation.fault != surface or isolation.type_correct is False:
+    if not isolation.correct or isolation.type_correct is False:
         return "WRONG"
     if isolation.type is None:
         return "surface" if true_type in isolation.candidates or not isolation.candidates else "WRONG"

@@ -47,7 +47,7 @@ class Mechanisms(StudyCommand):
     The same command resumes an interrupted run.
 
     draws: Draws of each combination of fault, bandwidth, error and instruments.
-    seed: Of everything drawn.
+    seed: Seed of all random draws.
     out: Folder for the results: `mechanisms` in it, with a page, a figure, CSV and JSON.
     """
 

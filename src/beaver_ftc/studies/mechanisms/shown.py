@@ -81,14 +81,11 @@ def finding(row: Document) -> str:
         return f"{label(row)}: without it all {row['flights']} flights are the same."
     certain = {name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0}
     if not certain:
-        same = f"{row['same_verdict']} of {row['flights']} verdicts are the same without it"
-        return f"{label(row)}: no effect beyond chance; {same}."
-    said = (f"{_more_or_less(found)} flights have {CRITERIA[name]}" for name, found in certain.items())
-    return f"{label(row)}: without it, {'; '.join(said)}."
-
-
-def _more_or_less(found: Document) -> str:
-    return f"{abs(100 * found['value']):.1f} % {'more' if found['value'] > 0 else 'fewer'}"
+        changed = row["flights"] - row["same_verdict"]
+        differ = f"{changed} of {row['flights']} verdicts differ" if changed else "no verdict differs"
+        return f"{label(row)}: without it {differ}, and no criterion changes beyond chance."
+    said = (f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in certain.items())
+    return f"{label(row)}: without it, {', '.join(said)}."
 
 
 def alarms_sentence(document: Document) -> str:
@@ -207,7 +204,10 @@ def figure_of(document: Document) -> "Figure":
         panel.tick_params(labelsize=8)
     grid[0][0].set_yticks(range(len(rows)), [label(row) for row in rows], fontsize=8)
     grid[0][0].invert_yaxis()
-    label_edges(grid, "net share without it, %")
+    label_edges(grid, "worse without the mechanism, net %")
+    for system, colour in zip((PAPER, DEFAULT), SERIES, strict=False):
+        grid[0][0].plot([], [], "o", color=colour, label=f"{system} system")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9, frameon=False)
     return figure
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BeaverFtcError
-from beaver_ftc.extensions import required
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.loop.readout import withhold_from_law
+from beaver_ftc.plugins import required
 from beaver_ftc.results.log import Columns, MemoryLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document, Metrics
@@ -224,8 +224,8 @@ def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
     return {
         "failed": False,
         "false_alarm": found.false_alarm,
-        "delay_s": None if found.false_alarm else detection.delay_s,
-        "named": bool(isolation.correct) and not found.false_alarm,
+        "delay_s": found.fault_found_s,
+        "named": found.fault_named,
         "tracking_deg_s": _tracking(found),
         "verdict": [detection.time_s, isolation.fault, isolation.time_s],
         "reason": reason_of(scenario) if found.false_alarm else None,

@@ -6,7 +6,7 @@ from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.scenario.judgement import Truth
+from beaver_ftc.results.metrics import Truth
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
 

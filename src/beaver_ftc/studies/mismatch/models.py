@@ -167,7 +167,7 @@ def _scaled(ratio: Mapping[str, float]) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Belief:
+class DesignModelOfFlight:
     """The design model in use: nonlinear, frozen or linearised at the trim of the first frame."""
 
     moments: MomentModel
@@ -192,8 +192,8 @@ class Belief:
         return np.stack([self.acceleration(still, y, u) - neutral for u in deflected], axis=-1)
 
 
-def belief_of(scenario: Scenario, trim: States) -> Belief:
+def design_model_of_flight(scenario: Scenario, trim: States) -> DesignModelOfFlight:
     """The scenario's design model; `trim` is the flight's first frame, where it was linearised."""
     design = design_of(scenario.design_model)[0]
     anchor(design, trim.x[0], trim.y[0], trim.u[0])
-    return Belief(designed_moments(scenario), anchored(design))
+    return DesignModelOfFlight(designed_moments(scenario), anchored(design))

@@ -58,10 +58,10 @@ from beaver_ftc.studies.mismatch.models import (
     ENGINE_TERMS,
     MOMENT_TERMS,
     RATES,
-    Belief,
+    DesignModelOfFlight,
     MomentModel,
     States,
-    belief_of,
+    design_model_of_flight,
     quantities,
     term,
     true_moments,
@@ -142,7 +142,7 @@ class Models:
 
     def __init__(self, scenario: Scenario, trim: States) -> None:
         self.scenario, self.actuators = scenario, HealthyActuators(scenario)
-        self.belief, self.truth = belief_of(scenario, trim), true_moments(scenario)
+        self.design_model, self.truth = design_model_of_flight(scenario, trim), true_moments(scenario)
 
 
 def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
@@ -158,7 +158,7 @@ def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
-            effects[name_of(fault)] = unanticipated(fault, m.belief, states)
+            effects[name_of(fault)] = unanticipated(fault, m.design_model, states)
     return effects
 
 
@@ -174,10 +174,10 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
     return np.where(is_in_force(fault, t_s), grown, 0.0)
 
 
-def unanticipated(fault: Any, belief: Belief, states: States) -> np.ndarray:
+def unanticipated(fault: Any, design_model: DesignModelOfFlight, states: States) -> np.ndarray:
     """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [Zhang2005]."""
     moment = states.y[:, 3] * GEOMETRY.wing_area_m2 * GEOMETRY.chord_m * states.y[:, 0] ** 3
-    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * belief.moments.inertia.Qm * moment
+    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * design_model.moments.inertia.Qm * moment
     return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])
 
 
@@ -210,7 +210,7 @@ def engine(m: Models, s: States) -> np.ndarray:
     if m.scenario.design_model.engine_terms:
         return np.zeros_like(s.x)
     table = {name: MOMENT_TERMS[name].value for name in ENGINE_TERMS}
-    neglected = MomentModel(table, m.belief.moments.inertia)
+    neglected = MomentModel(table, m.design_model.moments.inertia)
     return neglected.aerodynamic(s.x, s.y, s.effective, ENGINE_TERMS)
 
 
@@ -218,9 +218,9 @@ def coefficient_errors(m: Models, s: States) -> Contributions:
     """Each term whose coefficient differs between truth and design, neglected engine terms aside."""
     of = quantities(s.x, s.y, s.effective)
     neglected = () if m.scenario.design_model.engine_terms else ENGINE_TERMS
-    designed = m.belief.moments.coefficients | {name: MOMENT_TERMS[name].value for name in neglected}
+    designed = m.design_model.moments.coefficients | {name: MOMENT_TERMS[name].value for name in neglected}
     return {
-        name: term(name, error, m.belief.moments.inertia, of, s.y[:, 3])
+        name: term(name, error, m.design_model.moments.inertia, of, s.y[:, 3])
         for name in MOMENT_TERMS
         if (error := m.truth.coefficients[name] - designed[name]) != 0.0
     }
@@ -232,7 +232,7 @@ def inertia(m: Models, s: States, extra_moment: np.ndarray) -> np.ndarray:
     extra_moment (n, 3) rad/s2: the pitching moment of unanticipated faults, as the designer's inertia
     weighs it.
     """
-    true, designed = m.truth.inertia, m.belief.moments.inertia
+    true, designed = m.truth.inertia, m.design_model.moments.inertia
     if true == designed:
         return np.zeros_like(s.x)
     by_true, by_designed = (
@@ -275,18 +275,18 @@ def earth(m: Models, s: States) -> np.ndarray:
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
     """All sources but the integration at every frame, and the single faults and single coefficients."""
-    belief, healthy = m.belief, m.actuators.follow(s.u)
-    G = belief.effectiveness(s.y)
+    design_model, healthy = m.design_model, m.actuators.follow(s.u)
+    G = design_model.effectiveness(s.y)
     faults, errors = fault_effects(m, s, G, healthy), coefficient_errors(m, s)
     nothing = np.zeros_like(s.x)
     extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
-    measured = belief.acceleration(s.x_measured, s.y_measured, s.u)
-    exact = belief.moments.acceleration(s.x, s.y, s.effective)
+    measured = design_model.acceleration(s.x_measured, s.y_measured, s.u)
+    exact = design_model.moments.acceleration(s.x, s.y, s.effective)
     contributions = {
-        "sensors": belief.acceleration(s.x, s.y, s.u) - measured,
+        "sensors": design_model.acceleration(s.x, s.y, s.u) - measured,
         "actuators": np.einsum("kas,ks->ka", G, healthy - s.u),
         "fault": sum(faults.values(), nothing),
-        "simplification": exact - belief.acceleration(s.x, s.y, s.effective),
+        "simplification": exact - design_model.acceleration(s.x, s.y, s.effective),
         "engine": engine(m, s),
         "coefficients": sum(errors.values(), nothing),
         "inertia": inertia(m, s, extra),
@@ -305,5 +305,5 @@ def integration(m: Models, s: States, following: States) -> np.ndarray:
     a frame it is the sample at the start. following: the same frames, each one later.
     """
     moved = (following.x - s.x) * m.scenario.rate_hz - s.xdot
-    sampled = m.belief.acceleration(s.x_measured, s.y_measured, s.u)
+    sampled = m.design_model.acceleration(s.x_measured, s.y_measured, s.u)
     return moved - (following.design_mean - sampled)

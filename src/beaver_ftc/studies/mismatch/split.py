@@ -95,7 +95,7 @@ def _over_frames(m: Models, states: States) -> Stretch:
 
 def _at_end(m: Models, last: States) -> Stretch:
     """The flight's last row: nothing follows, so JSBSim's acceleration then stands for the frame."""
-    designed = m.belief.acceleration(last.x_measured, last.y_measured, last.u)
+    designed = m.design_model.acceleration(last.x_measured, last.y_measured, last.u)
     return _stretch(m, last, np.zeros_like(last.x), last.xdot - designed, last.eta_bar)
 
 

@@ -87,8 +87,8 @@ def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
     for scenario in scenarios:
         if scenario.airframe is not load():
             raise BadInput(
-                f"{scenario.name}: aircraft: mismatch knows the equations of {load().name} alone, allowed: "
-                f"{load().name}; of others `beaver-ftc derive` measures the error"
+                f"{scenario.name}: aircraft: `mismatch` works for {load().name} only, allowed: "
+                f"{load().name}; for other aircraft `beaver-ftc derive` measures the model error"
             )
 
 

@@ -106,7 +106,7 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
 
 
 def limit(rows: Sequence[Row], per_h: float) -> Document:
-    """What a test that is told the fault would find of the same flights, within each of WITHIN_S."""
+    """Shares of the same flights in which an informed test detects the fault, within each of WITHIN_S."""
     one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
     flights = list(one_each.values())
     return {

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 NAME = "power"
 WIDTH = 140
 OWN = "  as it ships"
-TOLD = "(told the fault)"
+INFORMED = "informed test"
 
 
 def as_text(document: Document, colour: bool = False) -> str:
@@ -75,9 +75,9 @@ def _table(document: Document, sensors: str, turbulence: str) -> "Table":
             own = [total and total["own_level"] for total in totals]
             rows.append([OWN, _rate(level["own_level"]), "", *map(shares, own)])
     limits = [limit["within"].values() if limit else [] for limit in of_each("limits")]
-    told = ["/".join(f"{100 * share:.0f}" for share in within) or "-" for within in limits]
+    informed = ["/".join(f"{100 * share:.0f}" for share in within) or "-" for within in limits]
     head = ["scheme", "false alarms/h", "before faults/h", *surfaces]
-    return plain(title_of(sensors, turbulence), head, [*rows, [TOLD, "", "", *told]])
+    return plain(title_of(sensors, turbulence), head, [*rows, [INFORMED, "", "", *informed]])
 
 
 def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
@@ -121,7 +121,7 @@ def _legend(document: Document) -> list[str]:
         f"before faults: the same on other flights. By chance alone {chance:.1f} % are detected within "
         f"{WITHIN_S[-1]:g} s.",
         f"{OWN.strip()}: at the level that follows from what it declares.",
-        f"{TOLD}: a test that knows surface, magnitude and instant, made once in that time at the same rate.",
+        f"{INFORMED}: knows surface, magnitude and instant; made once in that time at the same rate.",
         "plug-ins and that test are shown the air as the statistical scheme sees it by the vanes."
         if grid["vanes"]
         else "plug-ins and that test have the rates alone; the statistical scheme sees the air by its vanes.",
@@ -253,7 +253,7 @@ def _dots(document: Document, sensors: str, rows: Sequence[Row]) -> "Figure":
     """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
     surfaces = document["grid"]["surfaces"]
     conditions = [condition for condition in document["grid"]["conditions"] if condition[0] == sensors]
-    names = [*dict.fromkeys(row["scheme"] for row in rows), TOLD]
+    names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
     most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
     figure, axes = panels(
         len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
@@ -286,8 +286,8 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
         found = {scheme: summary(of) for (scheme,), of in grouped(here, "scheme").items()}
         shares = {scheme: cell["within"][within] for scheme, cell in found.items() if cell["flights"]}
         if here:
-            told = limit(here, document["false_alarms_per_h"])[within]
-            shares[TOLD] = {"value": told, "low": told, "high": told}
+            found_by_it = limit(here, document["false_alarms_per_h"])[within]
+            shares[INFORMED] = {"value": found_by_it, "low": found_by_it, "high": found_by_it}
         percent = 100.0 * np.array([[of["value"], of["low"], of["high"]] for of in shares.values()])
         values, lows, highs = percent.reshape(-1, 3).T
         panel.errorbar(
@@ -312,14 +312,14 @@ SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tacti
 class Power(StudyCommand):
     """Estimate the probability and the delay of fault detection.
 
-    Over surface, magnitude, excitation, sensors and turbulence.
+    The command varies surface, size of the loss, reference, sensors and turbulence.
 
     All schemes diagnose the same flights, each at the alarm level that gives the same false-alarm rate on the
     same healthy flights. Writes power.json, power.parquet, power.txt, and figures as PNG and SVG.
 
     The same command resumes an interrupted run.
 
-    grid: quick: a minute of CPU; full: ten or so.
+    grid: quick: about 1 min of processor time; full: about 10 min.
     schemes: Comma-separated schemes to compare with ours. Default: all registered ones.
     sensors: Only these sensors. Default: all of the grid.
     turbulence: Only this turbulence. Default: all of the grid.
@@ -327,7 +327,7 @@ class Power(StudyCommand):
     altitude: Altitude above sea level, m.
     aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     surface: Only this surface; print a one-line answer per loss.
-    rates_alone: Give plug-ins the body rates alone, without the air data that our detector uses.
+    rates_alone: Give plug-ins only the body rates, without the air data that our detector uses.
     out: Folder for the results: `power` in it.
     """
 

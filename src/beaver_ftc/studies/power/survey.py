@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from beaver_ftc.aircraft import DEFAULT
-from beaver_ftc.diagnosis.informed_test import Whitening
+from beaver_ftc.diagnosis.informed_test import WhiteningFilter
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.plugins import DETECTORS, is_compiled, refusal, registered
 from beaver_ftc.scenario.airframe import air_of, find_aircraft
@@ -228,7 +228,7 @@ def deflections(
         return [0.0] * len(within_s)
     place = recording.context.surfaces.index(surface)
     moment = np.array([measured.contribution[:, place] for measured in since])
-    d = Whitening(recording.context).deflection(-magnitude * moment)
+    d = WhiteningFilter(recording.context).deflection_coefficient(-magnitude * moment)
     frames = [round(s / recording.context.dt_s) for s in within_s]
     return [float(d[min(n, len(d)) - 1]) for n in frames]
 

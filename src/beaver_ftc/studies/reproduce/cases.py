@@ -18,6 +18,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
@@ -70,10 +71,11 @@ BEYOND = (
 
 @dataclass(frozen=True)
 class Flown:
-    """A case flown: its metrics, and its log as name -> values, shape (frames,)."""
+    """A case flown: its metrics, its log as name -> values, shape (frames,), and its scenario."""
 
     metrics: Metrics
     log: dict[str, np.ndarray]
+    scenario: Scenario
 
     @property
     def fault_at_s(self) -> float:
@@ -182,7 +184,7 @@ def _struck(fault: Mapping[str, Any], size: float, at_s: float) -> dict[str, Any
 def _fly(name: str, keys: Mapping[str, Any]) -> Flown:
     log = Columns()
     flight = fly(scenario(name, keys), log)
-    return Flown(measure(flight), log)
+    return Flown(measure(flight), log, flight.scenario)
 
 
 class LazyFlights(Mapping[str, Flown]):

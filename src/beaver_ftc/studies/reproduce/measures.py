@@ -11,12 +11,17 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
+from beaver_ftc.plant.conditions import trimmed
+from beaver_ftc.plant.linear import differences
+from beaver_ftc.scenario.faults import LossOfEffectiveness
+from beaver_ftc.studies.detectability import mismatch, moments_of
 from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 
 Flights = Mapping[str, Flown]
 
 AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # where a case shows
+RATES = ("p", "q", "r")  # among the states of a linear aircraft
 LOST, STILL = "aircraft lost", "the flap stands still"
 TRANSIENT_S = 3.0  # after the fault: detection, isolation and hand-over
 GOOD, TAKEN_OVER = 0.1, 0.2  # the limits `good` and `taken-over` of claims.yaml
@@ -79,7 +84,7 @@ def detected(flights: Flights, *names: str) -> float:
 def isolation(flights: Flights, name: str) -> float:
     """From the alarm to the right name; infinite if anything else is named in the end."""
     found = flights[name].metrics
-    if found.isolation.fault != name:
+    if not found.isolation.correct:
         return np.inf
     return _after(found.detection.time_s, found.isolation.time_s)
 
@@ -148,8 +153,8 @@ def conclusion_lag(flights: Flights, name: str) -> float:
     """From the exclusion of the last estimator that does not fit to the right name."""
     flown = flights[name]
     last_s = max(flown.excluded_at_s(other) for other in ESTIMATORS if other != name)
-    right = flown.metrics.isolation.fault == name
-    return _frames(flown, _after(last_s, flown.metrics.isolation.time_s)) if right else np.inf
+    isolation = flown.metrics.isolation
+    return _frames(flown, _after(last_s, isolation.time_s)) if isolation.correct else np.inf
 
 
 @_measure("estimators at work", at_least=True)
@@ -199,6 +204,35 @@ def named(flights: Flights, name: str) -> float:
 def left(flights: Flights, name: str) -> float:
     """How many isolation estimators are not excluded."""
     return sum(not np.isfinite(flights[name].excluded_at_s(estimator)) for estimator in ESTIMATORS)
+
+
+@_measure("last exclusion", "frames after the alarm and a mismatch beyond 1")
+def after_mismatch(flights: Flights, *names: str) -> float:
+    """How long after both an estimator is excluded, at most; one whose mismatch stays below 1 is not counted.
+
+    The mismatch is M_sj of detectability.py, along the flight itself.
+    """
+    lags = [
+        _frames(flights[name], _after(certain_s, max(certain_s, flights[name].excluded_at_s(other))))
+        for name in names
+        for other, certain_s in _certain_at_s(flights[name], name).items()
+    ]
+    return max(lags, default=np.inf)
+
+
+def _certain_at_s(flown: Flown, name: str) -> dict[str, float]:
+    """Of each other fault whose mismatch with a loss exceeds 1 after it: when it does after the alarm, s."""
+    fault = flown.scenario.faults[0]
+    if not isinstance(fault, LossOfEffectiveness):
+        return {}
+    moment, bound, _ = moments_of(flown.scenario, flown.log)
+    z, since = fault.magnitude * moment[name], flown.between(flown.fault_at_s)
+    alarm_s, found = flown.metrics.detection.time_s or np.inf, {}
+    for other in set(moment) - {name}:
+        beyond = since & (mismatch(z, moment[other], bound) > 1.0)
+        if beyond.any():
+            found[other] = max(alarm_s, float(flown.log["t_s"][np.argmax(beyond)]))
+    return found
 
 
 # Estimation
@@ -263,6 +297,16 @@ def unbounded(flights: Flights, name: str) -> float:
 
 
 # Control
+
+
+@_measure("slowest of the body rates", "of the fastest other variable", at_least=True)
+def separation(flights: Flights, name: str) -> float:
+    """Slowest pole of p, q, r over the fastest of the other states; each with those of the other held."""
+    plant, trim = trimmed(flights[name].scenario)
+    linear = differences(plant, trim)
+    inner = np.isin(linear.states, RATES)
+    poles = [np.abs(np.linalg.eigvals(linear.A[np.ix_(of, of)])) for of in (inner, ~inner)]
+    return float(poles[0].min() / poles[1].max())
 
 
 @_measure("RMS error", "of the reference's amplitude", none=LOST)

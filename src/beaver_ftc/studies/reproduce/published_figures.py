@@ -92,7 +92,7 @@ def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
     shown = flown.between(*span)
     errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
     series = {name: values[shown] for name, values in {**flown.log, **errors}.items()}
-    return draw(view, series, marks(flown.metrics), f"case {flown.metrics.scenario}")
+    return draw(view, series, marks(flown.metrics), "flown again in JSBSim")
 
 
 def shares(claim: Document) -> tuple[float, float, float]:
@@ -115,7 +115,7 @@ def margins_figure(document: Document) -> "Figure":
 
     claims = [claim for claim in document["claims"] if not claim["reason"]]
     figure = Figure(figsize=(12.0, 0.6 + 0.25 * len(claims)), dpi=110)
-    axes = figure.subplots(gridspec_kw={"left": 0.52, "right": 0.98, "top": 0.97, "bottom": 0.045})
+    axes = figure.subplots(gridspec_kw={"left": 0.52, "right": 0.98, "top": 0.97, "bottom": 0.075})
     for row, claim in enumerate(claims):
         low, ours, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
         axes.plot([low, high], [row, row], color=BLUE if high <= 1 else VERMILION, linewidth=3, alpha=0.55)
@@ -132,5 +132,7 @@ def margins_figure(document: Document) -> "Figure":
     axes.plot([], [], "o", color=BLACK, markersize=5, label="as flown")
     axes.plot([], [], color=BLUE, linewidth=3, alpha=0.55, label="over all changes, which it survives")
     axes.plot([], [], color=VERMILION, linewidth=3, alpha=0.55, label="over all changes, one breaks it")
-    axes.legend(loc="lower right", fontsize=8)
+    axes.legend(
+        loc="upper right", bbox_to_anchor=(1.0, -0.045), ncols=3, fontsize=8
+    )  # below: no corner is free
     return figure

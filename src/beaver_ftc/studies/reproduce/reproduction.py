@@ -6,11 +6,9 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from math import nan
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from beaver_ftc.commands import Reporter, StudyCommand
+from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.engine.study import Progress, Study, fly_all, run_study
@@ -309,16 +307,15 @@ class Reproduce(StudyCommand):
     Reports every figure, and for every statement our number, the number without the mechanism concerned, and
     a verdict; and the same cases flown with our defaults.
 
-    Exit status 1 if a statement is not borne out and the reason is not known.
+    Exit status 1 if a statement does not hold and the reason is not known.
 
     The same command resumes an interrupted run.
 
     out: Folder for the results: `reproduction` in it.
-    workers: Processes that fly them.
     """
 
     out: Path = Path("runs")
-    workers: Annotated[int, typer.Option(min=1)] = 2
+    workers: WorkersOption = None
 
     FILES = FILES
     PLUGINS = False
@@ -330,7 +327,7 @@ class Reproduce(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly the published cases, and all settings with their ablations."""
-        document = reproduce(self.out, self.workers, reporter.progress)
+        document = reproduce(self.out, self.processes, reporter.progress)
         return document | {"folder": str(self.out / NAME)}
 
     def as_text(self, document: Document, colour: bool) -> str:

@@ -66,7 +66,7 @@ def _row(name: str, bound: str, healthy: Flown, faulty: Flown) -> Document:
         "bound": bound,
         "alarm_s": healthy.metrics.detection.time_s,
         "share": {axis: float(share) for axis, share in zip(AXES, healthy.shares().max(axis=1), strict=True)},
-        "detected_s": None if found.false_alarm else found.detection.delay_s,
+        "detected_s": found.fault_found_s,
         "false_alarm": found.false_alarm,
         "named": found.isolation.fault,
     }

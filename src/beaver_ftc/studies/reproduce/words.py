@@ -165,11 +165,12 @@ def headline(document: Document) -> str:
     tested, built = document["testable"], document["construction"]
     settings = len(document["sensitivity"])
     return (
-        f"Of {tested['statements']} testable statements {tested['hold']} hold, {tested['elsewhere']} of them "
-        f"also in {settings} settings that the paper did not fly. {tested['do_not']} do not hold. "
-        f"{tested['unsettled']} hold, but also when the mechanism that the statement credits is removed. Of "
-        f"{built['statements']} statements that the code makes true by its construction {built['hold']} "
-        f"hold; {document['background']} give nothing to measure."
+        f"Of {tested['statements']} testable statements, {tested['hold']} hold, {tested['do_not']} do not "
+        f"hold, and {tested['unsettled']} hold even without the mechanism that the statement credits. "
+        f"{tested['elsewhere']} of the {tested['hold']} also hold in every one of {settings} settings that "
+        f"the paper did not fly. A further {built['statements']} statements should be true by the "
+        f"construction of the code, and {built['hold']} of them are. A further {document['background']} "
+        "statements contain nothing that can be measured."
     )
 
 
@@ -178,7 +179,7 @@ def adaptation_sentence(document: Document) -> str:
     found = document["adaptation"]
     return (
         f"Without the adaptation of the isolation estimators (gain 0), {found['same']} of {found['flights']} "
-        "flights with a fault have the same alarm, the same name and the same time."
+        "flights with a fault have the same alarm, the same name and the same time as with adaptation."
     )
 
 

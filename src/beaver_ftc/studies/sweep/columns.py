@@ -107,12 +107,19 @@ def _kind(path: str) -> str:
     return _KINDS[hint]
 
 
-def value_of(name: str, found: Metrics, flight: "Landing") -> Any:
+@cache
+def getter_of(name: str) -> Getter:
     """What a column says of a flight; None where a section on the way to it is."""
     if name in _ELSEWHERE:
-        return _ELSEWHERE[name][1](found, flight)
-    here: Any = found
-    for part in name.split("."):
-        if here is not None:
+        return _ELSEWHERE[name][1]
+    path = name.split(".")
+
+    def get(found: Metrics, flight: "Landing") -> Any:
+        here: Any = found
+        for part in path:
+            if here is None:
+                break
             here = here.get(part) if isinstance(here, dict) else getattr(here, part)
-    return here
+        return here
+
+    return get

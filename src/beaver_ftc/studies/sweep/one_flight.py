@@ -21,7 +21,7 @@ from beaver_ftc.documents.validation import key_path, problems_of
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, Variation
-from beaver_ftc.studies.sweep.columns import columns_of, value_of
+from beaver_ftc.studies.sweep.columns import columns_of, getter_of
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def row_of(assignment: Assignment, found: Metrics, flight: "Landing") -> Row:
     status = DEPARTED if departure else FLOWN
     reason = f"{departure.signal} at {departure.time_s:g} s" if departure else None
     columns = columns_of(flight.scenario.airframe.surfaces)
-    metrics = {name: value_of(name, found, flight) for name in columns}
+    metrics = {name: getter_of(name)(found, flight) for name in columns}
     return _row(assignment, found.seed, status, reason, metrics)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.metrics import strikes_within
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, flight_name, kind_of
 
@@ -54,8 +55,8 @@ class Flights:
     @cached_property
     def faulted(self) -> np.ndarray:
         """Flights that can tell about detection: a fault came, and no alarm before it."""
-        there = self["fault.at_s"] < self["flown_s"]  # False where there is no fault
-        return self.measured & there & ~self["false_alarm"]
+        struck = strikes_within(self["fault.at_s"], self["flown_s"])
+        return self.measured & struck & ~self["false_alarm"]
 
     @cached_property
     def detected(self) -> np.ndarray:

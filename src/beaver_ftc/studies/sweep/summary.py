@@ -12,10 +12,9 @@ from functools import partial
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.metrics import ON_THE_BOUND, is_late
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.faults import UNANTICIPATED
-from beaver_ftc.scenario.judgement import is_late
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson

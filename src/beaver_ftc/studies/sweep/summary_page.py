@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import ON_THE_BOUND
-from beaver_ftc.results.model import Document
+from beaver_ftc.results.model import Document, Expectation, Judged
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
 from beaver_ftc.studies.sweep.pictures import FIGURES
@@ -67,18 +67,18 @@ def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
     ]
 
 
-def verdict(summary: Document) -> Document:
-    """{scenario, passed, expectations} as of a run, each bound under a name of its own."""
-    bounds = [
-        {
-            "name": f"{found['name']}.{'at_least' if 'at_least' in found['expected'] else 'at_most'}",
-            "passed": found["passed"],
-            "expected": expected(found["expected"]),
-            "actual": f"{value(found['actual'])} of {found['of']} flights",
-        }
+def verdict(summary: Document) -> Judged:
+    """As of a run, each bound under a name of its own."""
+    bounds = (
+        Expectation(
+            f"{found['name']}.{'at_least' if 'at_least' in found['expected'] else 'at_most'}",
+            found["passed"],
+            expected(found["expected"]),
+            f"{value(found['actual'])} of {found['of']} flights",
+        )
         for found in summary["expectations"]
-    ]
-    return {"scenario": summary["sweep"], "passed": summary["passed"], "expectations": bounds}
+    )
+    return Judged(summary["sweep"], summary["passed"], tuple(bounds))
 
 
 def expected(level: Document) -> str:
@@ -201,7 +201,7 @@ def _guarantee(found: Document) -> str:
 def _drivers(ranking: list[Document]) -> str:
     told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
     return ", ".join(
-        f"{entry['key']} (rank correlation explains {percent(entry['explained'])})" for entry in told
+        f"{entry['key']} (explains {percent(entry['explained'])} of the ranks)" for entry in told
     )
 
 

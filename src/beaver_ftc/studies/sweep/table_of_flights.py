@@ -33,13 +33,13 @@ def sweep(
     expect: Mapping[str, Any] | None = None,
     out: str | PathLike[str] | None = None,
 ) -> "DataFrame":
-    """Fly a scenario many times; one row a flight, the columns of results.parquet.
+    """Fly a scenario many times; returns one row for each flight, with the columns of results.parquet.
 
-    vary: dotted keys to how they vary, `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`. runs: number of
-    flights; left out, one a point of the grid. workers: processes; the same table whatever their number.
-    seed, sampling, expect: as in a sweep file. out: keep results.parquet, summary.json and report.html in
-    `out/<name>`. `attrs` has scenario, seed, what varied and the columns' units. Raises BadInput that names
-    the key; a flight that fails is a row that says why.
+    vary: how each dotted key varies, `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`. runs: number of
+    flights; left out: one for each point of the grid. workers: number of processes; the table does not depend
+    on it. seed, sampling, expect: as in a sweep file. out: keep results.parquet, summary.json and report.html
+    in `out/<name>`. `attrs` has scenario, seed, varied keys and units of the columns. Raises BadInput that
+    names the key. A flight that fails is a row with the reason.
     """
     asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
     made = _made(scenario, {key: value for key, value in asked.items() if value is not None})

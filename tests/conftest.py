@@ -56,17 +56,19 @@ def pytest_addoption(parser):
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
     "products/live/page/test_guests.py", "aircraft/derive/test_derive.py", "cli/test_command_line.py",
-    "studies/compare/test_replay.py", "plugins/test_pytest_plugin.py", "studies/compare/test_compare.py",
-    "diagnosis/test_new_type.py", "logs/test_by_aircraft.py", "compiled/test_cache.py", "loop/test_stream.py",
-    "rivals/test_detectors.py", "studies/test_new_study.py", "logs/test_commands.py",
-    "results/test_flight.py",
-    "studies/mismatch/test_command.py", "assurance/certificates/test_certificates.py", "loop/test_loop.py",
-    "aircraft/test_engines.py", "logs/test_check.py", "aircraft/derive/test_derived_document.py",
-    "studies/sweep/test_campaign.py", "studies/power/test_survey.py",
-    "live/page/test_page.py", "live/page/test_server.py", "compiled/test_strangers.py",
-    "scenario/test_new_sensor.py", "plugins/test_plugins.py", "studies/reproduce/test_reproduce.py",
-    "control/test_power.py", "results/test_report.py", "recorded/test_benchmark.py", "sitl/test_endpoint.py",
-    "detection/test_likelihood.py", "loop/test_accelerometers.py",
+    "studies/mechanisms/test_mechanisms.py", "rivals/test_detectors.py", "compiled/test_cache.py",
+    "detection/test_likelihood.py", "studies/reproduce/test_reproduce.py",
+    "assurance/certificates/test_certificates.py", "loop/test_loop.py", "diagnosis/test_new_type.py",
+    "tools/test_drawn.py", "aircraft/test_engines.py", "tests/test_notebooks.py", "logs/test_commands.py",
+    "live/page/test_server.py", "logs/test_check.py", "control/test_power.py", "results/test_report.py",
+    "tools/test_reference.py", "tests/test_interface.py", "live/challenge/test_cheats.py",
+    "scenario/test_new_sensor.py", "live/page/test_page.py", "studies/sweep/test_campaign.py",
+    "studies/test_new_study.py", "compiled/test_strangers.py", "studies/mismatch/test_command.py",
+    "logs/test_long_logs.py", "evidence/test_evidence.py", "matrix/test_pitch_lost.py",
+    "sitl/test_endpoint.py", "bench/test_memory.py", "studies/power/test_survey.py",
+    "compiled/test_sized_types.py", "recorded/test_benchmark.py", "loop/test_who_sees_the_truth.py",
+    "studies/sweep/test_rare.py", "results/test_painters.py", "plugins/test_pytest_plugin.py",
+    "diagnosis/test_statistical_flights.py", "tools/test_docs_names.py",
 )  # fmt: skip
 
 
@@ -146,8 +148,12 @@ def beaver(trim_point):
     return plant
 
 
-def pytest_sessionstart(session):
-    """Compile what flights use before the first test: what is said meanwhile is a test by itself."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session):
+    """Compile what flights use before the first test: what is said meanwhile is a test by itself. A worker
+    waits for the one that compiles, and for `tests/warm.py` if it has been started before: make does so.
+    """
     plain = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    if not plain and not hasattr(session.config, "workerinput"):
+    gives_them_to_workers = session.config.getoption("numprocesses", None)
+    if not (plain or gives_them_to_workers or session.config.option.collectonly):
         warm.main()

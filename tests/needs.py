@@ -2,12 +2,12 @@
 
 import pytest
 
-from beaver_ftc import commands, extensions
+from beaver_ftc import commands, plugins
 
 
 def service(name: str) -> pytest.MarkDecorator:
     """The test wants what another package offers the core by this name."""
-    there = name in extensions.entries(extensions.SERVICES)
+    there = name in plugins.entries(plugins.SERVICES)
     return pytest.mark.skipif(not there, reason=f"no installed package offers {name!r}")
 
 

@@ -36,7 +36,7 @@ BESIDE = {
 FLOORS = (
     {"public"},
     {"documents"},
-    {"commands", "compiled", "extensions", "plugins"},
+    {"commands", "compiled", "plugins"},
     {"aircraft"},
     {"design"},
     {"scenario"},
@@ -51,7 +51,7 @@ FLOORS = (
 )
 TOOLS = FLOORS[2]
 # Their rows name what is far above them, for those who ask; the same for other packages.
-REGISTRIES = {"plugins", "commands", "extensions"}
+REGISTRIES = {"plugins", "commands"}
 
 
 @cache

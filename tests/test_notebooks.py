@@ -66,6 +66,14 @@ def test_it_shows_what_is_stored(path):
     assert notebooks.pictures(again) == notebooks.pictures(stored)
 
 
+def test_a_text_that_a_notice_parts_is_one_text():
+    """As when code is compiled between two lines that a cell prints."""
+    parts = (("stdout", "one\n"), ("stderr", "compiling\n"), ("stdout", "two\n"))
+    cell = nbformat.v4.new_code_cell("")
+    cell.outputs = [nbformat.v4.new_output("stream", name=name, text=text) for name, text in parts]
+    assert notebooks.texts(notebooks.slim(nbformat.v4.new_notebook(cells=[cell]))) == ["one\ntwo\n"]
+
+
 def differences(stored, shown):
     """Outputs that differ in a word, or in a number by more than another processor rounds."""
     assert len(stored) == len(shown)

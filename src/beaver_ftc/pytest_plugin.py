@@ -14,9 +14,12 @@ below pytest's temporary folder.
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
+
+if TYPE_CHECKING:
+    from beaver_ftc.results.model import Expectation
 
 _MARKED = (".scenario.yaml", ".scenario.yml")
 _YAML = (".yaml", ".yml")
@@ -117,11 +120,18 @@ def _looks_like_a_scenario(keys: list[str]) -> bool:
     return near or ("name" in keys and known.issuperset(keys))
 
 
+class Flown(NamedTuple):
+    """What came of a file, and the folder in which it is kept."""
+
+    expectations: "tuple[Expectation, ...]"
+    folder: str
+
+
 class FlownFile(pytest.File):
     """A file of flights; flown when the first of its expectations is asked about."""
 
     name_flown: str
-    _flown: dict[str, Any] | Exception | None = None
+    _flown: Flown | Exception | None = None
 
     def collect(self) -> Iterator[pytest.Item]:
         """One item an expectation; of a file that expects nothing, that it can be flown."""
@@ -137,8 +147,8 @@ class FlownFile(pytest.File):
             item.add_marker(pytest.mark.xdist_group(str(self.path)))
             yield item
 
-    def flown(self) -> dict[str, Any]:
-        """{expectations, folder} of what was flown; raises again what went wrong with it."""
+    def flown(self) -> Flown:
+        """What was flown; raises again what went wrong with it."""
         if self._flown is None:
             try:
                 self._flown = self._fly(self.config._tmp_path_factory.mktemp("beaver-ftc"))  # type: ignore[attr-defined]
@@ -152,7 +162,7 @@ class FlownFile(pytest.File):
         """Its name, and the names of what it expects. Raises BadInput."""
         raise NotImplementedError
 
-    def _fly(self, out: Path) -> dict[str, Any]:
+    def _fly(self, out: Path) -> Flown:
         """Fly into a folder, with figures if an expectation is missed."""
         raise NotImplementedError
 
@@ -167,11 +177,11 @@ class ScenarioFile(FlownFile):
         self.scenario = load(self.path)
         return self.scenario.name, names(self.scenario.expect)
 
-    def _fly(self, out: Path) -> dict[str, Any]:
+    def _fly(self, out: Path) -> Flown:
         from beaver_ftc.results.flight import fly
 
         flight = fly(self.scenario)
-        return flight.metrics | {"folder": str(flight.save(out, report=not flight.passed))}
+        return Flown(flight.expectations, str(flight.save(out, report=not flight.passed)))
 
 
 class SweepFile(FlownFile):
@@ -184,14 +194,14 @@ class SweepFile(FlownFile):
         self.sweep = load_sweep(self.path)
         return self.sweep.name, names(self.sweep.file.expect)
 
-    def _fly(self, out: Path) -> dict[str, Any]:
+    def _fly(self, out: Path) -> Flown:
         from beaver_ftc.studies.sweep.campaign import Options, run_sweep
         from beaver_ftc.studies.sweep.summary_page import verdict
 
         summary = run_sweep(self.sweep, Options(out, report=False, source=str(self.path)))
         if not summary["passed"]:
             run_sweep(self.sweep, Options(out, resume=True, source=str(self.path)))  # nothing is flown again
-        return verdict(summary) | {"folder": str(out / self.sweep.name)}
+        return Flown(verdict(summary).expectations, str(out / self.sweep.name))
 
 
 class ExpectationItem(pytest.Item):
@@ -201,14 +211,13 @@ class ExpectationItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fly, if nobody has yet, and hold the expectation against what came out."""
-        document = self.parent.flown()
-        self.user_properties.append(("result", document["folder"]))
-        for expectation in document["expectations"]:
-            if expectation["name"] == self.name and not expectation["passed"]:
-                why = f"; {expectation['reason']}" if expectation.get("reason") else ""
+        flown = self.parent.flown()
+        self.user_properties.append(("result", flown.folder))
+        for expectation in flown.expectations:
+            if expectation.name == self.name and not expectation.passed:
+                why = f"; {expectation.reason}" if expectation.reason else ""
                 raise ExpectationMissed(
-                    f"{self.name}: expected {expectation['expected']}, actual {expectation['actual']}{why}\n"
-                    f"kept: {document['folder']} (see report.html)"
+                    f"{self.name}: {expectation.both_values}{why}\nkept: {flown.folder} (see report.html)"
                 )
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from beaver_ftc.cli.shared import status_of_stop
+from beaver_ftc.cli import status_of_stop
 from commands import beaver
 
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
@@ -96,15 +96,6 @@ def test_exports_lie_beside_the_log_when_asked_for(short):
     assert _names(short / "runs/short") == expected
     assert beaver("run", "short.yaml", "--no-report", cwd=short).returncode == 0
     assert "log.csv" not in _names(short / "runs/short")
-
-
-@pytest.mark.parametrize("address", ["localhost", ":5550", "localhost:0", "localhost:65536", "localhost:x"])
-def test_what_is_no_address_of_a_flightgear_is_bad_input(short, address):
-    done = beaver("run", "short.yaml", "--flightgear", address, cwd=short)
-    assert done.returncode == 2
-    assert done.stderr.splitlines() == [
-        f"--flightgear: {address!r} is no address, allowed: HOST:PORT with a port of 1 to 65535"
-    ]
 
 
 def test_missed_expectation_is_status_1(short):

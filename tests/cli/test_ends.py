@@ -64,9 +64,9 @@ os.execv(sys.argv[1], sys.argv[1:])
 @pytest.mark.parametrize("seconds", [3.0])
 def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
     """Before its workers have started and while they fly; what the rivals ship with is as it was."""
-    from beaver_ftc.diagnosis.rivals import TUNED
+    from beaver_ftc.diagnosis.rivals import TUNED_FILE
 
-    before = TUNED.read_bytes()
+    before = TUNED_FILE.read_bytes()
     command = [sys.executable, "-c", HEARD_AGAIN, BEAVER, "compare", "--tune", "--workers", "2"]
     environment = {**os.environ, "COLUMNS": "80"}
     with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE) as running:
@@ -77,5 +77,5 @@ def test_tuning_that_is_ended_says_nothing(tmp_path, seconds):
     assert running.returncode == 143
     assert b"Traceback" not in said
     assert b"Error" not in said
-    assert TUNED.read_bytes() == before
+    assert TUNED_FILE.read_bytes() == before
     assert list(tmp_path.iterdir()) == []

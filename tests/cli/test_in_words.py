@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import sys
 from collections import Counter
 from pathlib import Path
@@ -9,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import needs
-from beaver_ftc.cli import run, shared, sweep
-from beaver_ftc.cli.shared import Format
+from beaver_ftc import cli
+from beaver_ftc.cli import Format, run, sweep
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 
 
@@ -24,7 +25,7 @@ class Terminal(io.StringIO):
 def clock(monkeypatch):
     """The time, to be set."""
     now = {"s": 100.0}
-    monkeypatch.setattr(shared.time, "monotonic", lambda: now["s"])
+    monkeypatch.setattr(cli.time, "monotonic", lambda: now["s"])
     return now
 
 
@@ -43,7 +44,7 @@ def counts(done, **more):
 )  # fmt: skip
 def test_a_line_of_a_sweep_now_and_then(monkeypatch, clock, terminal, step_s, shown):
     monkeypatch.setattr(sys, "stderr", Terminal(terminal))
-    with shared.live_progress("one") as show:
+    with cli.live_progress("one") as show:
         for i in range(5):
             show(counts(10 * i))
             clock["s"] += 1.0001 * step_s
@@ -62,7 +63,7 @@ def test_a_line_of_a_sweep_now_and_then(monkeypatch, clock, terminal, step_s, sh
 )  # fmt: skip
 def test_a_line_of_a_sweep(monkeypatch, clock, of, passed_s, line):
     monkeypatch.setattr(sys, "stderr", Terminal(False))
-    shown = shared._Progress("one", False)
+    shown = cli._Progress("one", False)
     shown(counts(5))
     assert shown.line(of, 100.0 + passed_s) == line
 
@@ -79,12 +80,12 @@ def test_a_line_of_a_sweep(monkeypatch, clock, of, passed_s, line):
     ],
 )
 def test_spans_of_time(seconds, span):
-    assert shared._span(seconds) == span
+    assert cli._span(seconds) == span
 
 
 def test_a_log_has_a_line_of_a_study_now_and_then_and_none_of_a_short_one(clock, monkeypatch):
     monkeypatch.setattr(sys, "stderr", log := Terminal(False))
-    with shared.progress_bar("x") as show:
+    with cli.progress_bar("x") as show:
         for flown in range(101):  # one a second
             clock["s"] = 100.0 + flown
             show(flown / 100)
@@ -98,9 +99,9 @@ def test_a_log_has_a_line_of_a_study_now_and_then_and_none_of_a_short_one(clock,
 
 def test_a_bar_shows_once_it_is_waited_for(monkeypatch, clock):
     bars = []
-    monkeypatch.setattr(shared, "_bar", lambda label, stack: bars.append(label) or bars.append)
+    monkeypatch.setattr(cli, "_bar", lambda label, stack: bars.append(label) or bars.append)
     monkeypatch.setattr(sys, "stderr", Terminal(True))
-    with shared.progress_bar("x") as show:
+    with cli.progress_bar("x") as show:
         for after_s, done in ((1.0, 0.1), (1.01, 0.2), (1.02, 0.3)):
             clock["s"] = 100.0 + after_s
             show(done)
@@ -120,13 +121,13 @@ def test_a_bar_shows_once_it_is_waited_for(monkeypatch, clock):
 )
 def test_an_error_is_a_line_and_a_status(monkeypatch, capsys, error, says, status):
     monkeypatch.setenv("BEAVER_FTC_DEBUG", "")
-    failure = shared.failure_of(error)
+    failure = cli.failure_of(error)
     assert (failure is error) == isinstance(error, BeaverFtcError)
     assert failure.__cause__ is (None if failure is error else error)
-    assert shared.report(failure) == status
+    assert cli.report(failure) == status
     assert capsys.readouterr() == ("", f"{says}\n")
     monkeypatch.setenv("BEAVER_FTC_DEBUG", "1")
-    assert shared.report(failure) == status
+    assert cli.report(failure) == status
     assert type(error).__name__ in capsys.readouterr().err
 
 
@@ -134,22 +135,22 @@ def test_an_error_is_a_line_and_a_status(monkeypatch, capsys, error, says, statu
     (Format.json, False, True), (Format.json, True, False), (Format.text, False, False),
 ])  # fmt: skip
 def test_who_asked_for_a_document_gets_one(capsys, asked, given, is_said):
-    assert shared._remember(asked) is asked
+    assert cli._remember(asked) is asked
     if given:
-        shared.emit_json({"a": 1})
+        cli.emit_json({"a": 1})
         capsys.readouterr()
-    assert shared.report_last(BadInput("a\nb")) == 2
+    assert cli.report_last(BadInput("a\nb")) == 2
     shown = capsys.readouterr()
     assert shown.err == "a\nb\n"
     assert shown.out == ('{\n  "errors": [\n    "a",\n    "b"\n  ]\n}\n' if is_said else "")
-    shared._remember(Format.text)
+    cli._remember(Format.text)
 
 
 def test_what_is_emitted_ends_its_line_once(capsys):
     for text in ("a", "b\n"):
-        shared.emit(text)
-    shared.answer(Format.text, {"c": 1}, lambda: "d")
-    shared.answer(Format.json, {"c": 1}, lambda: "d")
+        cli.emit(text)
+    cli.answer(Format.text, {"c": 1}, lambda: "d")
+    cli.answer(Format.json, {"c": 1}, lambda: "d")
     assert capsys.readouterr().out == 'a\nb\nd\n{\n  "c": 1\n}\n'
 
 
@@ -159,21 +160,21 @@ def test_a_reader_that_went_away_and_a_full_disk(monkeypatch, error, refused):
         raise error
 
     discarded = []
-    monkeypatch.setattr(shared, "_discard_stdout", lambda: discarded.append(1))
+    monkeypatch.setattr(cli, "_discard_stdout", lambda: discarded.append(1))
     monkeypatch.setattr(
         sys, "stdout", type("Out", (), {"write": staticmethod(write), "flush": lambda _: None})()
     )
     if refused:
         with pytest.raises(SimulationFailed, match=r"^cannot write standard output: No space$"):
-            shared.emit("a")
+            cli.emit("a")
     else:
-        shared.emit("a")
+        cli.emit("a")
     assert discarded == [1]
 
 
 @pytest.mark.parametrize(("text", "names"), [("a, b,,c ", ["a", "b", "c"]), ("", []), (" , ", [])])
 def test_names_with_commas(text, names):
-    assert shared.listed(text) == names
+    assert cli.listed(text) == names
 
 
 def test_scenarios_are_told_all_their_mistakes_at_once(tmp_path):
@@ -182,23 +183,25 @@ def test_scenarios_are_told_all_their_mistakes_at_once(tmp_path):
         (tmp_path / f"{name}.yaml").write_text(text)
     files = [str(tmp_path / f"{name}.yaml") for name in "abcd"]
     with pytest.raises(BadInput) as caught:
-        shared.load_all(files)
+        cli.load_all(files)
     lines = [line.removeprefix(f"{tmp_path}/")[:44] for line in str(caught.value).splitlines()]
     assert lines == [
         "c.yaml:2: rate_hz: 1 is out of range, allowe", "d.yaml:3: initial: no steady straight flight",
         "two scenarios are named x: one result would ",
     ]  # fmt: skip
-    assert [scenario.name for scenario in shared.load_all([files[0], "fault-free"])] == ["x", "fault-free"]
+    assert [scenario.name for scenario in cli.load_all([files[0], "fault-free"])] == ["x", "fault-free"]
 
 
 @needs.service("flightgear")
 @pytest.mark.parametrize(("given", "port"), [
     ("localhost:1", 1), ("localhost:65535", 65535), ("::1:0", None), ("localhost:65536", None),
-    ("x:-1", None), (":80", None), ("localhost", None), ("localhost:8 0", None),
+    ("x:-1", None), (":80", None), ("localhost", None), ("localhost:8 0", None), ("localhost:0", None),
+    ("localhost:x", None),
 ])  # fmt: skip
 def test_where_a_flightgear_is(given, port):
     if port is None:
-        with pytest.raises(BadInput, match="is no address, allowed: HOST:PORT with a port of 1 to 65535"):
+        says = f"--flightgear: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535"
+        with pytest.raises(BadInput, match=f"^{re.escape(says)}$"):
             run._shown(given)
     else:
         assert run._shown(given).keywords == {"host": "localhost", "port": port}
@@ -218,7 +221,7 @@ def test_runs_end_with_the_worst_status_and_a_document_of_all(monkeypatch, capsy
     monkeypatch.setattr(
         run,
         "write_junit",
-        lambda runs, path: written.append([{**each, "took_s": each["took_s"] >= 0} for each in runs]),
+        lambda judged, path: written.append([(each.name, each.error, each.took_s > 0) for each in judged]),
     )
     for names, status in ((("good",), 0), (("good", "bad"), 1), (("lost", "bad"), 3), (("lost",), 3)):
         scenarios = [type("S", (), {"name": name})() for name in names]
@@ -231,7 +234,7 @@ def test_runs_end_with_the_worst_status_and_a_document_of_all(monkeypatch, capsy
         ]
         assert ("scenario" in document) == (len(names) == 1)
         assert shown.err == ("gone\n" if "lost" in names else "")
-        assert [each["took_s"] for each in written[-1]] == [True] * len(names)
+        assert written[-1] == [(name, "gone" if name == "lost" else None, True) for name in names]
 
 
 @pytest.mark.parametrize(

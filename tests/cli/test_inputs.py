@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.cli.shared import load_all
+from beaver_ftc.cli import load_all
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 import needs
 from beaver_ftc import __version__, commands, plugins
+from beaver_ftc.cli import as_typer_reads, complete_names
 from beaver_ftc.cli import main as command_line
-from beaver_ftc.cli.shared import as_typer_reads, complete_names
 from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.writer import FILES_OF_A_RUN

@@ -20,6 +20,7 @@ from beaver_ftc.cli import catalogue
 from beaver_ftc.cli.main import Row
 from beaver_ftc.commands import registered
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.model import Expectation, Judged
 
 
 def test_options_of_all_commands(changed):
@@ -53,7 +54,7 @@ def beaver(monkeypatch, tmp_path):
             noting = _noting(name, result, given)
             monkeypatch.setattr(import_module(module), name, noting)
         done = commands.beaver(*asked.split(), cwd=tmp_path)
-        return done.returncode, done.stdout, given
+        return done.returncode, re.sub(r" at 0x[0-9a-f]+", "", done.stdout), given
 
     return run
 
@@ -76,12 +77,14 @@ def _shown(value):
         return str(value).replace(str(Path.cwd()), "HERE") if isinstance(value, Path) else value
     if isinstance(value, frozenset):
         return sorted(value)
-    if is_dataclass(value) and not hasattr(value, "name"):
-        return {field.name: _shown(getattr(value, field.name)) for field in fields(value)}
+    if is_dataclass(value) and (isinstance(value, Judged | Expectation) or not hasattr(value, "name")):
+        return _shown({field.name: getattr(value, field.name) for field in fields(value)})
     return getattr(value, "vanes", getattr(value, "name", "(object)"))
 
 
+CORES = {"studies__engine__workers__cores": 7}
 MATRIX = {
+    **CORES,
     "studies__matrix__fault_matrix__run_matrix": {"passed": False},
     "studies__matrix__fault_matrix__as_text": "m",
     "studies__matrix__pitch_lost__run_pitch_lost": {"passed": True},
@@ -91,10 +94,11 @@ POWER = {
     "studies__power__shown__run_power": {"a": 1},
     "studies__power__shown__as_text": "p",
     "studies__power__survey__contenders": lambda names: names,
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 CHANCES = {"studies__power__probabilities__answers": ["found soon"]}
 REPRODUCE = {
+    **CORES,
     "studies__reproduce__reproduction__reproduce": {"passed": False},
     "studies__reproduce__reproduction__as_text": "r",
 }
@@ -102,7 +106,7 @@ VERIFY = {
     "studies__verify__conduct": ["row"],
     "studies__verify__summarise": {"kept": False},
     "studies__verify__summary_text": "v",
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 
 
@@ -135,6 +139,7 @@ DERIVE = {
     "beaver_ftc_aircraft__derive__derived__text_of": "derived",
 }
 COMPARE = {
+    **CORES,
     "studies__compare__trial__of_set": lambda name, most: [SimpleNamespace(set=name)] * 2,
     "studies__compare__trial__of_sweep": lambda path, most: [SimpleNamespace(set="of-a-sweep")],
     "studies__compare__trial__entries_of": lambda schemes, laws: [*schemes, *laws],
@@ -149,12 +154,12 @@ COMPARE = {
     "studies__compare__tune__write_tuned": lambda document, folder: folder / "tuned.json",
     "studies__compare__tune__as_text": str,
     "studies__compare__tune__read_tuned": lambda path: {"read": str(path)},
-    "studies__compare__runs__write_runs": ["r"],
+    "studies__compare__runs__write_runs": [SimpleNamespace(name="r", document="r")],
     "studies__compare__runs__labels": lambda runs: ["first"],
     "studies__compare__runs__as_text": "runs",
     "beaver_ftc_logs__recorded__benchmark__run_benchmark": {"rec": 1},
     "beaver_ftc_logs__recorded__benchmark__as_text": "recorded",
-    "beaver_ftc_logs__recorded__benchmark__files_of": {"flights.png": b"picture"},
+    "beaver_ftc_logs__recorded__benchmark__result_files": {"flights.png": b"picture"},
     "beaver_ftc_logs__recorded__benchmark__update_page": None,
     "beaver_ftc_logs__recorded__other_days__run_other_days": {"o": 1},
 }
@@ -168,7 +173,7 @@ SWEEP = {
     "studies__sweep__campaign__run_sweep": {"s": 1},
     "studies__sweep__campaign__replay": {"passed": True, "folder": "f"},
     "studies__sweep__summary_page__summary_text": "swept",
-    "studies__sweep__summary_page__verdict": {"passed": False},
+    "studies__sweep__summary_page__verdict": Judged("many"),
     "results__verdict__verdict_text": "verdict",
     "results__junit__write_junit": None,
 }
@@ -188,48 +193,48 @@ MISMATCH = {
 }
 IDENTIFY = {
     "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
-    "beaver_ftc_logs__samples__load_flights": ["flight"],
-    "beaver_ftc_logs__identification__by_pressure": (
-        [SimpleNamespace(name="pressed", parts=2, notes=["long"])],
+    "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
+    "beaver_ftc_logs__identification__scale_commands_by_pressure": (
+        [SimpleNamespace(name="pressed", n_parts=2, notes=["long"])],
         "described",
     ),
     "beaver_ftc_logs__identification__identify": SimpleNamespace(
         identified={"i": 1}, settings=SimpleNamespace(model_dump=lambda: {"s": 2})
     ),
-    "beaver_ftc_logs__identification__summary": "fitted",
+    "beaver_ftc_logs__identification__identification_text": "fitted",
     "beaver_ftc_logs__model__as_text": "text",
     "studies__engine__store__write_whole": None,
-    "beaver_ftc_logs__pages__render_model": "page",
-    "beaver_ftc_logs__pages__check_page": None,
+    "beaver_ftc_logs__pages__render_identification": "page",
+    "beaver_ftc_logs__pages__refuse_to_replace_foreign_file": None,
 }
 DIAGNOSE = {
     "beaver_ftc_logs__detectors__check_detector": None,
     "beaver_ftc_logs__model__load_model": SimpleNamespace(vehicle="vehicle", groups="groups"),
-    "beaver_ftc_logs__samples__flights_of": ["one", "two"],
+    "beaver_ftc_logs__samples__stream_flights": ["one", "two"],
     "beaver_ftc_logs__findings__as_text": lambda each: each["flight"],
     "beaver_ftc_logs__detectors__diagnose_with": "rows",
-    "beaver_ftc_logs__findings__verdict_of": lambda of, *_: {"flight": of},
-    "beaver_ftc_logs__scoring__score": 0.5,
+    "beaver_ftc_logs__findings__verdict_document": lambda of, *_: {"flight": of},
+    "beaver_ftc_logs__scoring__score_diagnosis": 0.5,
     "beaver_ftc_logs__pages__write_diagnosis": "folder",
-    "beaver_ftc_logs__replay__is_own_log": lambda path: path.name == "log.parquet",
-    "beaver_ftc_logs__replay__replay": ("columns", {"flight": "ours"}),
+    "beaver_ftc_logs__replay__is_log_of_run": lambda path: path.name == "log.parquet",
+    "beaver_ftc_logs__replay__replay_run_log": ("columns", {"flight": "ours"}),
     "beaver_ftc_logs__replay__as_text": "replayed",
     "beaver_ftc_logs__pages__write_results": "folder",
 }
 SMALLEST = {
     "studies__smallest__survey__run_smallest": {"folder": "f"},
     "studies__smallest__survey__as_text": "s",
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 DECAY = {
     "studies__decay__survey__run_decay": {"folder": "f"},
     "studies__decay__survey__as_text": "d",
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 MECHANISMS = {
     "studies__mechanisms__command__run_mechanisms": {"folder": "f", "passed": False},
     "studies__mechanisms__command__as_text": "m",
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 EVIDENCE = RUN | {
     "beaver_ftc_assurance__evidence__plan__load_plan": lambda name: SimpleNamespace(
@@ -237,13 +242,13 @@ EVIDENCE = RUN | {
     ),
     "beaver_ftc_assurance__evidence__shown__run_plan": {"passed": False, "e": 1},
     "beaver_ftc_assurance__evidence__shown__as_text": "e",
-    "beaver_ftc_assurance__evidence__shown__as_expectations": ["A"],
+    "beaver_ftc_assurance__evidence__shown__as_expectations": (Expectation("A", True, None, "met"),),
     "beaver_ftc_assurance__evidence__shown__of_flight": lambda plan, name: (
         SimpleNamespace(name=name),
-        [{"name": of, "actual": f"met: {of}", "passed": of == "A"} for of in "AB"],
+        tuple(Expectation(of, of == "A", None, f"met: {of}") for of in "AB"),
     ),
     "results__junit__write_junit": None,
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 SEPARATE = {
     "beaver_ftc_assurance__separation__separate": lambda scenario, rate_deg_s: {"passed": rate_deg_s > 10.0},
@@ -253,11 +258,11 @@ SEPARATE = {
 GRADE = {
     "beaver_ftc_live__challenge__grading__grade": {"g": 1},
     "beaver_ftc_live__challenge__grading__as_text": "graded",
-    "studies__engine__workers__cores": 7,
+    **CORES,
 }
 RARE = {
     "studies__engine__workers__start_early": None,
-    "studies__engine__workers__cores": 7,
+    **CORES,
     "studies__sweep__rare__run_rare": {"r": 1},
     "studies__sweep__rare__as_text": "rare",
 }
@@ -330,7 +335,8 @@ ASKED = [
     ("compare --benchmark --set one --flights 3 --laws lqr --format json", COMPARE),
     ("compare --sweep s --schemes rls-monitor --workers 4 --leaderboard page --out o", COMPARE),
     ("compare --sweep s --schemes rls-monito --laws lq", COMPARE),
-    ("compare --tune --laws lqr --grade exact", COMPARE),
+    ("compare --tune --laws lqr --grade exact", COMPARE), ("compare --tune --draw 2", COMPARE),
+    ("compare --benchmark --draw 2", COMPARE),
     ("compare --tune --schemes augmented-ekf,none --trials 9 --seed 3 --flights 9 --format json", COMPARE),
     ("compare --benchmark --set one --schemes zhang2005 --tuned mine.json --format json", COMPARE),
     ("compare --tune --grade windy", COMPARE), ("compare --tune --laws lq", COMPARE),

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from beaver_ftc.cli.shared import Format
+from beaver_ftc.cli import Format
 from beaver_ftc.cli.sweep import Arguments, Backend, Objective, command
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.sweep.rare import Chains

@@ -42,12 +42,6 @@ def test_what_is_shown_is_the_file():
         assert load_sweep_text(_beaver("show", name).stdout, name=name).name == name
 
 
-def test_a_name_that_is_none_is_bad_input(tmp_path):
-    done = beaver("show", "elevator-partal-loss", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "did you mean elevator-partial-loss?" in done.stderr
-
-
 @pytest.mark.parametrize("like", [None, "rudder-stuck"])
 def test_a_new_scenario_is_one_and_replaces_nothing(tmp_path, like):
     options = ["--like", like] if like else []

@@ -1,27 +1,386 @@
-"""The command line: one module a command, and the options, answers and progress bars that they share."""
+"""The command line: one module a command, and the options, answers and progress bars that they share.
 
-from typing import TYPE_CHECKING
+An answer is text for people, or one JSON document for machines. On standard error a run or a study shows a
+bar on a terminal, once it takes long enough to be waited for, and a sweep a moving line; elsewhere, as in a
+log, both say a line now and then. Options that several commands share are declared once, and scenarios are
+checked before the first one flies.
+"""
 
-from beaver_ftc.public import lazily
+import contextlib
+import os
+import signal
+import sys
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from copy import copy
+from dataclasses import is_dataclass, replace
+from enum import StrEnum
+from functools import wraps
+from inspect import Parameter, Signature, signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, get_args
+
+import typer
+
+from beaver_ftc.commands import SCENARIO, ScenarioArgument, WorkersOption, complete_names, listed
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, split_docstring
+from beaver_ftc.documents.files import Document
 
 if TYPE_CHECKING:
-    from beaver_ftc.cli.shared import (
-        Document,
-        Format,
-        FormatOption,
-        JunitOption,
-        NoReportOption,
-        ResultsOption,
-        ScenarioArgument,
-        WorkersOption,
-        answer,
-        complain,
-        emit,
-        emit_json,
-        judged,
-        load_all,
-        progress_bar,
-        write_junit,
-    )
-else:
-    __getattr__, __dir__ = lazily(__name__)
+    from beaver_ftc.results.model import Judged
+    from beaver_ftc.scenario.schema import Scenario
+
+
+class Format(StrEnum):
+    """How a command answers on standard output."""
+
+    text = "text"
+    json = "json"
+
+
+# Whether this command was asked for a document, and whether it has given one.
+_document = {"asked": False, "given": False}
+
+
+def _remember(format: Format) -> Format:
+    _document["asked"], _document["given"] = format is Format.json, False
+    return format
+
+
+FormatOption = Annotated[
+    Format,
+    typer.Option("--format", help="Text for people, or one JSON document.", callback=_remember),
+]
+
+
+def emit(text: str) -> None:
+    """Write to standard output. A reader that went away is no error; a full disk is (SimulationFailed)."""
+    try:
+        sys.stdout.write(text if text.endswith("\n") else text + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_stdout()
+    except OSError as error:
+        _discard_stdout()
+        raise SimulationFailed(f"cannot write standard output: {error.strerror}") from error
+
+
+def emit_json(document: Any) -> None:
+    """Write one JSON document to standard output."""
+    from beaver_ftc.results.metrics import as_json
+
+    _document["given"] = True
+    emit(as_json(document))
+
+
+def answer(format: Format, document: Any, text: Callable[[], str]) -> None:
+    """What a command has found, in the form that was asked for."""
+    if format is Format.json:
+        emit_json(document)
+    else:
+        emit(text())
+
+
+def complain(text: str) -> None:
+    """Write a line to standard error."""
+    print(text, file=sys.stderr)
+
+
+def report(error: BeaverFtcError) -> int:
+    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
+    if os.environ.get("BEAVER_FTC_DEBUG"):
+        traceback.print_exception(error)
+    else:
+        complain(str(error))
+    return error.exit_code
+
+
+def report_last(error: BeaverFtcError) -> int:
+    """`report` what ends the command: who asked for a JSON document and has none gets the errors as one."""
+    status = report(error)
+    if _document["asked"] and not _document["given"]:
+        with suppress(SimulationFailed):  # standard output that cannot be written is no second error
+            emit_json({"errors": str(error).splitlines()})
+    return status
+
+
+def write_junit(runs: list["Judged"], path: Path | None) -> None:
+    """The verdicts as JUnit XML, where they are asked for."""
+    if path is not None:
+        from beaver_ftc.results import junit
+
+        junit.write_junit(runs, path)
+
+
+def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], "Judged"]) -> NoReturn:
+    """Fly what is judged as a whole, and end with its status: what fails is told in JSON and JUnit XML too.
+
+    what: the file it is of, where no verdict came to be.
+    fly: flies and answers; the verdict.
+    """
+    from beaver_ftc.results.model import Judged
+
+    began = time.perf_counter()
+    try:
+        verdict = fly()
+    except Exception as error:
+        failure = failure_of(error)
+        if format is Format.json:
+            emit_json({"passed": False, "errors": str(failure).splitlines()})
+        took_s = time.perf_counter() - began
+        write_junit([Judged(what, error=str(failure), took_s=took_s)], junit)
+        raise failure from failure.__cause__
+    write_junit([replace(verdict, took_s=time.perf_counter() - began)], junit)
+    raise typer.Exit(0 if verdict.passed else 1)
+
+
+def failure_of(error: Exception) -> BeaverFtcError:
+    """An error of ours as it is; another as a line for the user, with the error itself as its cause."""
+    if isinstance(error, BeaverFtcError):
+        return error
+    said = " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        text = "there is not enough memory for this" + (f": {said}" if said else "")
+    else:
+        text = f"unexpected {type(error).__name__}: {said} (BEAVER_FTC_DEBUG=1 shows where)"
+    failed = SimulationFailed(text)
+    failed.__cause__ = error
+    return failed
+
+
+def status_of_stop(error: Exception) -> int | None:
+    """The exit status where a signal stopped compiled code, whose caller sees it as a SystemError alone."""
+    cause = error.__cause__ if isinstance(error, SystemError) else None
+    if isinstance(cause, KeyboardInterrupt):
+        return 128 + signal.SIGINT
+    return cause.code if isinstance(cause, SystemExit) and isinstance(cause.code, int) else None
+
+
+def _discard_stdout() -> None:
+    """Keep the interpreter from failing over the same stream once more when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+PATIENCE_S = 1.0
+TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines
+FIRST_S = 5.0  # before the first line of a log
+
+
+@contextlib.contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """Yield what a run calls with how far it has come (0 to 1)."""
+    with contextlib.ExitStack() as stack:
+        begin = (lambda: _bar(label, stack)) if sys.stderr.isatty() else (lambda: _lines(label))
+        patience_s = PATIENCE_S if sys.stderr.isatty() else FIRST_S
+        started, advance = time.monotonic(), None
+
+        def show(done: float) -> None:
+            """Shows itself only once the run has taken longer than anyone waits without asking."""
+            nonlocal advance
+            if advance is None and time.monotonic() - started > patience_s:
+                advance = begin()
+            if advance:
+                advance(done)
+
+        yield show
+
+
+def _lines(label: str) -> Callable[[float], None]:
+    started, first, next_s = time.monotonic(), None, 0.0
+
+    def tell(done: float) -> None:
+        nonlocal first, next_s
+        first, passed_s = done if first is None else first, time.monotonic() - started
+        if passed_s >= next_s and done < 1.0:
+            next_s = passed_s + LOG_S
+            to_come = f", {_span((1.0 - done) / (done - first) * passed_s)} left" if done > first else ""
+            sys.stderr.write(f"{label}: {done:.0%}{to_come}\n")
+            sys.stderr.flush()
+
+    return tell
+
+
+def _bar(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    progress = stack.enter_context(Progress(console=Console(stderr=True), transient=True))
+    task = progress.add_task(label, total=1.0)
+    return lambda done: progress.update(task, completed=done)
+
+
+@contextlib.contextmanager
+def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
+    """Yield what a sweep calls with its counts (campaign.run_sweep)."""
+    progress = _Progress(name, sys.stderr.isatty())
+    try:
+        yield progress
+    finally:
+        progress.end()
+
+
+@contextlib.contextmanager
+def told() -> Iterator[Callable[[str], None]]:
+    """Yield what a study calls with a line on how far it has come: shown on a terminal only."""
+    shown = sys.stderr.isatty()
+
+    def tell(line: str) -> None:
+        if shown:
+            sys.stderr.write(f"\r\033[K{line}")
+            sys.stderr.flush()
+
+    yield tell
+    if shown:
+        sys.stderr.write("\r\033[K")
+
+
+class _Progress:
+    def __init__(self, name: str, terminal: bool) -> None:
+        self._name, self._terminal = name, terminal
+        self._last = self._begun = time.monotonic()
+        self._first: int | None = None
+        self._shown = ""
+
+    def __call__(self, counts: Counter[str]) -> None:
+        now = time.monotonic()
+        if self._first is None:
+            self._first, self._begun = counts["done"], now
+        if now - self._last < (TERMINAL_S if self._terminal else LOG_S):
+            return
+        self._last = now
+        self._show(self.line(counts, now))
+
+    def line(self, counts: Counter[str], now: float) -> str:
+        """Done, rate, time left, running detection rate."""
+        assert self._first is not None
+        done, total = counts["done"], counts["total"]
+        rate = (done - self._first) / max(now - self._begun, 1e-9)
+        to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
+        parts = [f"{self._name}: {done} of {total} flights, {_rate(rate)}/s{to_come}"]
+        if counts["faulted"]:
+            parts.append(f"detected {counts['detected'] / counts['faulted']:.1%}")
+        if counts["failed"]:
+            parts.append(f"{counts['failed']} not flown")
+        return ", ".join(parts)
+
+    def _show(self, line: str) -> None:
+        if self._terminal:
+            sys.stderr.write("\r" + line.ljust(len(self._shown)))
+            self._shown = line
+        else:
+            sys.stderr.write(line + "\n")
+        sys.stderr.flush()
+
+    def end(self) -> None:
+        """Leave the terminal's line clean."""
+        if self._shown:
+            sys.stderr.write("\r" + " " * len(self._shown) + "\r")
+            sys.stderr.flush()
+
+
+def _rate(per_s: float) -> str:
+    return f"{per_s:.0f}" if per_s >= 10.0 or per_s == 0.0 else f"{per_s:.2g}"
+
+
+def _span(seconds: float) -> str:
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+ScenariosArgument = Annotated[list[str], SCENARIO]
+ResultsOption = Annotated[Path, typer.Option(help="Folder for the results, with a folder for each scenario.")]
+NoReportOption = Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")]
+JunitOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
+]
+PluginOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="[NAME=]MODULE:CLASS",
+        help="Register a detector or law for this run, under NAME; if left out, MyClass is my-class.",
+    ),
+]
+
+
+def as_typer_reads(command: Callable[..., None], flies: bool) -> Callable[..., None]:
+    """A command as typer reads it: its parameters, or the fields of the dataclass that is its only one.
+
+    What the command's docstring says of one, `name: ...` at its end, is the help of that one. One that is not
+    annotated is an option; one that is true or false a switch, off if left out. A command that flies has
+    --plugin besides, whose classes are registered before it runs.
+    """
+    first = next(iter(signature(command).parameters.values())).annotation
+    record = first if isinstance(first, type) and is_dataclass(first) else None
+    own = signature(record or command).parameters
+    about, helps = split_docstring(command.__doc__, own)
+    parameters = [_annotated(each, helps.get(name)) for name, each in own.items()]
+    if flies:
+        parameters.append(Parameter("plugin", Parameter.KEYWORD_ONLY, default=None, annotation=PluginOption))
+
+    @wraps(command)
+    def called(plugin: Sequence[str] | None = None, **given: Any) -> None:
+        if plugin:
+            from beaver_ftc.plugins import register
+
+            for each in plugin:
+                register(each)
+        command(**given) if record is None else command(record(**given))
+
+    called.__doc__ = about
+    called.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    called.__annotations__ = {each.name: each.annotation for each in parameters}
+    return called
+
+
+def _annotated(parameter: Parameter, help: str | None) -> Parameter:
+    """A parameter as typer is to read it, with this help if any."""
+    kind, given = parameter.annotation, None
+    if hasattr(kind, "__metadata__"):
+        kind, given = get_args(kind)
+    switch = [f"--{parameter.name.replace('_', '-')}"] if kind is bool else []
+    option = copy(given) or typer.Option(*switch)
+    if help:
+        option.help = help
+    return parameter.replace(annotation=Annotated[kind, option])
+
+
+def load_all(names: list[str]) -> list["Scenario"]:
+    """The scenarios of these files or built-in names. Raises BadInput with every mistake in all of them."""
+    from beaver_ftc.scenario.schema import load_scenario
+
+    loaded: list[Scenario] = []
+    mistakes: list[str] = []
+    for name in names:
+        try:
+            loaded.append(load_scenario(name))
+            check_flyable(loaded[-1], name)
+        except BadInput as error:
+            mistakes.append(str(error))
+    given = [scenario.name for scenario in loaded]
+    twice = dict.fromkeys(name for name in given if given.count(name) > 1)
+    mistakes += [f"two scenarios are named {name}: one result would replace the other" for name in twice]
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
+    return loaded
+
+
+def check_flyable(scenario: "Scenario", name: str) -> None:
+    """Raise BadInput, in the form of any other mistake in a file, if the flight cannot be trimmed.
+
+    The trim is kept: the flight does not search for it again."""
+    from beaver_ftc.documents.validation import parse_document
+    from beaver_ftc.plant.conditions import find_trim
+    from beaver_ftc.scenario.builtin import read_file, resolve
+
+    try:
+        find_trim(scenario)
+    except BadInput as error:
+        path = resolve(name)
+        line = parse_document(read_file(path, name), str(path)).line(("initial",))
+        raise BadInput(f"{path}:{line}: initial: {error}") from None

@@ -1,5 +1,6 @@
 """Where the installed command begins: Ctrl-C ends it without a traceback, while it imports too."""
 
+import atexit
 import gc
 import os
 import signal
@@ -15,6 +16,7 @@ def main() -> NoReturn:
     """Run the command line. With one thread for linear algebra, unless the environment says otherwise: of
     small matrices threads wait for one another, and sums in another order have other last digits."""
     gc.set_threshold(COLLECTED_EVERY, 20, 100)
+    atexit.register(gc.freeze)  # a process that ends would look for cycles among all that it has
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from beaver_ftc.cli.main import main as run

@@ -6,7 +6,7 @@ from typing import Annotated, get_args
 
 import typer
 
-from beaver_ftc.cli.shared import Format, FormatOption, answer, complete_names, emit, emit_json
+from beaver_ftc.cli import Format, FormatOption, answer, complete_names, emit, emit_json
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, suggestion
 
@@ -28,7 +28,7 @@ def list_choices(
       beaver-ftc list --short
 
     kind: One kind only, e.g. aircraft.
-    short: Names alone.
+    short: Print names only.
     """
     available = _available()
     if kind is not None and kind not in available:
@@ -120,7 +120,7 @@ def show(
 ) -> None:
     """Print a built-in scenario, sweep or plan of evidence.
 
-    What is printed is a file that `run`, `sweep` or `evidence` takes.
+    `run`, `sweep` or `evidence` can read the printed file.
 
     Examples:
       beaver-ftc show elevator-partial-loss
@@ -142,16 +142,16 @@ def show(
 def schema(sweep: bool = False, plan: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 
-    Editors that know it complete and check a scenario as it is written.
+    With this schema, an editor completes and checks a scenario as you type.
 
     Examples:
       beaver-ftc schema
 
-    sweep: Of a sweep file instead of a scenario.
-    plan: Of a plan of evidence instead of a scenario.
+    sweep: The schema of a sweep file instead of a scenario.
+    plan: The schema of a plan of evidence instead of a scenario.
     """
     if plan:
-        from beaver_ftc.extensions import required
+        from beaver_ftc.plugins import required
 
         emit_json(required("plan_json_schema", "schema --plan")())
         return

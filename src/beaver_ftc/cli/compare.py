@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.shared import Format, FormatOption, answer, listed, progress_bar
-from beaver_ftc.commands import declare
+from beaver_ftc.cli import Format, FormatOption, answer, listed, progress_bar
+from beaver_ftc.commands import WorkersOption, declare
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 
 FILES = (
     "comparison.json", "comparison.png", "comparison.html", "runs.json", "runs.png", "runs.html",
@@ -28,13 +28,14 @@ class Options:
     grade: str | None = None
     trials: Annotated[int, typer.Option(min=5)] = 24
     seed: int = 1
+    draw: Annotated[int, typer.Option(min=0)] = 0
     tuned: Annotated[Path | None, typer.Option(metavar="FILE")] = None
     schemes: str | None = None
     laws: str | None = None
     only: Annotated[str | None, typer.Option("--set")] = None
     flights: Annotated[str | None, typer.Option(metavar="N|FOLDER")] = None
     other_days: bool = False
-    workers: Annotated[int, typer.Option(min=1)] = 2
+    workers: WorkersOption = None
     out: Path = Path("comparisons")
     leaderboard: Path | None = None
     format: FormatOption = Format.text
@@ -44,31 +45,31 @@ class Options:
 def command(options: Options) -> None:
     """Compare runs, or schemes and laws on the same flights.
 
-    It compares finished runs; or schemes and laws (--sweep, --benchmark); or detectors on recorded flights
-    (--flights FOLDER), each flight with a model identified without it. --tune chooses the parameters of
-    schemes and laws, ours, rivals and plug-ins alike, by one search on the calibration sets.
+    The command compares finished runs (RUN), schemes and laws (--sweep or --benchmark), or detectors on
+    recorded flights (--flights FOLDER). The model of a recorded flight is identified from the other flights.
+    --tune chooses the parameters of schemes and laws, by the same search for ours, rivals and plug-ins.
 
-    Writes comparison.json, .png and .html; for runs: runs.json, .png and .html; for recorded flights:
+    Files: comparison.json, .png and .html; for runs: runs.json, .png and .html; for recorded flights:
     flights.json, .md and .png; with --tune: tuned.json.
 
     The same command resumes an interrupted comparison on flights.
 
     runs: Result folders of `run`.
-    sweep: Compare on the flights of a sweep.
-    benchmark: Compare on the standard sets; update the leaderboard.
-    tune: Tune schemes and laws on the calibration sets.
-    grade: With --tune: of flights, exact, actuators or errors; all three without it.
-    trials: With --tune: of each method on each grade.
-    seed: With --tune: of the search.
-    tuned: With --sweep or --benchmark: fly with the values in this file instead of those shipped.
+    sweep: Compare on the flights of this sweep.
+    benchmark: Compare on the standard sets of flights, and update the ranking.
+    tune: Tune schemes and laws on the calibration flights.
+    grade: With --tune: only this grade of flights: exact, actuators or errors. Default: all three.
+    trials: With --tune: number of trials for each method and grade.
+    seed: With --tune: seed of the search.
+    draw: With --tune: number of the draw of calibration flights; from 1 on, also measure the gain.
+    tuned: With --sweep or --benchmark: parameters of this file instead of the shipped ones.
     schemes: Comma-separated schemes; all registered ones if neither schemes nor laws are listed.
     laws: Comma-separated laws; all registered ones if neither schemes nor laws are listed.
-    only: With --benchmark: one set.
-    flights: At most N flights of each sweep; or recorded flights.
-    other_days: With --flights FOLDER: on days made of the labelled flights.
-    workers: Processes.
+    only: With --benchmark: only this set.
+    flights: N: at most N flights of each sweep. FOLDER: recorded flights.
+    other_days: With --flights FOLDER: diagnose altered copies of the labelled flights (other days).
     out: Folder for the comparison.
-    leaderboard: With --benchmark or recorded flights: the page to update.
+    leaderboard: With --benchmark or recorded flights: the page with the ranking.
     """
     most, folder = _most_or_folder(options.flights)
     _refuse_contradictions(options, folder)
@@ -94,6 +95,7 @@ def _refuse_contradictions(options: Options, folder: Path | None) -> None:
     for option, with_it, allowed in (
         (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
         (options.grade is not None, options.tune, "--grade: allowed: only with --tune"),
+        (options.draw != 0, options.tune, "--draw: allowed: only with --tune"),
         (
             options.tuned is not None,
             options.sweep is not None or options.benchmark,
@@ -120,7 +122,7 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc.studies.compare.runs import as_text, labels, write_runs
 
     runs = write_runs(out, folders)
-    document = {"runs": dict(zip(labels(runs), runs, strict=True))}
+    document = {"runs": dict(zip(labels(runs), (run.document for run in runs), strict=True))}
     answer(format, document, lambda: f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
 
 
@@ -130,6 +132,7 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
     from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
     from beaver_ftc.studies.compare.tune import read_tuned
+    from beaver_ftc.studies.engine.workers import cores
 
     if options.sweep is not None:
         cases = of_sweep(options.sweep, most=most)
@@ -144,7 +147,8 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         _chosen("--laws", LAWS, options.laws, LAW, alone=options.schemes is None),
     )
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
-        document = run_comparison(options.out, name, cases, entries, options.workers, progress, chosen)
+        workers = options.workers or cores()
+        document = run_comparison(options.out, name, cases, entries, workers, progress, chosen)
     folder = options.out / name
     answer(
         options.format,
@@ -180,13 +184,15 @@ def _tune(options: Options, most: int | None) -> None:
     from beaver_ftc.plugins import DETECTORS, LAWS, registered
     from beaver_ftc.studies.compare.trial import STATISTICAL
     from beaver_ftc.studies.compare.tune import as_text, methods_of, tune, write_tuned
+    from beaver_ftc.studies.engine.workers import cores
 
     everything = options.schemes is None and options.laws is None
     schemes = [*registered(DETECTORS), STATISTICAL] if everything else _named("--schemes", options.schemes)
     laws = list(registered(LAWS)) if everything else _named("--laws", options.laws)
     methods = methods_of(schemes, laws, _grades(options.grade))
     with progress_bar(f"{len(methods)} methods and grades, {options.trials} trials each") as progress:
-        document = tune(methods, options.trials, options.seed, most, options.workers, progress)
+        workers = options.workers or cores()
+        document = tune(methods, options.trials, options.seed, most, workers, progress, options.draw)
     path = write_tuned(document, options.out)
     answer(options.format, document, lambda: f"{as_text(document)}\n\nwritten: {path}")
 
@@ -200,10 +206,10 @@ def _named(option: str, names: str | None) -> list[str]:
 
 
 def _grades(given: str | None) -> list[str]:
-    from beaver_ftc.diagnosis.rivals import GRADES
+    from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 
     if given is None:
-        return list(GRADES)
-    if given not in GRADES:
-        raise BadInput(f"compare: --grade {given[:50]!r}, allowed: {', '.join(GRADES)}")
+        return list(FLIGHT_GRADES)
+    if given not in FLIGHT_GRADES:
+        raise BadInput(f"compare: --grade {given[:50]!r}, allowed: {', '.join(FLIGHT_GRADES)}")
     return [given]

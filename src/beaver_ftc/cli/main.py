@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from beaver_ftc import __version__, commands
-from beaver_ftc.cli.shared import (
+from beaver_ftc.cli import (
     Format,
     FormatOption,
     answer,
@@ -27,7 +27,7 @@ from beaver_ftc.cli.shared import (
     status_of_stop,
 )
 from beaver_ftc.commands import Reporter, StudyCommand
-from beaver_ftc.extensions import loaded
+from beaver_ftc.plugins import loaded
 
 
 def command_of(study: type[StudyCommand]) -> Callable[..., None]:

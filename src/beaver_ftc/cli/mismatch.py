@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from beaver_ftc.cli.shared import (
+from beaver_ftc.cli import (
     Document,
     Format,
     FormatOption,

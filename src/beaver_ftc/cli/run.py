@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.shared import (
+from beaver_ftc.cli import (
     Document,
     Format,
     FormatOption,
@@ -30,7 +30,7 @@ from beaver_ftc.cli.shared import (
     write_junit,
 )
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
@@ -80,12 +80,14 @@ def command(options: Options) -> None:
     figures: Formats of the figures, comma-separated: png, pdf, svg; pdf and svg are sized for papers.
     """
     formats = _formats(options.figures)
+    from beaver_ftc.results.model import Judged
+
     try:
         loaded = load_all(options.scenarios)
     except BadInput as error:
         if options.format is Format.json:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
-        write_junit([{"scenario": "scenarios", "error": str(error)}], options.junit)
+        write_junit([Judged("scenarios", error=str(error))], options.junit)
         raise
     with _painters(not options.no_report) as at_work:
         status = _run_all(loaded, options, (at_work, formats))
@@ -128,27 +130,29 @@ def _shown(given: str | None) -> "Prepare | None":
 
 def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
-    from beaver_ftc.results.model import Metrics
+    from beaver_ftc.results.model import Judged, Metrics
     from beaver_ftc.results.verdict import verdict_text
 
     prepare = _shown(options.flightgear)
-    runs, took_s, status = [], [], 0
+    runs, judged, status = [], [], 0
     for scenario in scenarios:
         began = time.perf_counter()
         try:
             document = _run_one(scenario, options, prepare, drawn)
         except Exception as error:
             failure = failure_of(error)
+            took_s = time.perf_counter() - began
             status = max(status, report(failure))
             runs.append({"scenario": scenario.name, "error": str(failure)})
+            judged.append(Judged(scenario.name, error=str(failure), took_s=took_s))
             continue
-        finally:
-            took_s.append(time.perf_counter() - began)
+        took_s, found = time.perf_counter() - began, Metrics.of(document)
         runs.append(document)
-        status = max(status, 0 if document["passed"] else 1)
+        judged.append(replace(found.judged, took_s=took_s))
+        status = max(status, 0 if found.passed else 1)
         if options.format is Format.text:
-            emit(verdict_text(Metrics.of(document), document["folder"], colour=sys.stdout.isatty()))
-    write_junit([run | {"took_s": each} for run, each in zip(runs, took_s, strict=True)], options.junit)
+            emit(verdict_text(found, document["folder"], colour=sys.stdout.isatty()))
+    write_junit(judged, options.junit)
     if options.format is Format.json:
         first = runs[0] if len(runs) == 1 else {}
         emit_json(first | {"passed": status == 0, "runs": runs})

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.cli.shared import (
+from beaver_ftc.cli import (
     Document,
     Format,
     FormatOption,
@@ -18,7 +18,7 @@ from beaver_ftc.cli.shared import (
 )
 from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.extensions import required
+from beaver_ftc.plugins import required
 
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")  # as of a scenario
 _NAME_LINE = re.compile(r"^name:.*$", re.MULTILINE)
@@ -67,14 +67,15 @@ def validate(
 
 
 def _check(file: str) -> Document:
-    from beaver_ftc.scenario.builtin import has_key
+    from beaver_ftc.scenario.builtin import has_key, is_sweep
     from beaver_ftc.scenario.schema import load_scenario
-    from beaver_ftc.scenario.sweeps import is_sweep, load_sweep
 
     errors: list[str] = []
     warnings: list[str] = []
     try:
         if is_sweep(file):
+            from beaver_ftc.scenario.sweeps import load_sweep
+
             load_sweep(file)
         elif has_key(file, "plan", "requirements"):
             required("load_plan", file)(file)
@@ -96,7 +97,7 @@ def new(
 ) -> None:
     """Write NAME.yaml, a scenario to begin with, or sample logs.
 
-    It flies as it is; an existing file is never replaced.
+    The file flies without changes. An existing file is never replaced.
 
     Examples:
       beaver-ftc new my-case
@@ -104,10 +105,10 @@ def new(
       beaver-ftc new my-logs --log
 
     name: Name of the scenario, and of its file.
-    like: Begin with a built-in one.
+    like: Copy this built-in scenario.
     log: Write a folder NAME with two recorded flights and their vehicle file, to try `identify` and
       `diagnose` on.
-    out: Folder of the new file; made if need be.
+    out: Folder of the new file.
     """
     if not _NAME.fullmatch(name):
         raise BadInput(f"new: {name[:100]!r} is no name, allowed: letters, digits, - and _, at most 100")

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from beaver_ftc.cli.shared import (
-    Document,
+from beaver_ftc.cli import (
     Format,
     FormatOption,
     JunitOption,
@@ -25,6 +24,7 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
+    from beaver_ftc.results.model import Judged
     from beaver_ftc.scenario.sweeps import Sweep
     from beaver_ftc.studies.sweep.campaign import Options
     from beaver_ftc.studies.sweep.one_flight import Keep
@@ -63,7 +63,7 @@ def command(arguments: Arguments) -> None:
     it. With --format json: the summary.
 
     file: A sweep file, or the name of a built-in sweep.
-    out: Folder for the results, one folder a sweep in it.
+    out: Folder for the results. It gets a folder for each sweep.
     workers: Parallel processes or Ray tasks. Default: one per core.
     backend: Local processes, or a Ray cluster.
     ray_address: Ray cluster to join, e.g. auto. Default: one on this machine.
@@ -85,7 +85,7 @@ def command(arguments: Arguments) -> None:
         _rare(load_sweep(arguments.file), arguments)
         return
 
-    def fly() -> Document:
+    def fly() -> "Judged":
         sweep = load_sweep(arguments.file)
         return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
 
@@ -94,7 +94,7 @@ def command(arguments: Arguments) -> None:
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """How likely an expectation is not met: a number and its interval."""
-    from beaver_ftc.cli.shared import told
+    from beaver_ftc.cli import told
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.sweep.rare import as_text, run_rare
 
@@ -140,8 +140,8 @@ def _keep(flights: str, certified: bool = False) -> "Keep":
         ) from None
 
 
-def _fly(sweep: "Sweep", options: "Options", format: Format) -> Document:
-    from beaver_ftc.cli.shared import live_progress
+def _fly(sweep: "Sweep", options: "Options", format: Format) -> "Judged":
+    from beaver_ftc.cli import live_progress
     from beaver_ftc.studies.sweep.campaign import named_for, run_sweep
     from beaver_ftc.studies.sweep.summary_page import summary_text, verdict
 
@@ -152,15 +152,15 @@ def _fly(sweep: "Sweep", options: "Options", format: Format) -> Document:
     return verdict(document)
 
 
-def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> Document:
+def _replay(sweep: "Sweep", options: "Options", index: int, format: Format) -> "Judged":
     from beaver_ftc.results.model import Metrics
     from beaver_ftc.results.verdict import verdict_text
     from beaver_ftc.studies.sweep.campaign import replay
 
-    document: Document = replay(sweep, options, index)
+    document = replay(sweep, options, index)
     folder, found = document["folder"], Metrics.of(document)
     answer(format, document, lambda: verdict_text(found, folder, sys.stdout.isatty()))
-    return document
+    return found.judged
 
 
 @contextmanager

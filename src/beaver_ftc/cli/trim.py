@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from beaver_ftc.cli.shared import Format, FormatOption, answer
+from beaver_ftc.cli import Format, FormatOption, answer
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.trim import TrimPoint
@@ -39,14 +39,14 @@ class Condition:
 def command(condition: Condition) -> None:
     """Print a trimmed flight condition.
 
-    Steady straight flight, wings level; what cannot be trimmed is bad input (2). What is not given
-    is the scenario's, or else its default: 45 m/s at 1828.8 m, 1800 rpm, 20 inHg, no flap.
-    Engine and flap are those of an aircraft that has them.
+    The flight is steady and straight, with wings level. If there is no such trim, the exit status is 2.
+    An omitted option has the value of the scenario, or the default: 45 m/s at 1828.8 m, 1800 rpm,
+    20 inHg, no flap. Engine and flap apply to an aircraft that has them.
 
     Examples:
       beaver-ftc trim --airspeed-mps 40 --altitude-m 1000
 
-    scenario: Take the flight condition from it.
+    scenario: Scenario with the flight condition.
     airspeed_mps: True airspeed, m/s.
     altitude_m: Altitude, m.
     engine_rpm: Engine speed, rpm.

@@ -1,4 +1,4 @@
-"""What the bank of filters is given: its hypotheses, what of a flight may differ from the model, the noise.
+"""The inputs of the bank of filters: its hypotheses, how a flight may differ from the model, the noise.
 
 The hypotheses: healthy, one group of surfaces at a level, two at once, an unknown offset, or that nothing
 answers the commands at all. What is likelier is said by the model's settings: levels seen in labelled
@@ -18,195 +18,257 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.trust import claimed
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.trust import groups_with_known_effect
 
-HEALTHY, GROUP, PAIR, UNKNOWN, IDLE = range(5)
-_PAIR_SHARE = 0.02
-_UNKNOWN_SHARE = 0.05
-_IDLE_SHARE = 0.02
-_PAIR_LEVELS = (0.25, 0.5, 0.75)
-_HEALTHY_AT_FIRST, _IDLE_AT_FIRST = 0.7, 0.2
-_LEAST_SCALE, _LARGEST_SCALE = 0.3, 6.0
-_FARTHEST = 30.0
-"""Of a whitened flight: a fault is not whitened by what was before it, for a fraction of a second."""
-
-
-Hypothesis = tuple[Floats, int, float, Floats]  # a row of Bank: effectiveness, kind, weight, offset
+HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
+_PAIR_LOSS_CHANGE_SHARE = 0.02
+_UNKNOWN_OFFSET_CHANGE_SHARE = 0.05
+_NO_RESPONSE_CHANGE_SHARE = 0.02
+_PAIR_EFFECTIVENESS_LEVELS = (0.25, 0.5, 0.75)
+_PRIOR_HEALTHY_PROBABILITY, _PRIOR_NO_RESPONSE_PROBABILITY = 0.7, 0.2
+_MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE = 0.3, 6.0
+_MAX_SQUARED_RESIDUAL = 30.0
+"""For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
 
-class Bank(NamedTuple):
-    """H hypotheses. effectiveness (H, G); kind (H,); weight (H,) share of the changes that lead there, the
-    first is healthy; offset (H, 3) variance of the rates' offset that comes with it, (rad/s)2; start (H,)
-    probability of each before the flight; change: probability of a change in a sample; own (H, G): share of
-    each group's answer that its own gain is of, what is left of it, or all where a law's answer to noise adds
-    to what a surface seems to do."""
+HypothesisRow = tuple[
+    Floats, int, float, Floats
+]  # a row of HypothesisBank: effectiveness, kind, weight, offset
+
+
+class HypothesisBank(NamedTuple):
+    """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands.
+
+    effectiveness (H, G); hypothesis_kind (H,); change_share (H,): share of the changes that lead to the
+    hypothesis; rate_offset_variance (H, 3): of the offset of the rates that comes with it, (rad/s)2;
+    prior_probability (H,): probability before the flight; change_probability: of a change in a sample;
+    own_gain_share (H, G): share of a group's healthy response that the group's own gain multiplies: the
+    effectiveness, or 1 where the response of a control law to noise adds to the effect of a surface.
+    """
 
     effectiveness: Floats
-    kind: np.ndarray
-    weight: Floats
-    offset: Floats
-    start: Floats
-    change: float
-    own: Floats
+    hypothesis_kind: np.ndarray
+    change_share: Floats
+    rate_offset_variance: Floats
+    prior_probability: Floats
+    change_probability: float
+    own_gain_share: Floats
 
     @property
-    def idle(self) -> int:
-        """The hypothesis that nothing answers the commands: on the ground, or everything lost."""
-        return len(self.kind) - 1
+    def no_response_index(self) -> int:
+        """Index of the hypothesis that nothing answers the commands: on the ground, or everything lost."""
+        return len(self.hypothesis_kind) - 1
 
     @property
-    def faults(self) -> np.ndarray:
+    def is_fault(self) -> np.ndarray:
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
-        return np.asarray((self.kind == GROUP) | (self.kind == PAIR))
+        return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
 
-    def faulty(self, group: int) -> np.ndarray:
+    def is_fault_of(self, group: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
-        return np.asarray((self.effectiveness[:, group] < 1.0) & (self.kind != IDLE))
+        return np.asarray((self.effectiveness[:, group] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
 
 
-def bank_of(model: Model) -> Bank:
+def build_hypothesis_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model: none of a group of which nothing is said, where something is said of any."""
-    count, settings = len(model.groups), model.settings
-    told = claimed(model)
-    known = [group for group in range(count) if told[group] or not any(told)]
-    rows: list[Hypothesis] = [(np.ones(count), HEALTHY, settings.repair_share, np.zeros(3))]
-    surfaces = sum(len(model.groups[group]) for group in known)
-    stuck = "stuck" in model.vehicle.faults
-    pairs = len(known) > 1
-    single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_UNKNOWN_SHARE if stuck else 0.0)
-    for group in known:
-        levels, weights = _levels(model, group)
-        share = single * len(model.groups[group]) / surfaces / len(model.vehicle.faults)
-        for offset in _offsets(model, group):
-            for level, weight in zip(levels, weights, strict=True):
-                rows.append((_with(count, {group: level}), GROUP, share * weight, offset))
-    rows += _pairs(count, known)
-    if stuck:
-        unknown = np.diag(np.array(model.noise)) * settings.jam_sd**2
-        rows.append((np.ones(count), UNKNOWN, _UNKNOWN_SHARE, unknown))
-    rows.append((np.zeros(count), IDLE, _IDLE_SHARE, np.zeros(3)))
-    effectiveness, kind, weight, offset = (np.array(column) for column in zip(*rows, strict=True))
-    weight[1:] *= (1.0 - settings.repair_share) / weight[1:].sum()
-    change = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    own = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
-    return Bank(effectiveness, kind, weight, offset, _at_first(kind, weight), change, own)
+    n_groups, settings = len(model.groups), model.settings
+    has_known_effect = groups_with_known_effect(model)
+    known_groups = [
+        group for group in range(n_groups) if has_known_effect[group] or not any(has_known_effect)
+    ]
+    rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
+    n_known_surfaces = sum(len(model.groups[group]) for group in known_groups)
+    may_be_stuck = "stuck" in model.vehicle.faults
+    may_be_pairs = len(known_groups) > 1
+    single_fault_share = (
+        1.0
+        - (_PAIR_LOSS_CHANGE_SHARE if may_be_pairs else 0.0)
+        - (_UNKNOWN_OFFSET_CHANGE_SHARE if may_be_stuck else 0.0)
+    )
+    for group in known_groups:
+        levels, level_shares = _effectiveness_levels(model, group)
+        group_share = (
+            single_fault_share * len(model.groups[group]) / n_known_surfaces / len(model.vehicle.faults)
+        )
+        for offset_variance in _rate_offset_variances(model, group):
+            for level, change_share in zip(levels, level_shares, strict=True):
+                rows.append(
+                    (
+                        _group_effectiveness_row(n_groups, {group: level}),
+                        GROUP_LOSS,
+                        group_share * change_share,
+                        offset_variance,
+                    )
+                )
+    rows += _pair_hypotheses(n_groups, known_groups)
+    if may_be_stuck:
+        unknown_offset_variance = np.diag(np.array(model.noise)) * settings.jam_sd**2
+        rows.append(
+            (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_CHANGE_SHARE, unknown_offset_variance)
+        )
+    rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_CHANGE_SHARE, np.zeros(3)))
+    effectiveness, hypothesis_kind, change_share, offset_variance = (
+        np.array(column) for column in zip(*rows, strict=True)
+    )
+    change_share[1:] *= (1.0 - settings.repair_share) / change_share[1:].sum()
+    change_probability = settings.changes_per_hour / (3600.0 * model.rate_hz)
+    own_gain_share = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    return HypothesisBank(
+        effectiveness,
+        hypothesis_kind,
+        change_share,
+        offset_variance,
+        _prior_probabilities(hypothesis_kind, change_share),
+        change_probability,
+        own_gain_share,
+    )
 
 
-def _with(count: int, levels: dict[int, float]) -> Floats:
-    row = np.ones(count)
-    for group, level in levels.items():
+def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) -> Floats:
+    row = np.ones(n_groups)
+    for group, level in level_of_group.items():
         row[group] = level
     return row
 
 
-def _levels(model: Model, group: int) -> tuple[Floats, Floats]:
+def _effectiveness_levels(model: Model, group: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    seen = settings.levels.get("+".join(model.groups[group]), [])
-    even = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
-    levels = np.unique(np.round(np.concatenate([even, np.array(seen, dtype=float)]), 6))
-    likelier = np.isin(levels, np.round(seen, 6))
-    if not likelier.any() or likelier.all():
+    labelled_levels = settings.levels.get("+".join(model.groups[group]), [])
+    even_levels = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
+    levels = np.unique(np.round(np.concatenate([even_levels, np.array(labelled_levels, dtype=float)]), 6))
+    is_labelled_level = np.isin(levels, np.round(labelled_levels, 6))
+    if not is_labelled_level.any() or is_labelled_level.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
-    share = settings.level_share
-    return levels, np.where(likelier, share / likelier.sum(), (1.0 - share) / (~likelier).sum())
+    labelled_level_share = settings.level_share
+    return levels, np.where(
+        is_labelled_level,
+        labelled_level_share / is_labelled_level.sum(),
+        (1.0 - labelled_level_share) / (~is_labelled_level).sum(),
+    )
 
 
-def _offsets(model: Model, group: int) -> list[Floats]:
+def _rate_offset_variances(model: Model, group: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, response, noise = model.arrays()
-    total = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
-    share = np.clip(total / max(total.max(), TINY), 0.3, 1.0)
-    kinds = {"loss": np.zeros(3), "stuck": np.diag(noise) * (model.settings.jam_sd * share) ** 2}
-    return [kinds[kind] for kind in model.vehicle.faults]
+    _, _, response, noise = model.coefficient_arrays()
+    response_size = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
+    axis_share = np.clip(response_size / max(response_size.max(), MIN_DIVISOR), 0.3, 1.0)
+    variance_of_fault_kind = {
+        "loss": np.zeros(3),
+        "stuck": np.diag(noise) * (model.settings.jam_sd * axis_share) ** 2,
+    }
+    return [variance_of_fault_kind[kind] for kind in model.vehicle.faults]
 
 
-def _pairs(count: int, known: list[int]) -> list[Hypothesis]:
+def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
-    both = list(product(combinations(known, 2), product(_PAIR_LEVELS, repeat=2)))
+    groups_and_levels = list(
+        product(combinations(known_groups, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
+    )
     return [
-        (_with(count, dict(zip(groups, levels, strict=True))), PAIR, _PAIR_SHARE / len(both), np.zeros(3))
-        for groups, levels in both
+        (
+            _group_effectiveness_row(n_groups, dict(zip(groups, levels, strict=True))),
+            PAIR_LOSS,
+            _PAIR_LOSS_CHANGE_SHARE / len(groups_and_levels),
+            np.zeros(3),
+        )
+        for groups, levels in groups_and_levels
     ]
 
 
-def _at_first(kind: np.ndarray, weight: Floats) -> Floats:
+def _prior_probabilities(hypothesis_kind: np.ndarray, change_share: Floats) -> Floats:
     """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
-    faults = (kind != HEALTHY) & (kind != IDLE)
-    start = weight * (1.0 - _HEALTHY_AT_FIRST - _IDLE_AT_FIRST) / weight[faults].sum()
-    start[0] = _HEALTHY_AT_FIRST
-    start[-1] = _IDLE_AT_FIRST
-    return np.asarray(start)
+    is_other = (hypothesis_kind != HEALTHY) & (hypothesis_kind != NO_RESPONSE)
+    prior_probability = (
+        change_share
+        * (1.0 - _PRIOR_HEALTHY_PROBABILITY - _PRIOR_NO_RESPONSE_PROBABILITY)
+        / change_share[is_other].sum()
+    )
+    prior_probability[0] = _PRIOR_HEALTHY_PROBABILITY
+    prior_probability[-1] = _PRIOR_NO_RESPONSE_PROBABILITY
+    return np.asarray(prior_probability)
 
 
-class Adaptation(NamedTuple):
-    """Of the N = 4 + G states: trim (3,) rad/s a sample, gain, own gain of each group.
+class AdaptationLimits(NamedTuple):
+    """Limits of the adaptation of the N = 4 + G states: trim (3,) rad/s a sample, common gain, own gain of
+    each group.
 
-    mean (N,) and covariance (N, N) before the flight; bound (N,) on the distance from the mean; keep (N,)
-    share of that distance left a sample later; walk (N,) variance added a sample.
+    initial_mean (N,) and initial_covariance (N, N) are those before the flight; max_deviation (N,): largest
+    distance from the mean; deviation_retention (N,): share of that distance that remains a sample later;
+    walk_variance (N,): variance added a sample.
     """
 
-    mean: Floats
-    covariance: Floats
-    bound: Floats
-    keep: Floats
-    walk: Floats
+    initial_mean: Floats
+    initial_covariance: Floats
+    max_deviation: Floats
+    deviation_retention: Floats
+    walk_variance: Floats
 
 
-def adaptation_of(model: Model) -> Adaptation:
+def build_adaptation_limits(model: Model) -> AdaptationLimits:
     """The bounds of adaptation that a model's settings say."""
-    settings, groups = model.settings, len(model.groups)
-    _, _, response, noise = model.arrays()
-    variance = np.diag(noise)
-    shift = response.sum(axis=1) * settings.trim_shift
-    covariance = np.zeros((4 + groups, 4 + groups))
-    covariance[:3, :3] = np.diag(variance * settings.trim_sd**2) + shift.T @ shift
+    settings, n_groups = model.settings, len(model.groups)
+    _, _, response, noise = model.coefficient_arrays()
+    noise_variance = np.diag(noise)
+    trim_shift = response.sum(axis=1) * settings.trim_shift
+    covariance = np.zeros((4 + n_groups, 4 + n_groups))
+    covariance[:3, :3] = np.diag(noise_variance * settings.trim_sd**2) + trim_shift.T @ trim_shift
     covariance[3, 3] = settings.gain_sd**2
-    covariance[range(4, 4 + groups), range(4, 4 + groups)] = settings.own_gain_sd**2 + _unknown(model)
-    times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * groups)
-    keep = np.exp(-1.0 / (model.rate_hz * times_s))
-    walk = (1.0 - keep**2) * np.diag(covariance)
-    walk[:3] = variance * np.array(settings.trim_walk) ** 2
-    reach = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + groups))
-    mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * groups)
-    return Adaptation(mean, covariance, np.sqrt(np.diag(covariance)) * reach, keep, walk)
+    covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
+        settings.own_gain_sd** 2 + _excess_gain_variance(model)
+    )
+    return_times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * n_groups)
+    retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
+    walk_variance = (1.0 - retention**2) * np.diag(covariance)
+    walk_variance[:3] = noise_variance * np.array(settings.trim_walk) ** 2
+    max_deviation_sd = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n_groups))
+    mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
+    return AdaptationLimits(
+        mean, covariance, np.sqrt(np.diag(covariance)) * max_deviation_sd, retention, walk_variance
+    )
 
 
-def _unknown(model: Model) -> Floats:
+def _excess_gain_variance(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
-    known = np.zeros(len(model.groups))
+    gain_variance = np.zeros(len(model.groups))
     if model.fitted is not None and model.fitted.gain_sd:
-        known += np.array(model.fitted.gain_sd) ** 2
-    return np.maximum(known - model.settings.level_step**2, 0.0)
+        gain_variance += np.array(model.fitted.gain_sd) ** 2
+    return np.maximum(gain_variance - model.settings.level_step**2, 0.0)
 
 
-class Noise(NamedTuple):
-    """What of a sample is noise.
+class ResidualNoise(NamedTuple):
+    """The noise of a sample.
 
-    constant (3,) of the model, rad/s; covariance (3, 3) of a sample, (rad/s)2; power: share of a white
-    residual's information in this one; tail: degrees of freedom of its t distribution; memory in samples, and
-    least and largest value, of the running scale of the covariance; farthest: square of a residual from
-    which on a sample tells nothing more; wider: how many times the covariance is that of residuals.
+    intercept_rad_s (3,): of the model; covariance (3, 3) of a sample, (rad/s)2; information_share:
+    information of a residual over that of a white one; degrees_of_freedom: of its t distribution;
+    memory_samples, min_scale, max_scale: memory and limits of the running scale of the covariance;
+    max_squared_residual: squared standardised residual above which a sample carries no more information;
+    variance_factor: the covariance over that of the residuals.
     """
 
-    constant: Floats
+    intercept_rad_s: Floats
     covariance: Floats
-    power: float
-    tail: float
-    memory: float
-    least: float
-    largest: float
-    farthest: float
-    wider: float
+    information_share: float
+    degrees_of_freedom: float
+    memory_samples: float
+    min_scale: float
+    max_scale: float
+    max_squared_residual: float
+    variance_factor: float
 
 
-def noise_of(model: Model, colour: Sequence[float] = ()) -> Noise:
+def build_residual_noise(model: Model, noise_average: Sequence[float] = ()) -> ResidualNoise:
     """The noise that a model's settings say, of a colour."""
-    settings, farthest = model.settings, _FARTHEST if len(model.noise_predictor(colour)) else np.inf
-    memory = settings.noise_memory_s * model.rate_hz
-    return Noise(
-        model.constant(colour), model.arrays()[3], settings.power, settings.tail, memory,
-        _LEAST_SCALE, _LARGEST_SCALE, farthest, model.noise_factor(colour),
+    settings, max_squared_residual = (
+        model.settings,
+        _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_average)) else np.inf,
+    )
+    memory_samples = settings.noise_memory_s * model.rate_hz
+    return ResidualNoise(
+        model.whitened_intercept(noise_average), model.coefficient_arrays()[3], settings.power, settings.tail,
+        memory_samples,
+        _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
+        model.noise_inflation(noise_average),
     )  # fmt: skip

@@ -18,10 +18,10 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
-from beaver_ftc_logs.diagnose import Rows
-from beaver_ftc_logs.recording import Floats, Recording, nearest_ten
-from beaver_ftc_logs.samples import Samples, at_samples, in_si, sample
-from beaver_ftc_logs.stepped import Stepped, declared_of, rows_of, step_through
+from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_at
+from beaver_ftc_logs.stepped import ReplayedVerdicts, declared_errors, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Quantity, Vehicle
 
 if TYPE_CHECKING:
@@ -29,315 +29,396 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 
-_FASTEST_HZ, _SLOWEST_HZ = 1000.0, 20.0
-_JITTER = 0.1
-_FEW = 50
-_DENSITY = (0.2, 1.6)
-_BEYOND = 1.1
-_AT_ONCE_S = 1.0
-_ATTITUDE = ("roll", "pitch", "yaw")
+_MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
+_MAX_STEP_JITTER = 0.1
+_MIN_STRETCH_SAMPLES = 50
+_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
+_MAX_DEFLECTION_FACTOR = 1.1
+_UNEXPLAINED_FROM_START_S = 1.0
+_ATTITUDE_ANGLES = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
-class Known:
+class DiagnosedAircraft:
     """The aircraft whose flights are diagnosed, and what its diagnosis is told, as `Diagnosis` takes it."""
 
     aircraft: Aircraft
-    declared: Document = field(default_factory=dict)
+    declared_errors: Document = field(default_factory=dict)
 
 
-def known(reference: str, scenario: str | None = None) -> Known:
+def load_aircraft(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
     """The aircraft of a name, and the errors that a scenario (file or name) declares: the published ones
     where None. Raises BadInput where the scenario is of another aircraft."""
     from beaver_ftc.aircraft import UnknownAircraft
     from beaver_ftc.scenario import find_aircraft, load_scenario
 
     try:
-        aircraft = find_aircraft(reference, Path.cwd())
+        aircraft = find_aircraft(aircraft_name, Path.cwd())
     except UnknownAircraft as error:
         raise BadInput(f"--aircraft: {error}") from None
     if scenario is None:
-        return Known(aircraft)
-    given = load_scenario(scenario)
-    if given.fdi.sensor_monitor == "always":
+        return DiagnosedAircraft(aircraft)
+    loaded_scenario = load_scenario(scenario)
+    if loaded_scenario.fdi.sensor_monitor == "always":
         says = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: auto, never"
         raise BadInput(f"--scenario {scenario}: {says}")
-    if given.fdi.scheme == "none":
+    if loaded_scenario.fdi.scheme == "none":
         says = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
         raise BadInput(f"--scenario {scenario}: {says}")
-    if given.airframe.name != aircraft.name:
-        says = f"flies {given.airframe.name}, allowed: a scenario of {aircraft.name}"
+    if loaded_scenario.airframe.name != aircraft.name:
+        says = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
         raise BadInput(f"--scenario {scenario}: {says}")
-    return Known(given.airframe, declared_of(given))
+    return DiagnosedAircraft(loaded_scenario.airframe, declared_errors(loaded_scenario))
 
 
 @dataclass(frozen=True)
-class Taken:
-    """What a log gives the diagnosis: as `stepped.inputs_of`; the mean age of what is held, s; and begin and
-    end of each stretch that is diagnosed in one."""
+class AircraftInputs:
+    """Inputs of the diagnosis from a log: as `stepped.inputs_of`; the mean age of what is held, s; and begin
+    and end of each stretch that is diagnosed in one."""
 
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
-    inputs: list[Floats]
-    ages: dict[str, float]
-    unknown: Mask
-    parts: list[tuple[int, int]]
+    diagnosis_inputs: list[Floats]
+    held_column_age_s: dict[str, float]
+    is_missing: Mask
+    stretches: list[tuple[int, int]]
 
 
-def take(recording: Recording, vehicle: Vehicle, by: Known) -> Taken:
+def read_inputs(recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft) -> AircraftInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check(recording, vehicle, by.aircraft)
-    samples = sample(
-        recording, vehicle.model_copy(update={"max_rate_hz": _FASTEST_HZ, "reference_airspeed_mps": None})
+    _check_log_has_inputs(recording, vehicle, diagnosed.aircraft)
+    samples = resample(
+        recording,
+        vehicle.model_copy(update={"max_rate_hz": _MAX_LOG_RATE_HZ, "reference_airspeed_mps": None}),
     )
-    rate_hz = _rate_hz(samples)
-    diagnosis = Diagnosis(by.aircraft, rate_hz, **by.declared)
-    turning = diagnosis.declared.air.moves
-    inputs, ages = _inputs(samples, recording, vehicle, by.aircraft, turning)
-    _plausible(samples.name, inputs, by.aircraft)
-    unknown = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
-    parts = _stretches(samples, unknown, rate_hz)
-    if not parts:
+    rate_hz = _log_rate_hz(samples)
+    diagnosis = Diagnosis(diagnosed.aircraft, rate_hz, **diagnosed.declared_errors)
+    needs_attitude = diagnosis.declared.air.moves
+    inputs, mean_age_s = _read_sample_inputs(samples, recording, vehicle, diagnosed.aircraft, needs_attitude)
+    _check_units_plausible(samples.name, inputs, diagnosed.aircraft)
+    is_missing = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
+    stretches = _gap_free_stretches(samples, is_missing, rate_hz)
+    if not stretches:
         raise BadInput(
-            f"{samples.name}: has no {_FEW} samples in turn, evenly spaced and without a missing number, "
-            f"allowed: all signals logged at one rate of {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
+            f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
+            "missing number, allowed: all signals logged at one rate of "
+            f"{_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
         )
-    order = _order(vehicle, by.aircraft)
-    samples = replace(samples, commands=samples.commands[:, order], labels=samples.labels[:, order])
-    return Taken(samples, diagnosis, rate_hz, inputs, ages, unknown, parts)
+    surface_indices = _vehicle_surface_indices(vehicle, diagnosed.aircraft)
+    samples = replace(
+        samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
+    )
+    return AircraftInputs(samples, diagnosis, rate_hz, inputs, mean_age_s, is_missing, stretches)
 
 
-def diagnose_as(recording: Recording, vehicle: Vehicle, by: Known) -> tuple[Samples, Rows, Document]:
+def diagnose_by_aircraft(
+    recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
+) -> tuple[Samples, DiagnosisRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    taken = take(recording, vehicle, by)
-    return taken.samples, *diagnosed(taken, by)
+    aircraft_inputs = read_inputs(recording, vehicle, diagnosed)
+    return aircraft_inputs.samples, *diagnose_inputs(aircraft_inputs, diagnosed)
 
 
-def diagnosed(taken: Taken, by: Known) -> tuple[Rows, Document]:
+def diagnose_inputs(
+    aircraft_inputs: AircraftInputs, diagnosed: DiagnosedAircraft
+) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, diagnosis, inputs, parts, found = taken.samples, taken.diagnosis, taken.inputs, taken.parts, []
-    for begin, end in parts:
+    samples, diagnosis, inputs, stretches, stretch_verdicts = (
+        aircraft_inputs.samples,
+        aircraft_inputs.diagnosis,
+        aircraft_inputs.diagnosis_inputs,
+        aircraft_inputs.stretches,
+        [],
+    )
+    for begin, end in stretches:
         diagnosis.reset()
-        found.append(step_through(diagnosis, [part[begin:end] for part in inputs], taken.rate_hz))
+        stretch_verdicts.append(
+            replay_samples(diagnosis, [values[begin:end] for values in inputs], aircraft_inputs.rate_hz)
+        )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_signs(samples.name, by.aircraft, found)
-    stepped = _whole(len(samples.t_s), len(by.aircraft.surfaces), parts, found)
-    rows = rows_of(samples.t_s, stepped, by.aircraft.surfaces, diagnosis.config)
-    reasons = _outside(inputs[1], by.aircraft, taken.unknown, parts) | _misled(samples.t_s, parts, stepped)
-    rows = rows.silent(_since(parts, rows, reasons))
-    return rows, _verdict(samples, rows, stepped, by, taken.ages)
+        _check_command_signs(samples.name, diagnosed.aircraft, stretch_verdicts)
+    replayed = _join_stretch_diagnoses(
+        len(samples.t_s), len(diagnosed.aircraft.surfaces), stretches, stretch_verdicts
+    )
+    rows = rows_of_replay(samples.t_s, replayed, diagnosed.aircraft.surfaces, diagnosis.config)
+    reasons = _rows_outside_envelope(
+        inputs[1], diagnosed.aircraft, aircraft_inputs.is_missing, stretches
+    ) | _rows_unexplained_from_start(samples.t_s, stretches, replayed)
+    rows = rows.without_verdict(_add_doubtful_alarm_reason(stretches, rows, reasons))
+    return rows, _verdict_document(samples, rows, replayed, diagnosed, aircraft_inputs.held_column_age_s)
 
 
-def _check_signs(name: str, aircraft: Aircraft, found: list[Stepped]) -> None:
+def _check_command_signs(
+    flight_name: str, aircraft: Aircraft, stretch_verdicts: list[ReplayedVerdicts]
+) -> None:
     """Raise BadInput where the rates answer a command the other way round in all of a stretch."""
-    for surface, gain in zip(aircraft.surfaces, np.min([one.gains for one in found], axis=0), strict=True):
-        if gain < trust.REVERSED:
+    for surface, gain in zip(
+        aircraft.surfaces, np.min([one.max_command_gains for one in stretch_verdicts], axis=0), strict=True
+    ):
+        if gain < trust.MAX_REVERSED_GAIN:
             says = f"the rates answer the command of {surface} the other way round in all of it"
-            raise BadInput(f"{name}: {says}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?")
+            raise BadInput(
+                f"{flight_name}: {says}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
+            )
 
 
-def _check(recording: Recording, vehicle: Vehicle, aircraft: Aircraft) -> None:
+def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
     """Raise BadInput for what vehicle file and log lack of what the aircraft's model is given."""
-    missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
-    if missing:
-        says = f"surfaces: no {missing[0]}, allowed: what the commands make of {', '.join(aircraft.surfaces)}"
+    missing_surfaces = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
+    if missing_surfaces:
+        says = (
+            f"surfaces: no {missing_surfaces[0]}, allowed: what the commands make of "
+            f"{', '.join(aircraft.surfaces)}"
+        )
         raise BadInput(f"vehicle {vehicle.name}: {says}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
-    wanted = _flow_of(aircraft)
-    for name in wanted:
+    flow_names = _flow_input_names(aircraft)
+    for name in flow_names:
         if name not in vehicle.flow:
-            says = f"flow: no {name}, allowed: a column for each of {', '.join(wanted)}"
+            says = f"flow: no {name}, allowed: a column for each of {', '.join(flow_names)}"
             raise BadInput(f"vehicle {vehicle.name}: {says}")
-    for one in (vehicle.airspeed, *(vehicle.flow[name] for name in wanted)):
+    for one in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
         if one.column not in recording.columns:
-            near = nearest_ten(one.column, recording.columns)
-            says = f"no column {one.column}, allowed: a log that has it; it has {near}"
+            nearest = nearest_names(one.column, recording.columns)
+            says = f"no column {one.column}, allowed: a log that has it; it has {nearest}"
             raise BadInput(f"{recording.name}: {says}")
 
 
-def _flow_of(aircraft: Aircraft) -> list[str]:
+def _flow_input_names(aircraft: Aircraft) -> list[str]:
     return ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
 
 
-def _order(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
+def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
     """Place of each of the aircraft's surfaces among the vehicle's."""
     return [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
 
 
-def _rate_hz(samples: Samples) -> float:
+def _log_rate_hz(samples: Samples) -> float:
     """Samples a second: of the first ones, so that a log cut short has the same; rounded to four digits."""
-    first = samples.t_s[:_FEW]
-    steps = np.diff(first)
-    even = steps[np.abs(steps / samples.dt_s - 1.0) < _JITTER]
-    rate_hz = float(f"{1.0 / (even.mean() if len(even) else samples.dt_s):.4g}")
-    if not _SLOWEST_HZ <= rate_hz <= _FASTEST_HZ:
-        says = f"an aircraft's model takes {_SLOWEST_HZ:g} to {_FASTEST_HZ:g} Hz"
+    first_t_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
+    steps_s = np.diff(first_t_s)
+    even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_STEP_JITTER]
+    rate_hz = float(f"{1.0 / (even_steps_s.mean() if len(even_steps_s) else samples.dt_s):.4g}")
+    if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
+        says = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
         raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {says}")
     return rate_hz
 
 
-def _inputs(
-    samples: Samples, recording: Recording, vehicle: Vehicle, aircraft: Aircraft, turning: bool
+def _read_sample_inputs(
+    samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.inputs_of` has them; and the mean age
-    of what is held, s. turning: whether the attitude is wanted."""
-    columns, ages = in_si(recording, vehicle).columns, dict(samples.age_s)
+    of what is held, s. needs_attitude: whether the attitude is wanted."""
+    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.held_column_age_s)
 
     def measured(one: Quantity) -> Floats:
-        values, age_s = at_samples(columns[one.column], samples.t_s, samples.dt_s)
+        values, age_s = values_at(columns[one.column], samples.t_s, samples.dt_s)
         if age_s is not None:
-            ages[one.column] = age_s
+            mean_age_s[one.column] = age_s
         return values
 
-    alpha, beta, qdyn, *own = (measured(vehicle.flow[name]) for name in _flow_of(aircraft))
-    assert vehicle.airspeed is not None  # as `_check` has seen
-    signals = [alpha, beta, measured(vehicle.airspeed), qdyn, *own]
-    order = _order(vehicle, aircraft)
-    full = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
+    alpha, beta, qdyn, *aircraft_signals = (
+        measured(vehicle.flow[name]) for name in _flow_input_names(aircraft)
+    )
+    assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
+    signals = [alpha, beta, measured(vehicle.airspeed), qdyn, *aircraft_signals]
+    surface_indices = _vehicle_surface_indices(vehicle, aircraft)
+    full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
-    if turning:
-        for i, angle in enumerate(_ATTITUDE):
+    if needs_attitude:
+        for axis, angle in enumerate(_ATTITUDE_ANGLES):
             one = getattr(vehicle.attitude, angle) if vehicle.attitude else None
             if one is None or one.column not in columns:
                 says = "is missing, allowed: its column, where fdi.bounds declares turbulence"
                 raise BadInput(f"{samples.name}: attitude.{angle}: {says}")
-            attitude[:, i] = measured(one)
-    return [samples.rates, np.column_stack(signals), samples.commands[:, order] * full, attitude], ages
+            attitude[:, axis] = measured(one)
+    return [
+        samples.rates,
+        np.column_stack(signals),
+        samples.commands[:, surface_indices] * full_deflection_rad,
+        attitude,
+    ], mean_age_s
 
 
-def _plausible(name: str, inputs: list[Floats], aircraft: Aircraft) -> None:
+def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Aircraft) -> None:
     """Raise BadInput where flow or commands are in another unit."""
     signals, commands = inputs[1], inputs[2]
-    for i, angle in enumerate(("alpha_rad", "beta_rad")):
-        largest = float(np.nanmedian(np.abs(signals[:, i])))
-        if largest > 0.5 * pi:
-            raise BadInput(f"{name}: flow.{angle} is {largest:.3g} in the middle, allowed: rad; `unit: deg`?")
-    moving = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
-    density = 2.0 * signals[moving, 3] / signals[moving, 2] ** 2
-    if density.size and not _DENSITY[0] < float(np.nanmedian(density)) < _DENSITY[1]:
-        says = f"airspeed and flow.qdyn_pa make a density of {np.nanmedian(density):.3g} kg/m3"
-        raise BadInput(
-            f"{name}: {says}, allowed: {_DENSITY[0]:g} to {_DENSITY[1]:g}, true airspeed in m/s and Pa"
+    for axis, angle in enumerate(("alpha_rad", "beta_rad")):
+        median_angle = _known_median(np.abs(signals[:, axis]))
+        if median_angle > 0.5 * pi:
+            raise BadInput(
+                f"{flight_name}: flow.{angle} is {median_angle:.3g} in the middle, allowed: rad; `unit: deg`?"
+            )
+    is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
+    density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
+    median_density_kg_m3 = _known_median(density_kg_m3)
+    if density_kg_m3.size and not _DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _DENSITY_LIMITS_KG_M3[1]:
+        says = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
+        allowed = "{:g} to {:g}".format(*_DENSITY_LIMITS_KG_M3)
+        raise BadInput(f"{flight_name}: {says}, allowed: {allowed}, true airspeed in m/s and Pa")
+    for surface_index, surface in enumerate(aircraft.surfaces):
+        travel = aircraft.travel[surface]
+        max_deflection_rad, max_command_rad = (
+            max(abs(travel.min_rad), abs(travel.max_rad)),
+            np.nanmax(np.abs(commands[:, surface_index]), initial=0.0),
         )
-    for s, surface in enumerate(aircraft.surfaces):
-        stop = aircraft.travel[surface]
-        furthest, reach = (
-            max(abs(stop.min_rad), abs(stop.max_rad)),
-            np.nanmax(np.abs(commands[:, s]), initial=0.0),
-        )
-        if reach > _BEYOND * furthest:
-            says = f"the command of {surface} reaches {reach:.3g} rad, allowed: its stop, {furthest:.3g} rad"
-            raise BadInput(f"{name}: {says}; full_deflection_rad says what 1 is")
+        if max_command_rad > _MAX_DEFLECTION_FACTOR * max_deflection_rad:
+            says = (
+                f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
+                f"{max_deflection_rad:.3g} rad"
+            )
+            raise BadInput(f"{flight_name}: {says}; full_deflection_rad says what 1 is")
 
 
-def _stretches(samples: Samples, unknown: Mask, rate_hz: float) -> list[tuple[int, int]]:
+def _known_median(values: Floats) -> float:
+    """Median of the numbers among the values, nan where there is none."""
+    known = values[~np.isnan(values)]
+    return float(np.median(known)) if known.size else float("nan")
+
+
+def _gap_free_stretches(samples: Samples, is_missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """Begin and end of what is diagnosed in one: evenly spaced and without a missing number."""
-    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _JITTER
-    good = ~unknown
-    joined = good[1:] & good[:-1] & ~uneven
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], joined, [False]]).astype(int)))
-    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(begin, end + 1) for begin, end in pairs if end + 1 - begin >= _FEW]
+    is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_STEP_JITTER
+    is_known = ~is_missing
+    is_joined = is_known[1:] & is_known[:-1] & ~is_uneven_step
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_joined, [False]]).astype(int)))
+    begin_end_pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(begin, end + 1) for begin, end in begin_end_pairs if end + 1 - begin >= _MIN_STRETCH_SAMPLES]
 
 
-def _whole(n: int, surfaces: int, parts: list[tuple[int, int]], found: list[Stepped]) -> Stepped:
+def _join_stretch_diagnoses(
+    n_samples: int,
+    n_surfaces: int,
+    stretches: list[tuple[int, int]],
+    stretch_verdicts: list[ReplayedVerdicts],
+) -> ReplayedVerdicts:
     """The stretches put together; nothing is said between them."""
-    verdicts, low, high = [Verdict()] * n, np.zeros((n, surfaces)), np.ones((n, surfaces))
-    gains = np.min([one.gains for one in found], axis=0)
-    for (begin, end), one in zip(parts, found, strict=True):
-        verdicts[begin:end], low[begin:end], high[begin:end] = one.verdicts, one.low, one.high
-    return Stepped(verdicts, low, high, gains)
+    verdicts, low, high = (
+        [Verdict()] * n_samples,
+        np.zeros((n_samples, n_surfaces)),
+        np.ones((n_samples, n_surfaces)),
+    )
+    gains = np.min([one.max_command_gains for one in stretch_verdicts], axis=0)
+    for (begin, end), one in zip(stretches, stretch_verdicts, strict=True):
+        verdicts[begin:end], low[begin:end], high[begin:end] = (
+            one.verdicts,
+            one.effectiveness_low,
+            one.effectiveness_high,
+        )
+    return ReplayedVerdicts(verdicts, low, high, gains)
 
 
-def _outside(
-    signals: Floats, aircraft: Aircraft, unknown: Mask, parts: list[tuple[int, int]]
+def _rows_outside_envelope(
+    signals: Floats, aircraft: Aircraft, is_missing: Mask, stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """Rows of which the aircraft's model says nothing, by what is wrong."""
-    slow, fast = aircraft.envelope.airspeed_mps
-    low, high = aircraft.alpha_rad
-    apart = np.ones(len(signals), dtype=bool)
-    for begin, end in parts:
-        apart[begin:end] = False
+    min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
+    min_alpha_rad, max_alpha_rad = aircraft.alpha_rad
+    is_outside_stretches = np.ones(len(signals), dtype=bool)
+    for begin, end in stretches:
+        is_outside_stretches[begin:end] = False
     airspeed, alpha = signals[:, 2], signals[:, 0]
     return {
-        "a number is missing": unknown,
-        "samples are not evenly spaced": apart & ~unknown,
-        f"airspeed is outside {slow:g} to {fast:g} m/s": (airspeed < slow) | (airspeed > fast),
-        f"angle of attack is outside {low:.3g} to {high:.3g} rad": (alpha < low) | (alpha > high),
+        "a number is missing": is_missing,
+        "samples are not evenly spaced": is_outside_stretches & ~is_missing,
+        f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (airspeed < min_airspeed_mps)
+        | (airspeed > max_airspeed_mps),
+        f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (alpha < min_alpha_rad)
+        | (alpha > max_alpha_rad),
     }
 
 
-def _misled(t_s: Floats, parts: list[tuple[int, int]], stepped: Stepped) -> dict[str, Mask]:
+def _rows_unexplained_from_start(
+    t_s: Floats, stretches: list[tuple[int, int]], replayed: ReplayedVerdicts
+) -> dict[str, Mask]:
     """Stretches that nothing explains from their first second on."""
-    misled = np.zeros(len(t_s), dtype=bool)
-    for begin, end in parts:
-        soon = begin + int(np.searchsorted(t_s[begin:end], t_s[begin] + _AT_ONCE_S))
-        if any(verdict.isolated == "unanticipated" for verdict in stepped.verdicts[begin:soon]):
-            first = next(k for k in range(begin, soon) if stepped.verdicts[k].detected)
-            misled[first:end] = True
+    is_unexplained = np.zeros(len(t_s), dtype=bool)
+    for begin, end in stretches:
+        first_second_end = begin + int(
+            np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_FROM_START_S)
+        )
+        if any(verdict.isolated == "unanticipated" for verdict in replayed.verdicts[begin:first_second_end]):
+            first_alarm = next(k for k in range(begin, first_second_end) if replayed.verdicts[k].detected)
+            is_unexplained[first_alarm:end] = True
     says = "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
-    return {says: misled}
+    return {says: is_unexplained}
 
 
-def _since(parts: list[tuple[int, int]], rows: Rows, reasons: dict[str, Mask]) -> dict[str, Mask]:
+def _add_doubtful_alarm_reason(
+    stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
+) -> dict[str, Mask]:
     """The reasons there are; an alarm that was raised where one holds is none in what follows."""
-    gone, since = np.logical_or.reduce(list(reasons.values())), np.zeros(len(rows.t_s), dtype=bool)
-    for begin, end in parts:
-        alarmed = begin + np.flatnonzero(rows.faulty[begin:end])
-        if alarmed.size and gone[alarmed[0]]:
-            since[alarmed[0] : end] = True
-    reasons = reasons | {"the alarm was raised where nothing can be said": since & ~gone}
+    has_reason, is_after_doubtful_alarm = (
+        np.logical_or.reduce(list(reasons.values())),
+        np.zeros(len(rows.t_s), dtype=bool),
+    )
+    for begin, end in stretches:
+        alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
+        if alarm_rows.size and has_reason[alarm_rows[0]]:
+            is_after_doubtful_alarm[alarm_rows[0] : end] = True
+    reasons = reasons | {
+        "the alarm was raised where nothing can be said": is_after_doubtful_alarm & ~has_reason
+    }
     return {says: mask for says, mask in reasons.items() if mask.any()}
 
 
-def _verdict(samples: Samples, rows: Rows, stepped: Stepped, by: Known, ages: dict[str, float]) -> Document:
+def _verdict_document(
+    samples: Samples,
+    rows: DiagnosisRows,
+    replayed: ReplayedVerdicts,
+    diagnosed: DiagnosedAircraft,
+    held_column_age_s: dict[str, float],
+) -> Document:
     """The document of verdict.json."""
-    surfaces = list(by.aircraft.surfaces)
-    alarmed = np.flatnonzero(rows.faulty)
-    last = stepped.verdicts[alarmed[-1]] if alarmed.size else Verdict()
-    said = [k for k in alarmed.tolist() if stepped.verdicts[k].isolated == last.isolated]
-    held = [
+    surfaces = list(diagnosed.aircraft.surfaces)
+    alarm_rows = np.flatnonzero(rows.faulty)
+    last_verdict = replayed.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    same_verdict_rows = [
+        k for k in alarm_rows.tolist() if replayed.verdicts[k].isolated == last_verdict.isolated
+    ]
+    held_column_notes = [
         f"{name} is held, {age:.2g} s old on average: errors declared have to cover it"
-        for name, age in ages.items()
+        for name, age in held_column_age_s.items()
     ]
     return {
         "flight": samples.name,
-        "aircraft": by.aircraft.name,
-        "declared": by.declared,
+        "aircraft": diagnosed.aircraft.name,
+        "declared": diagnosed.declared_errors,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
         "recorded_s": len(samples.t_s) * samples.dt_s,
-        "gaps": int(samples.run[-1]),
+        "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
-        "faulty": bool(alarmed.size),
-        "detection_s": float(samples.t_s[alarmed[0]]) if alarmed.size else None,
-        "isolation_s": float(samples.t_s[said[0]]) if last.isolated else None,
-        "isolated": last.isolated,
-        "type": last.type,
-        "estimate": last.estimate,
-        "candidates": list(last.candidates),
-        "credible": trust.account(rows.reasons, rows.credible),
-        "events": findings.events_of(rows, surfaces),
-        "can_separate": _separable(rows, surfaces),
+        "faulty": bool(alarm_rows.size),
+        "detection_s": float(samples.t_s[alarm_rows[0]]) if alarm_rows.size else None,
+        "isolation_s": float(samples.t_s[same_verdict_rows[0]]) if last_verdict.isolated else None,
+        "isolated": last_verdict.isolated,
+        "type": last_verdict.type,
+        "estimate": last_verdict.estimate,
+        "candidates": list(last_verdict.candidates),
+        "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
+        "events": findings.fault_events(rows, surfaces),
+        "can_separate": _excluded_loss_lines(rows, surfaces),
         "isolability": {"together": []},
-        "notes": [*samples.notes, *held],
+        "notes": [*samples.notes, *held_column_notes],
     }
 
 
-def _separable(rows: Rows, surfaces: list[str]) -> list[str]:
+def _excluded_loss_lines(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
     """The loss of each surface that is excluded within a second in half of the healthy rows."""
-    quiet = (rows.faulty == 0) & (rows.credible == 1)
-    if not quiet.any():
+    is_credible_healthy = (rows.faulty == 0) & (rows.credible == 1)
+    if not is_credible_healthy.any():
         return []
-    losses = 1.0 - np.median(rows.low[quiet], axis=0)
+    excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_healthy], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, excluded_losses.tolist(), strict=True)
     ]
 
 

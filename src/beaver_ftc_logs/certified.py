@@ -12,26 +12,28 @@ import numpy as np
 
 from beaver_ftc_assurance.certificates import certificate
 from beaver_ftc_assurance.certificates import proved as by_frames
-from beaver_ftc_logs.by_aircraft import Taken
-from beaver_ftc_logs.diagnose import Rows
+from beaver_ftc_logs.by_aircraft import AircraftInputs
+from beaver_ftc_logs.diagnose import DiagnosisRows
 
 
-def write(taken: Taken, rows: Rows, folder: Path) -> None:
+def write_certificate(aircraft_inputs: AircraftInputs, rows: DiagnosisRows, folder: Path) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
-    alarmed = (part for part in taken.parts if rows.faulty[part[0] : part[1]].any())
-    start, end = next(alarmed, taken.parts[0])
-    inputs = [np.ascontiguousarray(part[start:end]) for part in taken.inputs]
-    diagnosis = taken.diagnosis
+    stretches_with_alarm = (
+        values for values in aircraft_inputs.stretches if rows.faulty[values[0] : values[1]].any()
+    )
+    start, end = next(stretches_with_alarm, aircraft_inputs.stretches[0])
+    inputs = [np.ascontiguousarray(values[start:end]) for values in aircraft_inputs.diagnosis_inputs]
+    diagnosis = aircraft_inputs.diagnosis
 
-    def stepped() -> Iterator[int]:
-        for k, sample in enumerate(zip(*inputs, strict=True)):
+    def step_frames() -> Iterator[int]:
+        for sample_index, sample in enumerate(zip(*inputs, strict=True)):
             diagnosis.step(*sample)
-            yield k
+            yield sample_index
 
     diagnosis.reset()
     frames, scenario = diagnosis.inside()
-    named = scenario.model_copy(update={"name": taken.samples.name})
-    log, document = by_frames.proved(named, frames, stepped())
-    document = certificate.sealed(document | {"begins_s": float(taken.samples.t_s[start])})
-    by_frames.write(named, log, document, folder)
+    named_scenario = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
+    log, document = by_frames.proved(named_scenario, frames, step_frames())
+    document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[start])})
+    by_frames.write(named_scenario, log, document, folder)

@@ -1,6 +1,5 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
-import warnings
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")]
 ReaderOption = Annotated[
-    str | None, typer.Option(help="table, alfa, ulog or ardupilot, where it is not evident.")
+    str | None, typer.Option(help="Format of the log, if it is not evident: table, alfa, ulog or ardupilot.")
 ]
 
 
@@ -43,30 +42,31 @@ def identify(
     check: Do not fit; report what the logs contain, and propose a vehicle file if none is given.
     false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.
     """
-    _silence_numpy()
     if check:
-        _check(flights, vehicle, out, reader, format)
+        _check_logs(flights, vehicle, out, reader, format)
         return
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc.results import clear_disk_errors
     from beaver_ftc.studies.engine import write_whole
-    from beaver_ftc_logs.identification import by_pressure, identify, summary
+    from beaver_ftc_logs.identification import identification_text, identify, scale_commands_by_pressure
     from beaver_ftc_logs.model import as_text
-    from beaver_ftc_logs.pages import check_page, render_model
-    from beaver_ftc_logs.samples import load_flights
-    from beaver_ftc_logs.vehicle import asking, load_vehicle
+    from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
+    from beaver_ftc_logs.samples import load_flights_for_fit
+    from beaver_ftc_logs.vehicle import load_vehicle, with_false_alarm_rate
 
     page = out.with_suffix(".html")
-    check_page(page)
-    described = load_vehicle(vehicle)
+    refuse_to_replace_foreign_file(page)
+    vehicle_file = load_vehicle(vehicle)
     if false_alarms_per_hour is not None:
-        described = asking(described, false_alarms_per_hour)
-    loaded, described = by_pressure(load_flights(flights, described, reader), described)
-    model = identify(loaded, described)
-    shown = render_model(loaded, model)
-    for path, text in ((out, as_text(model)), (page, shown)):
+        vehicle_file = with_false_alarm_rate(vehicle_file, false_alarms_per_hour)
+    loaded_flights, vehicle_file = scale_commands_by_pressure(
+        load_flights_for_fit(flights, vehicle_file, reader), vehicle_file
+    )
+    model = identify(loaded_flights, vehicle_file)
+    page_html = render_identification(loaded_flights, model)
+    for path, text in ((out, as_text(model)), (page, page_html)):
         with clear_disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, text.encode("utf-8"))
@@ -76,39 +76,38 @@ def identify(
         "identified": model.identified,
         "settings": model.settings.model_dump(),
     }
-    long = [f"  {one.name}: {one.notes[0]}" for one in loaded if one.parts > 1]
-    answer(format, document, lambda: "\n".join([summary(model), *long, f"model: {out}", f"page: {page}"]))
+    long_log_lines = [f"  {one.name}: {one.notes[0]}" for one in loaded_flights if one.n_parts > 1]
+    answer(
+        format,
+        document,
+        lambda: "\n".join([identification_text(model), *long_log_lines, f"model: {out}", f"page: {page}"]),
+    )
 
 
-def _silence_numpy() -> None:
-    """A column of nothing but gaps makes NumPy warn of means of nothing: the readers say so by its name."""
-    warnings.filterwarnings("ignore", category=RuntimeWarning)
-
-
-def _check(
+def _check_logs(
     flights: list[Path], vehicle: str | None, out: Path | None, reader: str | None, format: Format
 ) -> None:
-    from beaver_ftc_logs.check import as_text, as_yaml, check
+    from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
     from beaver_ftc_logs.vehicle import load_vehicle
 
-    described = load_vehicle(vehicle) if vehicle is not None else None
-    if out is not None and (out.exists() or described is not None):
+    vehicle_file = load_vehicle(vehicle) if vehicle is not None else None
+    if out is not None and (out.exists() or vehicle_file is not None):
         says = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {says}")
-    checked = [check(path, described, reader) for path in flights]
-    guess = next((one["vehicle"] for one in checked if one["vehicle"]), None)
-    lines = [as_text(one) for one in checked]
-    if guess is not None and out is not None:
-        _write_new(out, as_yaml(guess))
+    findings = [check_log(path, vehicle_file, reader) for path in flights]
+    guessed_vehicle = next((one["vehicle"] for one in findings if one["vehicle"]), None)
+    lines = [as_text(one) for one in findings]
+    if guessed_vehicle is not None and out is not None:
+        _write_vehicle_file(out, vehicle_file_text(guessed_vehicle))
         lines.append(f"vehicle file: {out}")
-    elif guess is not None:
-        lines.append(as_yaml(guess))
-    answer(format, {"logs": checked, "vehicle": guess}, lambda: "\n".join(lines))
-    if not all(one["usable"] for one in checked):
+    elif guessed_vehicle is not None:
+        lines.append(vehicle_file_text(guessed_vehicle))
+    answer(format, {"logs": findings, "vehicle": guessed_vehicle}, lambda: "\n".join(lines))
+    if not all(one["usable"] for one in findings):
         raise typer.Exit(2)
 
 
-def _write_new(path: Path, text: str) -> None:
+def _write_vehicle_file(path: Path, text: str) -> None:
     from beaver_ftc.results import clear_disk_errors
 
     with clear_disk_errors(path):
@@ -117,7 +116,7 @@ def _write_new(path: Path, text: str) -> None:
 
 
 @dataclass(frozen=True)
-class Options:
+class DiagnoseOptions:
     """The arguments of `diagnose`."""
 
     flights: FlightsArgument
@@ -134,7 +133,7 @@ class Options:
 
 
 @declare("diagnosis.parquet", "verdict.json")
-def diagnose(options: Options) -> None:
+def diagnose(options: DiagnoseOptions) -> None:
     """Diagnose recorded flights with a model or an aircraft.
 
     Writes DIR/<flight>/diagnosis.parquet (one row per sample), verdict.json and report.html. A row uses only
@@ -149,43 +148,46 @@ def diagnose(options: Options) -> None:
     detector: Detector to use: bank-of-filters, or another one by its name.
     certificate: With --aircraft: also write certificate.json and log.parquet, which prove the alarm.
     """
-    _silence_numpy()
-    _check_options(options)
+    _check_options_agree(options)
     flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:
-        _by_aircraft(options)
+        _diagnose_by_aircraft(options)
         return
     if options.model is None:
-        _replay(flights, out, format)
+        _replay_own_logs(flights, out, format)
         return
     from beaver_ftc_logs.detectors import check_detector
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.model import load_model
-    from beaver_ftc_logs.samples import flights_of
+    from beaver_ftc_logs.samples import stream_flights
 
     check_detector(options.detector)
-    known = load_model(options.model)
+    model = load_model(options.model)
     verdicts = [
-        _diagnose(flight, known, out, options.score, options.detector)
-        for flight in flights_of(flights, known.vehicle, options.reader)
+        _diagnose_flight(flight, model, out, options.score, options.detector)
+        for flight in stream_flights(flights, model.vehicle, options.reader)
     ]
     answer(
         format,
         {"flights": verdicts},
-        lambda: "\n".join(f"{as_text(each)}\n  report: {each['folder']}/report.html" for each in verdicts),
+        lambda: "\n".join(
+            f"{as_text(verdict)}\n  report: {verdict['folder']}/report.html" for verdict in verdicts
+        ),
     )
 
 
-def _check_options(options: Options) -> None:
+def _check_options_agree(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that contradict one another."""
     if options.aircraft is None:
-        only = {"--scenario": options.scenario, "--vehicle": options.vehicle}
-        only |= {"--certificate": "" if options.certificate else None}
-        for option, given in only.items():
-            if given is not None:
+        aircraft_only_options = {"--scenario": options.scenario, "--vehicle": options.vehicle}
+        aircraft_only_options |= {"--certificate": "" if options.certificate else None}
+        for option, value in aircraft_only_options.items():
+            if value is not None:
                 raise BadInput(
-                    f"diagnose: {f'{option} {given}'.rstrip()}: allowed: only with --aircraft NAME"
+                    f"diagnose: {f'{option} {value}'.rstrip()}: allowed: only with --aircraft NAME"
                 )
+        if options.model is None:
+            _check_replay_options(options)
         return
     if options.model is not None:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
@@ -194,63 +196,79 @@ def _check_options(options: Options) -> None:
         raise BadInput(f"diagnose: --aircraft with {says}")
 
 
-def _by_aircraft(options: Options) -> None:
-    from beaver_ftc_logs.by_aircraft import as_text, diagnosed, known, take
-    from beaver_ftc_logs.pages import write_by_aircraft
+def _check_replay_options(options: DiagnoseOptions) -> None:
+    """Raise BadInput for options that change nothing where the diagnosis of `run` flies again."""
+    options_without_effect = {
+        "--score": options.score,
+        "--detector": options.detector != "bank-of-filters",
+        "--reader": options.reader is not None,
+    }
+    for option, is_given in options_without_effect.items():
+        if is_given:
+            raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
+
+
+def _diagnose_by_aircraft(options: DiagnoseOptions) -> None:
+    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_aircraft, read_inputs
+    from beaver_ftc_logs.pages import write_diagnosis_by_aircraft
     from beaver_ftc_logs.readers import check_exists
-    from beaver_ftc_logs.samples import parts_for
-    from beaver_ftc_logs.scoring import score
+    from beaver_ftc_logs.samples import read_parts_for_vehicle
+    from beaver_ftc_logs.scoring import score_diagnosis
     from beaver_ftc_logs.vehicle import load_vehicle
 
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    by = known(str(options.aircraft), options.scenario)
+    diagnosed = load_aircraft(str(options.aircraft), options.scenario)
     verdicts = []
     for path in options.flights:
         check_exists(path)
-        beside = path.with_name("vehicle.yaml")
-        if options.vehicle is None and not beside.is_file():
+        vehicle_beside_log = path.with_name("vehicle.yaml")
+        if options.vehicle is None and not vehicle_beside_log.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        described = load_vehicle(options.vehicle or str(beside))
-        for recording in parts_for(path, described, options.reader):
-            taken = take(recording, described, by)
-            rows, verdict = diagnosed(taken, by)
-            samples, surfaces = taken.samples, by.aircraft.surfaces
+        vehicle_file = load_vehicle(options.vehicle or str(vehicle_beside_log))
+        for recording in read_parts_for_vehicle(path, vehicle_file, options.reader):
+            aircraft_inputs = read_inputs(recording, vehicle_file, diagnosed)
+            rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed)
+            samples, surfaces = aircraft_inputs.samples, diagnosed.aircraft.surfaces
             if options.score:
-                verdict["score"] = score(samples, rows, [[name] for name in surfaces])
-            proof = partial(certified.write, taken, rows) if options.certificate else None
-            folder = write_by_aircraft(options.out, samples, surfaces, rows, verdict, proof)
+                verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
+            write_proof = (
+                partial(certified.write_certificate, aircraft_inputs, rows) if options.certificate else None
+            )
+            folder = write_diagnosis_by_aircraft(options.out, samples, surfaces, rows, verdict, write_proof)
             verdicts.append(verdict | {"folder": str(folder)})
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _replay(flights: list[Path], out: Path, format: Format) -> None:
+def _replay_own_logs(flights: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc_logs.pages import write_results
-    from beaver_ftc_logs.replay import as_text, is_own_log, replay
+    from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
-    others = [path for path in flights if not is_own_log(path)]
-    if others:
+    other_logs = [path for path in flights if not is_log_of_run(path)]
+    if other_logs:
         says = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
-        raise BadInput(f"diagnose: {others[0]}: {says}")
-    done = [replay(path) for path in flights]
+        raise BadInput(f"diagnose: {other_logs[0]}: {says}")
+    replays = [replay_run_log(path) for path in flights]
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
-        for columns, verdict in done
+        for columns, verdict in replays
     ]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _diagnose(samples: "Samples", model: "Model", out: Path, scored: bool, detector: str) -> Document:
+def _diagnose_flight(
+    samples: "Samples", model: "Model", out: Path, with_score: bool, detector_name: str
+) -> Document:
     from beaver_ftc_logs.detectors import diagnose_with
-    from beaver_ftc_logs.findings import verdict_of
+    from beaver_ftc_logs.findings import verdict_document
     from beaver_ftc_logs.pages import write_diagnosis
-    from beaver_ftc_logs.scoring import score
+    from beaver_ftc_logs.scoring import score_diagnosis
 
-    rows = diagnose_with(detector, samples, model)
-    verdict = verdict_of(samples, model, rows) | {"detector": detector}
-    if scored:
-        verdict["score"] = score(samples, rows, model.groups)
+    rows = diagnose_with(detector_name, samples, model)
+    verdict = verdict_document(samples, model, rows) | {"detector": detector_name}
+    if with_score:
+        verdict["score"] = score_diagnosis(samples, rows, model.groups)
     folder = write_diagnosis(out, samples, model, rows, verdict)
     return verdict | {"folder": str(folder)}
 
@@ -259,16 +277,16 @@ def compare_recorded(folder: Path, out: Path, format: Format, page: Path | None)
     """Compare ways to diagnose the recorded flights in a folder; page: a page of Markdown to update."""
     from beaver_ftc.results import result_folder
     from beaver_ftc.studies.present import write_files
-    from beaver_ftc_logs.recorded.benchmark import as_text, files_of, run_benchmark, update_page
+    from beaver_ftc_logs.recorded.benchmark import as_text, result_files, run_benchmark, update_page
 
     document = run_benchmark(folder)
-    with result_folder(out, "recorded-flights") as written:
-        write_files(written, files_of(document))
+    with result_folder(out, "recorded-flights") as result_dir:
+        write_files(result_dir, result_files(document))
     if page is not None:
         update_page(document, page)
-        picture = page.parent / "images" / "recorded-flights.png"
-        if picture.parent.is_dir():
-            picture.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
+        figure_path = page.parent / "images" / "recorded-flights.png"
+        if figure_path.parent.is_dir():
+            figure_path.write_bytes((out / "recorded-flights" / "flights.png").read_bytes())
     answer(format, document | {"folder": str(out / "recorded-flights")}, lambda: as_text(document))
 
 

@@ -7,7 +7,7 @@ forgetting-least-squares  all the past, forgotten exponentially with 20 s [Ljung
 freeze                  a servo output that has not moved for 6 s: sees the logged output itself stand still
 
 A detector of the loop is told the rates, what the design model makes of the frame before, and how much of
-that each surface did (diagnosis/base.py). All three follow from the identified model:
+that each surface did (diagnosis/__init__.py). All three follow from the identified model:
 
     acceleration = (c + A past + sum_g F_g - rates before) / dt,      contribution_g = F_g / dt
 
@@ -26,112 +26,142 @@ from beaver_ftc.design import N_Y, Context, Declared
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
-from beaver_ftc_logs.bank import bank_of
+from beaver_ftc_logs.bank import build_hypothesis_bank
 from beaver_ftc_logs.diagnose import (
-    UNKNOWN,
-    Rows,
-    check_rate,
+    UNKNOWN_SURFACE,
+    DiagnosisRows,
+    check_log_fits_model,
     diagnose,
-    healthy_residual,
-    joined,
-    silenced,
+    join_flagged_names,
+    standardized_healthy_residual,
+    without_rows_not_credible,
 )
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Floats, Recording
-from beaver_ftc_logs.regression import by_surface, group_indices, predicted
+from beaver_ftc_logs.recording import Floats, RecordedFlight
+from beaver_ftc_logs.regression import columns_by_surface, split_response, surface_indices_by_group
 from beaver_ftc_logs.samples import Samples
-from beaver_ftc_logs.trust import without_dead
+from beaver_ftc_logs.trust import with_dead_rates_unknown
 
-MEMORY_S = 20.0
-STILL_S = 6.0
-_SURE_SD = 5.0
-_NINETY = 1.645
-PLACES = ("aileron", "elevator", "rudder")
-_SURFACES = 4
-_GYRO_RAD_S = 1e-4
-BANK = "bank-of-filters"
+LEAST_SQUARES_MEMORY_S = 20.0
+FREEZE_RULE_S = 6.0
+_MIN_LOSS_STANDARD_ERRORS = 5.0
+_STANDARD_ERRORS_OF_90_PERCENT = 1.645
+LOOP_SURFACES_BY_GROUP = ("aileron", "elevator", "rudder")
+_N_LOOP_SURFACES = 4
+_DECLARED_GYRO_NOISE_RAD_S = 1e-4
+BANK_OF_FILTERS = "bank-of-filters"
 
 
-def _least_squares(samples: Samples, model: Model, forget: bool) -> Rows:
+def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponentially: bool) -> DiagnosisRows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
-    x, y = _whitened(samples, model)
-    information = _remembered(np.einsum("nai,naj->nij", x, x), samples.dt_s, forget)
-    score = _remembered(np.einsum("nai,na->ni", x, y), samples.dt_s, forget)
-    prior = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(x.shape[2] - 3, 4.0)])
-    covariance = np.linalg.inv(information + prior)
-    found = np.einsum("nij,nj->ni", covariance, score)
-    sd = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:], 0.0))
-    return _rows(samples, model, 1.0 + found[:, 3:], sd)
+    regressors, residual = _whitened_loss_regression(samples, model)
+    information = _sums_over_memory(
+        np.einsum("nai,naj->nij", regressors, regressors), samples.dt_s, forgets_exponentially
+    )
+    score_vector = _sums_over_memory(
+        np.einsum("nai,na->ni", regressors, residual), samples.dt_s, forgets_exponentially
+    )
+    prior_information = np.diag(
+        [*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(regressors.shape[2] - 3, 4.0)]
+    )
+    covariance = np.linalg.inv(information + prior_information)
+    estimate = np.einsum("nij,nj->ni", covariance, score_vector)
+    standard_error = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:], 0.0))
+    return _least_squares_rows(samples, model, 1.0 + estimate[:, 3:], standard_error)
 
 
-def _whitened(samples: Samples, model: Model) -> tuple[Floats, Floats]:
+def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    ok, unexplained, answers = predicted(samples, model)
-    noise = model.arrays()[3]
-    whiten = np.linalg.inv(np.linalg.cholesky(noise))
-    sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(ok), 3, 3))
-    x = np.where(ok[:, None, None], np.concatenate([sizes, answers.transpose(0, 2, 1)], axis=2), 0.0)
-    return np.einsum("ab,nbi->nai", whiten, x), healthy_residual(model, ok, unexplained, answers)
+    is_predictable, unexplained, responses = split_response(samples, model)
+    noise = model.coefficient_arrays()[3]
+    whitening = np.linalg.inv(np.linalg.cholesky(noise))
+    noise_sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(is_predictable), 3, 3))
+    regressors = np.where(
+        is_predictable[:, None, None],
+        np.concatenate([noise_sizes, responses.transpose(0, 2, 1)], axis=2),
+        0.0,
+    )
+    return np.einsum("ab,nbi->nai", whitening, regressors), standardized_healthy_residual(
+        model, is_predictable, unexplained, responses
+    )
 
 
-def _remembered(values: Floats, dt_s: float, forget: bool) -> Floats:
+def _sums_over_memory(values: Floats, dt_s: float, forgets_exponentially: bool) -> Floats:
     """Sums over the memory that ends at each sample."""
-    if forget:
+    if forgets_exponentially:
         from scipy.signal import lfilter
 
-        return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / MEMORY_S)], values, axis=0))
-    total = np.cumsum(values, axis=0)
-    length = round(MEMORY_S / dt_s)
-    total[length:] = total[length:] - total[:-length].copy()
-    return total
+        return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], values, axis=0))
+    sums = np.cumsum(values, axis=0)
+    memory_samples = round(LEAST_SQUARES_MEMORY_S / dt_s)
+    sums[memory_samples:] = sums[memory_samples:] - sums[:-memory_samples].copy()
+    return sums
 
 
-def _rows(samples: Samples, model: Model, effectiveness: Floats, sd: Floats) -> Rows:
+def _least_squares_rows(
+    samples: Samples, model: Model, effectiveness: Floats, standard_error: Floats
+) -> DiagnosisRows:
     """Rows of a least-squares estimate. With labelled levels, the effectiveness is the nearest of them, and
-    below 1 it is a fault; without, it is a fault where it is below 1 by more than _SURE_SD standard
+    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_FAULT_SD standard
     deviations."""
-    bank = bank_of(model)
-    low, high = (np.clip(effectiveness + side * _NINETY * sd, 0.0, 1.0) for side in (-1.0, 1.0))
-    value, lost = np.clip(effectiveness, 0.0, 1.0), effectiveness + _SURE_SD * sd < 1.0
+    bank = build_hypothesis_bank(model)
+    low, high = (
+        np.clip(effectiveness + side * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
+        for side in (-1.0, 1.0)
+    )
+    estimate, is_lost = (
+        np.clip(effectiveness, 0.0, 1.0),
+        effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
+    )
     if model.settings.levels:
         for g, group in enumerate(model.groups):
-            seen = model.settings.levels.get("+".join(group))
-            levels = np.array([*seen, 1.0]) if seen else np.unique(bank.effectiveness[:, g])
-            value[:, g] = levels[np.abs(value[:, g, None] - levels).argmin(axis=1)]
-        lost = value < 1.0
-    edges = {"low": np.minimum(low, value), "high": np.maximum(high, value)}
-    bounds = {name: by_surface(edge, model) for name, edge in edges.items()}
-    named = joined(lost, ["+".join(group) for group in model.groups])
-    return _told(samples, named, by_surface(value, model), **bounds)
+            labelled_levels = model.settings.levels.get("+".join(group))
+            levels = (
+                np.array([*labelled_levels, 1.0]) if labelled_levels else np.unique(bank.effectiveness[:, g])
+            )
+            estimate[:, g] = levels[np.abs(estimate[:, g, None] - levels).argmin(axis=1)]
+        is_lost = estimate < 1.0
+    bounds_by_group = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
+    bounds = {name: columns_by_surface(edge, model) for name, edge in bounds_by_group.items()}
+    named = join_flagged_names(is_lost, ["+".join(group) for group in model.groups])
+    return _rows_without_bounds(samples, named, columns_by_surface(estimate, model), **bounds)
 
 
-def _told(samples: Samples, named: np.ndarray, estimate: Floats, **known: Floats) -> Rows:
+def _rows_without_bounds(
+    samples: Samples, named: np.ndarray, estimate: Floats, **given_bounds: Floats
+) -> DiagnosisRows:
     """Rows of a detector without bounds or probability: faulty where it names a surface; the bounds are then
     the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in named], dtype=np.int64)
-    found = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **known}
-    low, high, probability = found["low"], found["high"], found["probability"]
-    return Rows(samples.t_s, faulty, named, estimate, low, high, probability)
+    bounds = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **given_bounds}
+    low, high, probability = bounds["low"], bounds["high"], bounds["probability"]
+    return DiagnosisRows(samples.t_s, faulty, named, estimate, low, high, probability)
 
 
-def freeze(recording: Recording, samples: Samples, model: Model) -> Rows | None:
+def diagnose_by_freeze_rule(
+    recording: RecordedFlight, samples: Samples, model: Model
+) -> DiagnosisRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     names = list(model.vehicle.surfaces)
     outputs = model.vehicle.outputs
-    logged = {name: one.column for name, one in outputs.items() if one.column in recording.columns}
-    if not logged:
+    logged_outputs = {name: one.column for name, one in outputs.items() if one.column in recording.columns}
+    if not logged_outputs:
         return None
-    still = np.zeros((len(samples.t_s), len(names)), dtype=bool)
-    for name in logged:
-        column = recording.columns[logged[name]]
-        last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
-        moved = np.concatenate([[True], np.diff(column.values) != 0.0])
-        since = column.t_s[np.maximum.accumulate(np.where(moved, np.arange(len(moved)), 0))]
-        still[:, names.index(name)] = (samples.t_s - since[np.maximum(last, 0)] > STILL_S) & (last >= 0)
-    return _told(samples, joined(still, names), 1.0 - still)
+    is_frozen = np.zeros((len(samples.t_s), len(names)), dtype=bool)
+    for name in logged_outputs:
+        column = recording.columns[logged_outputs[name]]
+        last_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
+        has_moved = np.concatenate([[True], np.diff(column.values) != 0.0])
+        unchanged_since_s = column.t_s[
+            np.maximum.accumulate(np.where(has_moved, np.arange(len(has_moved)), 0))
+        ]
+        is_frozen[:, names.index(name)] = (
+            samples.t_s - unchanged_since_s[np.maximum(last_rows, 0)] > FREEZE_RULE_S
+        ) & (last_rows >= 0)
+    return _rows_without_bounds(samples, join_flagged_names(is_frozen, names), 1.0 - is_frozen)
 
 
-class Linear:
+class LinearRateModel:
     """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
 
     def __init__(self, past: Floats, dt_s: float) -> None:
@@ -143,121 +173,130 @@ class Linear:
 
     def G(self, y: Floats) -> Floats:
         """Nothing: what surfaces do is in `contribution`, with its lags."""
-        return np.zeros((3, _SURFACES))
+        return np.zeros((3, _N_LOOP_SURFACES))
 
 
-def stream_of(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
-    """What a detector is given at each row: what is measured, and the command (4,) as shares of travel.
+def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
+    """Return the inputs of a detector at each row: measurements, and the command (4,) as shares of travel.
 
     Where the model can say nothing (a gap, a lost sample) the innovation is 0.
     """
-    groups = group_indices(model)
-    if len(groups) > len(PLACES):
+    groups = surface_indices_by_group(model)
+    if len(groups) > len(LOOP_SURFACES_BY_GROUP):
         raise BadInput(
             f"{model.vehicle.name}: {len(groups)} groups of surfaces, allowed for a detector of the loop: "
-            f"at most {len(PLACES)}"
+            f"at most {len(LOOP_SURFACES_BY_GROUP)}"
         )
-    ok, unexplained, answers = predicted(samples, model)
-    intercept, dt_s = model.arrays()[0], 1.0 / model.rate_hz
-    x = np.nan_to_num(samples.rates)
-    before = np.vstack([x[:1], x[:-1]])
-    expected = x - np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
-    acceleration = (expected - before) / dt_s
-    contribution, command = np.zeros((len(x), 3, _SURFACES)), np.zeros((len(x), _SURFACES))
-    known = np.where(ok[:, None, None], answers, 0.0)
-    for place, members in enumerate(groups):
-        contribution[:, :, place] = known[:, place] / dt_s
-        command[:, place] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
-    parts = zip(samples.t_s.tolist(), x, acceleration, contribution, command, strict=True)
-    error = _error(model)
+    is_predictable, unexplained, responses = split_response(samples, model)
+    intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
+    rates = np.nan_to_num(samples.rates)
+    previous_rates = np.vstack([rates[:1], rates[:-1]])
+    predicted_rates = rates - np.where(
+        is_predictable[:, None], unexplained - intercept - responses.sum(axis=1), 0.0
+    )
+    acceleration = (predicted_rates - previous_rates) / dt_s
+    contribution, command = (
+        np.zeros((len(rates), 3, _N_LOOP_SURFACES)),
+        np.zeros((len(rates), _N_LOOP_SURFACES)),
+    )
+    known_responses = np.where(is_predictable[:, None, None], responses, 0.0)
+    for group_index, members in enumerate(groups):
+        contribution[:, :, group_index] = known_responses[:, group_index] / dt_s
+        command[:, group_index] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
+    frames = zip(samples.t_s.tolist(), rates, acceleration, contribution, command, strict=True)
+    error = _model_error_rad_s2(model)
     return [
-        (Measured(t_s, rates, np.zeros(N_Y), expected_rad_s2, by_surfaces, error.copy()), commanded)
-        for t_s, rates, expected_rad_s2, by_surfaces, commanded in parts
+        (Measured(t_s, frame_rates, np.zeros(N_Y), expected_rad_s2, by_surfaces, error.copy()), commanded)
+        for t_s, frame_rates, expected_rad_s2, by_surfaces, commanded in frames
     ]
 
 
-def _error(model: Model) -> Floats:
+def _model_error_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(model.arrays()[3])) / (1.0 / model.rate_hz))
+    return np.asarray(np.sqrt(np.diag(model.coefficient_arrays()[3])) / (1.0 / model.rate_hz))
 
 
-def context_of(model: Model) -> Context:
-    """What a detector is told before the flight."""
+def loop_detector_context(model: Model) -> Context:
+    """Return the context that a detector is given before the flight."""
     dt_s = 1.0 / model.rate_hz
-    noise = np.zeros(7)
-    noise[:3] = _GYRO_RAD_S
-    design: Any = Linear(model.arrays()[1], dt_s)
+    noise_sd = np.zeros(7)
+    noise_sd[:3] = _DECLARED_GYRO_NOISE_RAD_S
+    design: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
-        trim_rad=np.zeros(_SURFACES), travel_rad=np.outer((-1.0, 1.0), np.ones(_SURFACES)),
-        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*PLACES, "flap"),
-        declared=Declared(noise=noise, model_rad_s2=_error(model)),
+        trim_rad=np.zeros(_N_LOOP_SURFACES), travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES)),
+        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*LOOP_SURFACES_BY_GROUP, "flap"),
+        declared=Declared(noise=noise_sd, model_rad_s2=_model_error_rad_s2(model)),
     )  # fmt: skip
 
 
-def run_detector(detector: Detector, samples: Samples, model: Model) -> Rows:
+def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> DiagnosisRows:
     """Step a detector of the loop through a flight. An alarm stands while its statistic says so."""
-    stream = stream_of(samples, model)
-    detector.reset(context_of(model))
-    return rows_of([detector.step(*given) for given in stream], samples, model)
+    detector_inputs = loop_detector_inputs(samples, model)
+    detector.reset(loop_detector_context(model))
+    return rows_of_verdicts([detector.step(*frame) for frame in detector_inputs], samples, model)
 
 
-def rows_of(verdicts: list[Verdict], samples: Samples, model: Model) -> Rows:
+def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. A detector that gives no bounds says 0 to 1 of what it suspects."""
-    n, groups = len(verdicts), group_indices(model)
-    faulty = np.array([_alarm(verdict) for verdict in verdicts], dtype=np.int64)
-    estimate, low = np.ones((2, n, len(model.vehicle.surfaces)))
-    named = np.full(n, "", dtype=object)
+    n_samples, groups = len(verdicts), surface_indices_by_group(model)
+    faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
+    estimate, low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
+    named = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in PLACES[: len(groups)]:
-            named[k], low[k] = UNKNOWN, 0.0
+        if verdicts[k].isolated not in LOOP_SURFACES_BY_GROUP[: len(groups)]:
+            named[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
-        place = PLACES.index(str(verdicts[k].isolated))
-        named[k], low[k, groups[place]] = "+".join(model.groups[place]), 0.0
-        estimate[k, groups[place]] = _remaining(verdicts[k], place)
+        group_index = LOOP_SURFACES_BY_GROUP.index(str(verdicts[k].isolated))
+        named[k], low[k, groups[group_index]] = "+".join(model.groups[group_index]), 0.0
+        estimate[k, groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
-    return _told(samples, named, estimate, low=low, high=np.ones_like(low), probability=probability)
+    return _rows_without_bounds(
+        samples, named, estimate, low=low, high=np.ones_like(low), probability=probability
+    )
 
 
-def _alarm(verdict: Verdict) -> bool:
+def _raises_alarm(verdict: Verdict) -> bool:
     """By the statistic of this sample where there is one; the loop's own latch serves one fault a flight."""
     return verdict.statistic > 1.0 if np.isfinite(verdict.statistic) else verdict.detected
 
 
-def _remaining(verdict: Verdict, place: int) -> float:
+def _remaining_effectiveness(verdict: Verdict, group_index: int) -> float:
     if verdict.effectiveness is not None:
-        return float(np.clip(verdict.effectiveness[place], 0.0, 1.0))
+        return float(np.clip(verdict.effectiveness[group_index], 0.0, 1.0))
     return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0
 
 
-_OF_FLIGHTS: dict[str, Callable[[Samples, Model], Rows]] = {
-    BANK: diagnose,
-    "sliding-least-squares": partial(_least_squares, forget=False),
-    "forgetting-least-squares": partial(_least_squares, forget=True),
+_FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], DiagnosisRows]] = {
+    BANK_OF_FILTERS: diagnose,
+    "sliding-least-squares": partial(_diagnose_by_least_squares, forgets_exponentially=False),
+    "forgetting-least-squares": partial(_diagnose_by_least_squares, forgets_exponentially=True),
 }
 
 
 def detector_names() -> list[str]:
     """Every detector a recorded flight can be given to, ours first."""
-    return [*_OF_FLIGHTS, *(name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name))]
+    return [*_FLIGHT_DETECTORS, *(name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name))]
 
 
 def check_detector(name: str) -> None:
     """Raise BadInput for a detector that recorded flights do not know."""
-    known = detector_names()
-    if name not in known:
-        raise BadInput(f"--detector {name}: is not known{suggestion(name, known)}")
+    known_names = detector_names()
+    if name not in known_names:
+        raise BadInput(f"--detector {name}: is not known{suggestion(name, known_names)}")
 
 
-def diagnose_with(name: str, samples: Samples, model: Model) -> Rows:
+def diagnose_with(detector_name: str, samples: Samples, model: Model) -> DiagnosisRows:
     """The rows of one detector. Raises BadInput for an unknown name, or a log at another rate."""
-    check_detector(name)
-    check_rate(samples, model)
-    if name == BANK:
+    check_detector(detector_name)
+    check_log_fits_model(samples, model)
+    if detector_name == BANK_OF_FILTERS:
         return diagnose(samples, model)
-    lived = without_dead(samples, model)
-    if name in _OF_FLIGHTS:
-        return silenced(samples, model, _OF_FLIGHTS[name](lived, model))
-    detector: Detector = made(DETECTORS, name)
-    return silenced(samples, model, run_detector(detector, lived, model))
+    live_samples = with_dead_rates_unknown(samples, model)
+    if detector_name in _FLIGHT_DETECTORS:
+        return without_rows_not_credible(
+            samples, model, _FLIGHT_DETECTORS[detector_name](live_samples, model)
+        )
+    detector: Detector = made(DETECTORS, detector_name)
+    return without_rows_not_credible(samples, model, run_loop_detector(detector, live_samples, model))

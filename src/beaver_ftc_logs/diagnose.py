@@ -12,117 +12,122 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
-from beaver_ftc_logs.bank import GROUP, Bank, bank_of
-from beaver_ftc_logs.bank import UNKNOWN as UNKNOWN_OFFSET
-from beaver_ftc_logs.filtering import accumulated, evidence, posterior_of
+from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_hypothesis_bank
+from beaver_ftc_logs.filtering import fault_evidence_gains, hypothesis_posterior, page_sum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.regression import by_surface, predicted
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import columns_by_surface, split_response
 from beaver_ftc_logs.samples import Samples
 
-_RATE_TOLERANCE = 0.25
-UNKNOWN = "unknown"
-_NAMED = 0.5
-_MISNAMED = 0.001
+_LOG_RATE_TOLERANCE = 0.25
+UNKNOWN_SURFACE = "unknown"
+_MIN_NAMING_PROBABILITY = 0.5
+_MAX_WRONG_NAME_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
-_LATELY_S = 1.0
-_STILL = 1e-6
+_RESIDUAL_DIRECTION_WINDOW_S = 1.0
+_MIN_COMMAND_MOTION_SHARE = 1e-6
 """Share of travel that a command moves by rounding alone."""
-_IDLE = 0.5
+_MAX_NO_RESPONSE_PROBABILITY = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
 @dataclass(frozen=True)
-class Rows:
+class DiagnosisRows:
     """A row a sample.
 
-    t_s (n,); faulty (n,) 0 or 1; named (n,) text; estimate, low, high (n, S) effectiveness of each surface;
-    probability (n,) of a fault of any surface; credible (n,) 0 or 1, 1 where nothing else is given; since_s
-    (n,) when the evidence for a fault began to gather, t_s where nothing else is given; reasons: rows that
-    are not credible, by what is wrong.
+    t_s (n,); faulty (n,) 0 or 1; named_surfaces (n,) text; effectiveness of each surface, its
+    effectiveness_low and effectiveness_high (n, S); fault_probability (n,) of any surface; credible (n,) 0 or
+    1, 1 where nothing else is given; evidence_since_s (n,) when the evidence for a fault began to gather, t_s
+    where nothing else is given; reasons_not_credible: rows that are not credible, by what is wrong.
     """
 
     t_s: Floats
     faulty: NDArray[np.int64]
-    named: NDArray[np.object_]
-    estimate: Floats
-    low: Floats
-    high: Floats
-    probability: Floats
+    named_surfaces: NDArray[np.object_]
+    effectiveness: Floats
+    effectiveness_low: Floats
+    effectiveness_high: Floats
+    fault_probability: Floats
     credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    since_s: Floats = field(default_factory=lambda: np.empty(0))
-    reasons: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    evidence_since_s: Floats = field(default_factory=lambda: np.empty(0))
+    reasons_not_credible: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if len(self.since_s) != len(self.t_s):
-            object.__setattr__(self, "since_s", self.t_s)
+        if len(self.evidence_since_s) != len(self.t_s):
+            object.__setattr__(self, "evidence_since_s", self.t_s)
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
-    def unbounded(self, where: NDArray[np.bool_]) -> "Rows":
-        """The rows with nothing said of effectiveness where (n,) or (n, S) is true."""
-        here = where if where.ndim == 2 else where[:, None]
+    def without_estimate(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
+        """The rows with nothing said of effectiveness where is_removed (n,) or (n, S) is true."""
+        is_removed_by_surface = is_removed if is_removed.ndim == 2 else is_removed[:, None]
         return replace(
             self,
-            estimate=np.where(here, 1.0, self.estimate),
-            low=np.where(here, 0.0, self.low),
-            high=np.where(here, 1.0, self.high),
+            effectiveness=np.where(is_removed_by_surface, 1.0, self.effectiveness),
+            effectiveness_low=np.where(is_removed_by_surface, 0.0, self.effectiveness_low),
+            effectiveness_high=np.where(is_removed_by_surface, 1.0, self.effectiveness_high),
         )
 
-    def quiet(self, where: NDArray[np.bool_]) -> "Rows":
-        """The rows without alarm and name where (n,) is true."""
+    def without_alarm(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
+        """The rows without alarm and name where is_removed (n,) is true."""
         return replace(
             self,
-            faulty=np.where(where, 0, self.faulty),
-            named=np.where(where, "", self.named),
-            probability=np.where(where, 0.0, self.probability),
+            faulty=np.where(is_removed, 0, self.faulty),
+            named_surfaces=np.where(is_removed, "", self.named_surfaces),
+            fault_probability=np.where(is_removed, 0.0, self.fault_probability),
         )
 
-    def silent(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "Rows":
+    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "DiagnosisRows":
         """The rows that say nothing where one of the reasons, (n,) each, is true."""
-        gone = np.zeros(len(self.t_s), dtype=bool)
-        for where in reasons.values():
-            gone |= where
-        rows = self.unbounded(gone).quiet(gone)
-        return replace(rows, credible=np.where(gone, 0, 1), reasons=reasons)
+        is_removed = np.zeros(len(self.t_s), dtype=bool)
+        for has_reason in reasons.values():
+            is_removed |= has_reason
+        rows = self.without_estimate(is_removed).without_alarm(is_removed)
+        return replace(rows, credible=np.where(is_removed, 0, 1), reasons_not_credible=reasons)
 
 
-def diagnose(samples: Samples, model: Model) -> Rows:
+def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
-    check_rate(samples, model)
-    bank = bank_of(model)
-    lived = trust.without_dead(samples, model)
-    posterior, _, _ = posterior_of(lived, model, bank)
-    still = posterior[:, bank.idle] > _IDLE
-    rows = rows_of(samples, model, bank, posterior)
+    check_log_fits_model(samples, model)
+    bank = build_hypothesis_bank(model)
+    live_samples = trust.with_dead_rates_unknown(samples, model)
+    posterior, _, _ = hypothesis_posterior(live_samples, model, bank)
+    has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
+    rows = rows_of_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
-        rows = _along(lived, model, rows, model.settings.threshold)
-    return silenced(samples, model, rows, still)
+        rows = _without_contradicted_names(live_samples, model, rows, model.settings.threshold)
+    return without_rows_not_credible(samples, model, rows, has_no_response)
 
 
-def silenced(
+def without_rows_not_credible(
     samples: Samples,
     model: Model,
-    rows: Rows,
-    still: NDArray[np.bool_] | None = None,
-) -> Rows:
+    rows: DiagnosisRows,
+    has_no_response: NDArray[np.bool_] | None = None,
+) -> DiagnosisRows:
     """Rows at the log's own stamps, that say nothing where the model is not credible, and nothing of a group
-    whose effect it does not know. still (n,): where nothing answers the commands."""
-    reasons = trust.outside(samples, model)
-    if still is not None and still.any():
-        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = still
-    if not any(trust.claimed(model)):
+    whose effect it does not know. has_no_response (n,): where nothing answers the commands."""
+    reasons = trust.rows_outside_model(samples, model)
+    if has_no_response is not None and has_no_response.any():
+        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
+            has_no_response
+        )
+    if not any(trust.groups_with_known_effect(model)):
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _with_untold(samples, model, _without_power(samples, model, rows))
-    told = np.array(trust.claimed(model), dtype=float)[None]
-    unknown = np.broadcast_to(by_surface(told, model) == 0.0, rows.low.shape)
-    return _at_stamps(samples, rows.unbounded(unknown).silent(reasons))
+    rows = _with_unobservable_surfaces(
+        samples, model, _without_names_after_engine_failure(samples, model, rows)
+    )
+    has_known_gain = np.array(trust.groups_with_known_gain(model), dtype=float)[None]
+    is_unknown_gain = np.broadcast_to(
+        columns_by_surface(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
+    )
+    return _rows_at_log_stamps(samples, rows.without_estimate(is_unknown_gain).without_verdict(reasons))
 
 
-def _with_untold(samples: Samples, model: Model, rows: Rows) -> Rows:
+def _with_unobservable_surfaces(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
     """Rows that name, with a surface, each whose effect the model cannot tell and that may be at fault in its
     place; bounds of a name of several hold where any one of them is at fault.
 
@@ -130,222 +135,282 @@ def _with_untold(samples: Samples, model: Model, rows: Rows) -> Rows:
     stuck one may be any.
     """
     surfaces = list(model.vehicle.surfaces)
-    moved = np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0) > _STILL
-    moved |= "stuck" in model.vehicle.faults
-    untold = trust.unclaimed(model)
-    joins = moved & np.array([surface in untold for surface in surfaces])
-    named, high = rows.named.copy(), rows.high.copy()
+    has_moved = (
+        np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0)
+        > _MIN_COMMAND_MOTION_SHARE
+    )
+    has_moved |= "stuck" in model.vehicle.faults
+    surfaces_of_unknown_effect = trust.surfaces_of_unknown_effect(model)
+    may_join = has_moved & np.array([surface in surfaces_of_unknown_effect for surface in surfaces])
+    named, high = rows.named_surfaces.copy(), rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
-        given = set(str(named[k]).split("+"))
-        if not given <= set(surfaces):
+        named_group = set(str(named[k]).split("+"))
+        if not named_group <= set(surfaces):
             continue
-        members = np.array([one in given or bool(joins[k, i]) for i, one in enumerate(surfaces)])
-        named[k] = "+".join(compress(surfaces, members))
-        if members.sum() > len(given) or (model.settings.one_group and not _is_group(given, model)):
-            high[k, members] = 1.0
-    return replace(rows, named=named, high=high)
+        is_named = np.array([one in named_group or bool(may_join[k, i]) for i, one in enumerate(surfaces)])
+        named[k] = "+".join(compress(surfaces, is_named))
+        if is_named.sum() > len(named_group) or (
+            model.settings.one_group and not _are_in_one_group(named_group, model)
+        ):
+            high[k, is_named] = 1.0
+    return replace(rows, named_surfaces=named, effectiveness_high=high)
 
 
-def _is_group(given: set[str], model: Model) -> bool:
+def _are_in_one_group(named_surfaces: set[str], model: Model) -> bool:
     """Whether surfaces are one group of the model, which has one effectiveness."""
-    return any(given <= set(group) for group in model.groups)
+    return any(named_surfaces <= set(group) for group in model.groups)
 
 
-def _without_power(samples: Samples, model: Model, rows: Rows) -> Rows:
+def _without_names_after_engine_failure(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
     """Rows in which no surface is named where an engine may have failed."""
-    lowest = model.fitted.energy_climb if model.fitted is not None else None
-    if lowest is None or samples.energy_climb is None:
+    unpowered_climb_mps = model.fitted.energy_climb if model.fitted is not None else None
+    if unpowered_climb_mps is None or samples.energy_climb_mps is None:
         return rows
-    climb = samples.energy_climb
-    named = energy.renamed(rows.t_s, rows.faulty, rows.named, climb, lowest, rows.since_s)
-    return replace(rows.unbounded(named != rows.named), named=named)
+    climb_mps = samples.energy_climb_mps
+    named = energy.without_surfaces_after_engine_failure(
+        rows.t_s, rows.faulty, rows.named_surfaces, climb_mps, unpowered_climb_mps, rows.evidence_since_s
+    )
+    return replace(rows.without_estimate(named != rows.named_surfaces), named_surfaces=named)
 
 
-def _along(samples: Samples, model: Model, rows: Rows, asked: float) -> Rows:
+def _without_contradicted_names(
+    samples: Samples, model: Model, rows: DiagnosisRows, min_log_likelihood_gain: float
+) -> DiagnosisRows:
     """Rows that name no group where what the last second left unexplained lies along another.
 
     Whatever a surface at fault does, be it stuck, biased or swinging, it does along the rates that it turns
     when it is healthy: a name is taken back where another direction, whatever the course of time along it,
     explains as much more as is asked. Not in moving air: gusts have directions, too.
     """
-    rest = healthy_residual(model, *predicted(samples, model))
-    _, _, response, noise = model.arrays()
-    turned = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
-    size = np.linalg.norm(turned, axis=0)
-    along = (rest @ (turned / np.maximum(size, TINY))) ** 2
-    total = np.cumsum(along, axis=0)
-    begin = np.maximum(np.arange(len(total)) - round(_LATELY_S * model.rate_hz), 0)
-    explained = 0.5 * model.settings.power * (total - total[begin])
-    best, gone = explained.max(axis=1), np.zeros(len(rest), dtype=bool)
-    for g, group in enumerate(model.groups):
-        gone |= _of(rows.named, set(group)) & (best - explained[:, g] > asked)
-    return replace(rows.unbounded(gone), named=np.where(gone, UNKNOWN, rows.named))
-
-
-def healthy_residual(model: Model, ok: NDArray[np.bool_], unexplained: Floats, answers: Floats) -> Floats:
-    """What a healthy vehicle leaves of what is `predicted`, in standard deviations of the noise, (n, 3); 0
-    where nothing can be."""
-    intercept, _, _, noise = model.arrays()
-    rest = np.where(ok[:, None], unexplained - intercept - answers.sum(axis=1), 0.0)
-    return np.asarray(rest @ np.linalg.inv(np.linalg.cholesky(noise)).T)
-
-
-def _of(named: NDArray[np.object_], unclaimed: set[str]) -> NDArray[np.bool_]:
-    """Which rows name a surface of which nothing is claimed."""
-    return np.array([bool(unclaimed & set(name.split("+"))) for name in named], dtype=bool)
-
-
-def check_rate(samples: Samples, model: Model) -> None:
-    """Raise BadInput where a log's rate is not the model's."""
-    rate_hz = 1.0 / samples.dt_s
-    if abs(rate_hz / model.rate_hz - 1.0) > _RATE_TOLERANCE:
-        raise BadInput(
-            f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_RATE_TOLERANCE:.0%} of the "
-            f"{model.rate_hz:.3g} Hz the model was identified at"
+    residual = standardized_healthy_residual(model, *split_response(samples, model))
+    _, _, response, noise = model.coefficient_arrays()
+    response_directions = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
+    direction_norms = np.linalg.norm(response_directions, axis=0)
+    squared_projections = (residual @ (response_directions / np.maximum(direction_norms, MIN_DIVISOR))) ** 2
+    cumulated = np.cumsum(squared_projections, axis=0)
+    window_begin = np.maximum(
+        np.arange(len(cumulated)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
+    )
+    log_likelihood_gain = 0.5 * model.settings.power * (cumulated - cumulated[window_begin])
+    best_gain, is_contradicted = log_likelihood_gain.max(axis=1), np.zeros(len(residual), dtype=bool)
+    for group_index, group in enumerate(model.groups):
+        is_contradicted |= _rows_naming_any(rows.named_surfaces, set(group)) & (
+            best_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
         )
-    trust.check_units(samples, model.fitted)
-    trust.check_columns(samples, model)
-
-
-def rows_of(samples: Samples, model: Model, bank: Bank, posterior: Floats) -> Rows:
-    """What the probabilities of the hypotheses (n, H) say of each sample."""
-    idle = posterior[:, bank.idle]
-    probability = posterior[:, bank.faults].sum(axis=1)
-    answering = posterior[:, : bank.idle] / np.maximum(1.0 - idle, TINY)[:, None]
-    well = posterior[:, 0] + idle > 0.5
-    threshold = model.settings.threshold
-    gained = evidence(posterior, bank)
-    gathered = accumulated(gained, threshold or np.inf)
-    raised = sure = _standing(probability >= model.settings.alarm, model)
-    if threshold is not None:
-        named_at = model.settings.name_evidence * threshold
-        raised = (gathered >= threshold) & ~well
-        sure = (accumulated(gained, named_at) >= named_at) & ~well
-    faulty = _latched(raised, well).astype(np.int64)
-    began = np.maximum.accumulate(np.where(gathered <= 0.0, np.arange(len(gathered)), 0))
-    by_group = [_of_group(bank, answering, g, model) for g in range(len(model.groups))]
-    estimate, low, high = (np.column_stack(part) for part in zip(*by_group, strict=True))
-    still = idle > _IDLE
-    estimate[still], low[still], high[still] = 1.0, 0.0, 1.0
-    if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
-        high[faulty == 0] = 1.0
-    return Rows(
-        t_s=samples.t_s,
-        faulty=faulty,
-        named=_names(model, bank, posterior, faulty, _latched(sure, well)),
-        estimate=by_surface(estimate, model),
-        low=by_surface(low, model),
-        high=by_surface(high, model),
-        probability=probability,
-        since_s=samples.t_s[began],
+    return replace(
+        rows.without_estimate(is_contradicted),
+        named_surfaces=np.where(is_contradicted, UNKNOWN_SURFACE, rows.named_surfaces),
     )
 
 
-def _of_group(bank: Bank, posterior: Floats, group: int, model: Model) -> tuple[Floats, ...]:
+def standardized_healthy_residual(
+    model: Model, is_predictable: NDArray[np.bool_], unexplained: Floats, responses: Floats
+) -> Floats:
+    """Residual of a healthy vehicle by `split_response`, in standard deviations of the noise, (n, 3); 0 where
+    no sample can be predicted."""
+    intercept, _, _, noise = model.coefficient_arrays()
+    residual = np.where(is_predictable[:, None], unexplained - intercept - responses.sum(axis=1), 0.0)
+    return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(noise)).T)
+
+
+def _rows_naming_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
+    """Which rows name a surface of which nothing is claimed."""
+    return np.array([bool(surfaces & set(name.split("+"))) for name in named], dtype=bool)
+
+
+def check_log_fits_model(samples: Samples, model: Model) -> None:
+    """Raise BadInput where a log's rate is not the model's."""
+    rate_hz = 1.0 / samples.dt_s
+    if abs(rate_hz / model.rate_hz - 1.0) > _LOG_RATE_TOLERANCE:
+        raise BadInput(
+            f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
+            f"the {model.rate_hz:.3g} Hz the model was identified at"
+        )
+    trust.check_rate_units(samples, model.fitted)
+    trust.check_columns(samples, model)
+
+
+def rows_of_posterior(
+    samples: Samples, model: Model, bank: HypothesisBank, posterior: Floats
+) -> DiagnosisRows:
+    """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
+    no_response_probability = posterior[:, bank.no_response_index]
+    probability = posterior[:, bank.is_fault].sum(axis=1)
+    posterior_given_response = (
+        posterior[:, : bank.no_response_index]
+        / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
+    )
+    is_healthier = posterior[:, 0] + no_response_probability > 0.5
+    threshold = model.settings.threshold
+    evidence_gains = fault_evidence_gains(posterior, bank)
+    evidence = page_sum(evidence_gains, threshold or np.inf)
+    is_alarm_raised = is_name_sure = _has_held_long_enough(probability >= model.settings.alarm, model)
+    if threshold is not None:
+        naming_threshold = model.settings.name_evidence * threshold
+        is_alarm_raised = (evidence >= threshold) & ~is_healthier
+        is_name_sure = (page_sum(evidence_gains, naming_threshold) >= naming_threshold) & ~is_healthier
+    faulty = _latch_until_healthy(is_alarm_raised, is_healthier).astype(np.int64)
+    evidence_begin = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
+    by_group = [
+        _group_effectiveness_and_bounds(bank, posterior_given_response, group_index, model)
+        for group_index in range(len(model.groups))
+    ]
+    estimate, low, high = (np.column_stack(column) for column in zip(*by_group, strict=True))
+    has_no_response = no_response_probability > _MAX_NO_RESPONSE_PROBABILITY
+    estimate[has_no_response], low[has_no_response], high[has_no_response] = 1.0, 0.0, 1.0
+    if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
+        high[faulty == 0] = 1.0
+    return DiagnosisRows(
+        t_s=samples.t_s,
+        faulty=faulty,
+        named_surfaces=_surfaces_at_fault(
+            model, bank, posterior, faulty, _latch_until_healthy(is_name_sure, is_healthier)
+        ),
+        effectiveness=columns_by_surface(estimate, model),
+        effectiveness_low=columns_by_surface(low, model),
+        effectiveness_high=columns_by_surface(high, model),
+        fault_probability=probability,
+        evidence_since_s=samples.t_s[evidence_begin],
+    )
+
+
+def _group_effectiveness_and_bounds(
+    bank: HypothesisBank, posterior: Floats, group: int, model: Model
+) -> tuple[Floats, ...]:
     """A group's effectiveness and its bounds, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
-    levels, mass = _marginal(bank, posterior, group)
+    levels, level_probability = _marginal_distribution(bank, posterior, group)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
-        mass = mass / _marginal(bank, bank.start[None, : bank.idle], group)[1]
-        mass /= mass.sum(axis=1, keepdims=True)
-    low, high = _bounds(levels, mass, model.settings.bounds)
+        level_probability = (
+            level_probability
+            / _marginal_distribution(bank, bank.prior_probability[None, : bank.no_response_index], group)[1]
+        )
+        level_probability /= level_probability.sum(axis=1, keepdims=True)
+    low, high = _credible_bounds(levels, level_probability, model.settings.bounds)
     if len(model.groups[group]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
-    return _median(levels, mass), low, high
+    return _median_level(levels, level_probability), low, high
 
 
-def _standing(raised: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
-    """Where a condition holds, and has held for long enough up to there."""
-    reach = round(model.settings.hold_s * model.rate_hz)
-    since = np.arange(len(raised)) - np.maximum.accumulate(np.where(raised, -1, np.arange(len(raised))))
-    return np.asarray(raised & (since > reach))
+def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
+    """Return the rows at which a condition holds and has held for long enough, (n,)."""
+    min_samples = round(model.settings.hold_s * model.rate_hz)
+    held_samples = np.arange(len(condition)) - np.maximum.accumulate(
+        np.where(condition, -1, np.arange(len(condition)))
+    )
+    return np.asarray(condition & (held_samples > min_samples))
 
 
-def _latched(raised: NDArray[np.bool_], well: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latch_until_healthy(is_raised: NDArray[np.bool_], is_healthier: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
-    order = np.arange(len(raised))
-    last_raised = np.maximum.accumulate(np.where(raised, order, -1))
-    last_well = np.maximum.accumulate(np.where(well & ~raised, order, -1))
-    return np.asarray((last_raised >= 0) & (last_raised > last_well))
+    row_index = np.arange(len(is_raised))
+    last_raised = np.maximum.accumulate(np.where(is_raised, row_index, -1))
+    last_healthy = np.maximum.accumulate(np.where(is_healthier & ~is_raised, row_index, -1))
+    return np.asarray((last_raised >= 0) & (last_raised > last_healthy))
 
 
-def _marginal(bank: Bank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
+def _marginal_distribution(bank: HypothesisBank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
-    levels, index = np.unique(bank.effectiveness[: bank.idle, group], return_inverse=True)
-    mass = np.zeros((len(posterior), len(levels)))
-    for hypothesis, level in enumerate(index):
-        mass[:, level] += posterior[:, hypothesis]
-    return levels, mass
+    levels, level_of_hypothesis = np.unique(
+        bank.effectiveness[: bank.no_response_index, group], return_inverse=True
+    )
+    level_probability = np.zeros((len(posterior), len(levels)))
+    for hypothesis, level_index in enumerate(level_of_hypothesis):
+        level_probability[:, level_index] += posterior[:, hypothesis]
+    return levels, level_probability
 
 
-def _median(levels: Floats, mass: Floats) -> Floats:
+def _median_level(levels: Floats, level_probability: Floats) -> Floats:
     """The level with half of the probability on either side: the least mean absolute error."""
-    return np.asarray(levels[(np.cumsum(mass, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
+    return np.asarray(levels[(np.cumsum(level_probability, axis=1) >= 0.5 - 1e-12).argmax(axis=1)])
 
 
-def _bounds(levels: Floats, mass: Floats, share: float) -> tuple[Floats, Floats]:
+def _credible_bounds(
+    levels: Floats, level_probability: Floats, min_probability: float
+) -> tuple[Floats, Floats]:
     """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
-    order = np.argsort(-mass, axis=1, kind="stable")
-    ranked = np.take_along_axis(mass, order, axis=1)
-    inside = np.cumsum(ranked, axis=1) - ranked < share
-    chosen = np.where(inside, levels[order], np.nan)
-    low, high = np.nanmin(chosen, axis=1), np.nanmax(chosen, axis=1)
-    edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
-    return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
+    by_probability = np.argsort(-level_probability, axis=1, kind="stable")
+    ranked_probability = np.take_along_axis(level_probability, by_probability, axis=1)
+    is_inside = np.cumsum(ranked_probability, axis=1) - ranked_probability < min_probability
+    chosen_levels = np.where(is_inside, levels[by_probability], np.nan)
+    low, high = np.nanmin(chosen_levels, axis=1), np.nanmax(chosen_levels, axis=1)
+    level_edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
+    return level_edges[np.searchsorted(levels, low)], level_edges[np.searchsorted(levels, high) + 1]
 
 
-def _names(
-    model: Model, bank: Bank, posterior: Floats, faulty: NDArray[np.int64], sure: NDArray[np.bool_]
+def _surfaces_at_fault(
+    model: Model,
+    bank: HypothesisBank,
+    posterior: Floats,
+    faulty: NDArray[np.int64],
+    is_name_sure: NDArray[np.bool_],
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
-    sure (n,): where the evidence is enough for a name. Where one group is at fault (`one_group`), each that
-    may be instead is named with it; `unknown` where none that the bank has is left out.
+    is_name_sure (n,): where the evidence is enough for a name. Where one group is at fault (`one_group`),
+    each that may be instead is named with it; `unknown` where none that the bank has is left out.
     """
-    total = np.maximum(posterior[:, bank.faults].sum(axis=1), TINY)
-    shares = [posterior[:, bank.faulty(g)].sum(axis=1) / total for g in range(len(model.groups))]
-    share = np.column_stack(shares)
-    likelier = (share > _NAMED) & sure[:, None]
+    fault_probability = np.maximum(posterior[:, bank.is_fault].sum(axis=1), MIN_DIVISOR)
+    group_shares = [
+        posterior[:, bank.is_fault_of(g)].sum(axis=1) / fault_probability for g in range(len(model.groups))
+    ]
+    group_share = np.column_stack(group_shares)
+    is_likely = (group_share > _MIN_NAMING_PROBABILITY) & is_name_sure[:, None]
     if model.settings.one_group:
-        single = bank.kind == GROUP
-        alone = np.column_stack(
-            [posterior[:, bank.faulty(g) & single].sum(axis=1) for g in range(len(model.groups))]
+        is_single_loss = bank.hypothesis_kind == GROUP_LOSS
+        single_loss_probability = np.column_stack(
+            [posterior[:, bank.is_fault_of(g) & is_single_loss].sum(axis=1) for g in range(len(model.groups))]
         )
-        likelier = (alone > _MISNAMED * alone.max(axis=1, keepdims=True)) & sure[:, None]
-        candidates = alone.max(axis=0) > 0.0
-        likelier &= ~(likelier[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
-    likely = joined(likelier, ["+".join(group) for group in model.groups])
+        is_likely = (
+            single_loss_probability
+            > _MAX_WRONG_NAME_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
+        ) & is_name_sure[:, None]
+        candidates = single_loss_probability.max(axis=0) > 0.0
+        is_likely &= ~(is_likely[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
+    likely_names = join_flagged_names(is_likely, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
-    other = posterior[:, bank.kind == UNKNOWN_OFFSET].sum(axis=1) > total
-    reach, stood = round(model.settings.rename_s * model.rate_hz), 0
+    is_unknown_offset = posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
+    rename_samples, unchanged_samples = round(model.settings.rename_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
-        now, said = likely[k] or UNKNOWN, named[k - 1] if k else ""
-        stood = stood + 1 if k and now == (likely[k - 1] or UNKNOWN) else 0
+        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
+        unchanged_samples = (
+            unchanged_samples + 1 if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE) else 0
+        )
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
-        keeps = said and (other[k] or (said != UNKNOWN and (stood < reach or _as_wide(now, said, model))))
-        named[k] = said if keeps else now
+        keeps_name = last_name and (
+            is_unknown_offset[k]
+            or (
+                last_name != UNKNOWN_SURFACE
+                and (unchanged_samples < rename_samples or _keeps_all_names(new_name, last_name, model))
+            )
+        )
+        named[k] = last_name if keeps_name else new_name
     return named
 
 
-def _as_wide(now: str, said: str, model: Model) -> bool:
+def _keeps_all_names(new_name: str, last_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.one_group and (now == UNKNOWN or set(said.split("+")) <= set(now.split("+")))
+    return model.settings.one_group and (
+        new_name == UNKNOWN_SURFACE or set(last_name.split("+")) <= set(new_name.split("+"))
+    )
 
 
-def joined(flags: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
-    """The names that flags (n, K) stand for, joined by +, (n,) text."""
-    return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
+def join_flagged_names(is_named: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+    """The names that are flagged in is_named (n, K), joined by +, (n,) text."""
+    return np.array(["+".join(compress(names, row)) for row in is_named], dtype=object)
 
 
-def _at_stamps(samples: Samples, rows: Rows) -> Rows:
+def _rows_at_log_stamps(samples: Samples, rows: DiagnosisRows) -> DiagnosisRows:
     """The rows at the log's own stamps: each stamp has the last row up to it."""
-    if len(samples.stamps) == len(rows.t_s) and np.array_equal(samples.stamps, rows.t_s):
+    if len(samples.log_stamps_s) == len(rows.t_s) and np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
-    last = np.maximum(np.searchsorted(rows.t_s, samples.stamps, side="right") - 1, 0)
-    others = [name for name in Rows.__dataclass_fields__ if name not in ("t_s", "reasons")]
-    reasons = {reason: rows_outside[last] for reason, rows_outside in rows.reasons.items()}
-    fields = {name: getattr(rows, name)[last] for name in others}
-    return Rows(t_s=samples.stamps, reasons=reasons, **fields)
+    last_rows = np.maximum(np.searchsorted(rows.t_s, samples.log_stamps_s, side="right") - 1, 0)
+    field_names = [
+        name for name in DiagnosisRows.__dataclass_fields__ if name not in ("t_s", "reasons_not_credible")
+    ]
+    reasons = {reason: rows_outside[last_rows] for reason, rows_outside in rows.reasons_not_credible.items()}
+    fields = {name: getattr(rows, name)[last_rows] for name in field_names}
+    return DiagnosisRows(t_s=samples.log_stamps_s, reasons_not_credible=reasons, **fields)

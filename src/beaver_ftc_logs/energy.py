@@ -11,42 +11,58 @@ import numpy as np
 from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc_logs.recording import Floats
 
-ENGINE, UNKNOWN = "engine", "unknown"
-LOWEST = 0.15
+ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
+UNPOWERED_CLIMB_QUANTILE = 0.15
 """Share of healthy flight in which energy falls as fast as without power."""
-_WINDOW_S, _GOES_ON_S = 5.0, 3.0
+_CLIMB_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
 
 
-def climb_of(t_s: Floats, altitude: Floats, airspeed: Floats, run: np.ndarray) -> Floats:
+def energy_climb_mps(
+    t_s: Floats, altitude_m: Floats, airspeed_mps: Floats, stretch_number: np.ndarray
+) -> Floats:
     """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
-    height = altitude + airspeed**2 / (2.0 * GRAVITY_MPS2)
-    first = np.searchsorted(t_s, t_s - _WINDOW_S, side="right") - 1
-    known = (first >= 0) & (run[np.maximum(first, 0)] == run)
-    first = np.maximum(first, 0)
-    lasted_s = np.where(known, t_s - t_s[first], 1.0)
-    return np.asarray(np.where(known, (height - height[first]) / lasted_s, np.nan))
+    energy_height_m = altitude_m + airspeed_mps**2 / (2.0 * GRAVITY_MPS2)
+    window_begin = np.searchsorted(t_s, t_s - _CLIMB_WINDOW_S, side="right") - 1
+    is_within_run = (window_begin >= 0) & (stretch_number[np.maximum(window_begin, 0)] == stretch_number)
+    window_begin = np.maximum(window_begin, 0)
+    window_s = np.where(is_within_run, t_s - t_s[window_begin], 1.0)
+    return np.asarray(
+        np.where(is_within_run, (energy_height_m - energy_height_m[window_begin]) / window_s, np.nan)
+    )
 
 
-def renamed(
-    t_s: Floats, faulty: np.ndarray, named: np.ndarray, climb: Floats, lowest: float, since_s: Floats
+def without_surfaces_after_engine_failure(
+    t_s: Floats,
+    faulty: np.ndarray,
+    named: np.ndarray,
+    climb_mps: Floats,
+    unpowered_climb_mps: float,
+    evidence_since_s: Floats,
 ) -> np.ndarray:
-    """The names of rows (n,), without a surface where an engine may have failed. since_s (n,): since when the
-    evidence for the alarm of each row has gathered.
+    """The names of rows (n,), without a surface where an engine may have failed. evidence_since_s (n,): since
+    when the evidence for the alarm of each row has gathered.
 
     That is so while the window of the energy height reaches back to before then, and from where energy falls
     as without power until it rises, which it does by power alone. A row uses nothing later than its time.
     """
-    found = named.copy()
+    kept_names = named.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        first = int(np.searchsorted(t_s, since_s[begin]))
-        falls, rises = climb[first:end] <= lowest, climb[first:end] > 0.0
-        order = np.arange(end - first)
-        last_fall, last_rise = (np.maximum.accumulate(np.where(one, order, -1)) for one in (falls, rises))
-        doubted = (last_fall > last_rise)[begin - first :]
-        share = np.cumsum(falls[begin - first :]) / np.arange(1, end - begin + 1)
-        goes_on = doubted & (share > 0.5) & (t_s[begin:end] - t_s[begin] >= _GOES_ON_S)
-        says = np.where(np.logical_or.accumulate(goes_on) & doubted, ENGINE, UNKNOWN)
-        early = t_s[begin:end] - t_s[first] < _WINDOW_S
-        found[begin:end] = np.where(doubted | early, says, named[begin:end])
-    return found
+        evidence_begin = int(np.searchsorted(t_s, evidence_since_s[begin]))
+        is_falling, is_rising = (
+            climb_mps[evidence_begin:end] <= unpowered_climb_mps,
+            climb_mps[evidence_begin:end] > 0.0,
+        )
+        row_index = np.arange(end - evidence_begin)
+        last_fall, last_rise = (
+            np.maximum.accumulate(np.where(one, row_index, -1)) for one in (is_falling, is_rising)
+        )
+        is_doubted = (last_fall > last_rise)[begin - evidence_begin :]
+        falling_share = np.cumsum(is_falling[begin - evidence_begin :]) / np.arange(1, end - begin + 1)
+        is_lasting = (
+            is_doubted & (falling_share > 0.5) & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_S)
+        )
+        doubted_names = np.where(np.logical_or.accumulate(is_lasting) & is_doubted, ENGINE, UNKNOWN_SURFACE)
+        is_early = t_s[begin:end] - t_s[evidence_begin] < _CLIMB_WINDOW_S
+        kept_names[begin:end] = np.where(is_doubted | is_early, doubted_names, named[begin:end])
+    return kept_names

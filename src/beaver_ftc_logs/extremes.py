@@ -19,25 +19,27 @@ import numpy as np
 from pydantic import Field
 
 from beaver_ftc.documents import Number, Section
-from beaver_ftc_logs.recording import TINY, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 
-_SHAPE_SD, _SHAPES = 0.2, np.linspace(-0.5, 0.5, 41)
-_SCALES = np.geomspace(0.2, 5.0, 61)
+_SHAPE_PRIOR_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
+_SCALE_RATIO_GRID = np.geomspace(0.2, 5.0, 61)
 """The grid of the shape, and of the scale over the mean excess."""
-_RATES = (np.arange(40) + 0.5) / 40.0
-_LEAST, _PER_ROOT = 10, 2.0
+_PEAK_RATE_PROBABILITIES = (np.arange(40) + 0.5) / 40.0
+_MIN_PEAKS, _PEAKS_PER_ROOT_OF_COUNT = 10, 2.0
 """Peaks over the level: so many at least, else so many times the root of their number."""
-_SURE = (0.05, 0.95)
-SHOWN = 3.0
+_CREDIBLE_PROBABILITIES = (0.05, 0.95)
+EXPECTED_ALARMS_RULED_OUT = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
-_HIGHEST = 1e4
-_ROUNDING = 1e-9  # of a sum of probabilities: a quantile between two rates must not hang on its last digits
+_MAX_THRESHOLD = 1e4
+_PROBABILITY_ROUNDING = (
+    1e-9  # of a sum of probabilities: a quantile between two rates must not hang on its last digits
+)
 
-Part = tuple[Floats, float]
+PeaksAndHours = tuple[Floats, float]
 """Peaks of what is left out in one, and its hours."""
 
 
-class Tail(Section):
+class PeakTail(Section):
     """The highest peaks of the alarm statistic on parts not fitted."""
 
     level: Number = Field(description="the level, in natural logarithms of odds")
@@ -47,7 +49,7 @@ class Tail(Section):
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedFalseAlarms:
     """False alarms an hour: mean, and what 90 % of the posterior lies between."""
 
     value: float
@@ -55,101 +57,125 @@ class Expected:
     high: float
 
 
-def peaks_of(statistic: Floats) -> Floats:
+def peaks_between_zeros(statistic: Floats) -> Floats:
     """The highest value of each stretch above zero, (k,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], statistic > 0.0, [0]]).astype(np.int8)))
     return np.array([statistic[begin:end].max() for begin, end in zip(edges[::2], edges[1::2], strict=True)])
 
 
-def tail_of(parts: Sequence[Part]) -> Tail | None:
+def fit_peak_tail(healthy_parts: Sequence[PeaksAndHours]) -> PeakTail | None:
     """The tail of parts left out: each one's peaks and its hours; None where they are fewer than ten."""
-    peaks = np.sort(np.concatenate([one for one, _ in parts]) if parts else [])[::-1]
-    if len(peaks) <= _LEAST:
+    peaks = np.sort(np.concatenate([one for one, _ in healthy_parts]) if healthy_parts else [])[::-1]
+    if len(peaks) <= _MIN_PEAKS:
         return None
-    count = min(max(_LEAST, int(_PER_ROOT * np.sqrt(len(peaks)))), len(peaks) - 1)
-    level = float(peaks[count])
-    return Tail(
+    n_peaks_over_level = min(
+        max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(peaks)))), len(peaks) - 1
+    )
+    level = float(peaks[n_peaks_over_level])
+    return PeakTail(
         level=level,
-        excess=(peaks[:count] - level).tolist(),
-        minutes=60.0 * sum(hours for _, hours in parts),
-        dispersion=_dispersion([(one[one > level] - level, hours) for one, hours in parts]),
+        excess=(peaks[:n_peaks_over_level] - level).tolist(),
+        minutes=60.0 * sum(hours for _, hours in healthy_parts),
+        dispersion=_excess_dispersion([(one[one > level] - level, hours) for one, hours in healthy_parts]),
     )
 
 
-def _dispersion(parts: Sequence[Part]) -> float:
+def _excess_dispersion(healthy_parts: Sequence[PeaksAndHours]) -> float:
     """Chi-square by degree of freedom of what each part's excess comes to, 1 at least: sums of exponential
     excess at Poisson times have twice the variance that their number alone would give."""
-    sums, hours = np.array([one.sum() for one, _ in parts]), np.array([hours for _, hours in parts])
-    number, share = sum(len(one) for one, _ in parts), hours / hours.sum()
-    if len(parts) < 2 or sums.sum() <= 0.0:
+    excess_sums, hours = (
+        np.array([one.sum() for one, _ in healthy_parts]),
+        np.array([hours for _, hours in healthy_parts]),
+    )
+    n_peaks, hours_share = sum(len(one) for one, _ in healthy_parts), hours / hours.sum()
+    if len(healthy_parts) < 2 or excess_sums.sum() <= 0.0:
         return 1.0
-    expected, size = share * sums.sum(), sums.sum() / number
-    square = (sums - expected) ** 2 / np.maximum(2.0 * expected * size, TINY)
-    return max(float(square.sum()) / (len(parts) - 1), 1.0)
+    mean_excess, mean_excess_of_peak = hours_share * excess_sums.sum(), excess_sums.sum() / n_peaks
+    squared_deviation = (excess_sums - mean_excess) ** 2 / np.maximum(
+        2.0 * mean_excess * mean_excess_of_peak, MIN_DIVISOR
+    )
+    return max(float(squared_deviation.sum()) / (len(healthy_parts) - 1), 1.0)
 
 
-def expected(tail: Tail, threshold: float) -> Expected:
+def expected_false_alarms(tail: PeakTail, threshold: float) -> ExpectedFalseAlarms:
     """False alarms an hour at a threshold not below the tail's level."""
-    shape, scale, weight = _posterior(tail)
-    rates = (_above(threshold - tail.level, shape, scale)[:, None] * _rates(tail)[None, :]).ravel()
-    order, mass = np.argsort(rates), np.repeat(weight, len(_RATES)) / len(_RATES)
-    within = np.searchsorted(np.cumsum(mass[order]), np.array(_SURE) - _ROUNDING)
-    low, high = rates[order][np.minimum(within, len(rates) - 1)]
-    return Expected(float(rates @ mass), float(low), float(high))
+    shape, scale, weight = _pareto_posterior(tail)
+    false_alarm_rates = (
+        _exceedance_probability(threshold - tail.level, shape, scale)[:, None]
+        * _peak_rate_quantiles(tail)[None, :]
+    ).ravel()
+    by_rate, rate_probability = (
+        np.argsort(false_alarm_rates),
+        np.repeat(weight, len(_PEAK_RATE_PROBABILITIES)) / len(_PEAK_RATE_PROBABILITIES),
+    )
+    quantile_index = np.searchsorted(
+        np.cumsum(rate_probability[by_rate]), np.array(_CREDIBLE_PROBABILITIES) - _PROBABILITY_ROUNDING
+    )
+    low, high = false_alarm_rates[by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
+    return ExpectedFalseAlarms(float(false_alarm_rates @ rate_probability), float(low), float(high))
 
 
-def threshold_for(tail: Tail, per_hour: float) -> float:
+def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """The threshold at which so many false alarms an hour are expected; the level where that has fewer."""
-    shape, scale, weight = _posterior(tail)
-    level_rate = float(_rates(tail).mean())
+    shape, scale, weight = _pareto_posterior(tail)
+    mean_peak_rate = float(_peak_rate_quantiles(tail).mean())
 
-    def too_low(excess: float) -> bool:
-        return level_rate * float(_above(excess, shape, scale) @ weight) > per_hour
+    def has_too_many_alarms(excess: float) -> bool:
+        return (
+            mean_peak_rate * float(_exceedance_probability(excess, shape, scale) @ weight)
+            > false_alarms_per_hour
+        )
 
-    low, high = 0.0, 1.0
-    if not too_low(low):
+    low_excess, high_excess = 0.0, 1.0
+    if not has_too_many_alarms(low_excess):
         return tail.level
-    while too_low(high) and high < _HIGHEST:
-        low, high = high, 2.0 * high
+    while has_too_many_alarms(high_excess) and high_excess < _MAX_THRESHOLD:
+        low_excess, high_excess = high_excess, 2.0 * high_excess
     for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if too_low(middle) else (low, middle)
-    return tail.level + high
+        middle_excess = 0.5 * (low_excess + high_excess)
+        low_excess, high_excess = (
+            (middle_excess, high_excess)
+            if has_too_many_alarms(middle_excess)
+            else (low_excess, middle_excess)
+        )
+    return tail.level + high_excess
 
 
-def sure_threshold(rate_hz: float, per_hour: float) -> float:
+def guaranteed_threshold(rate_hz: float, false_alarms_per_hour: float) -> float:
     """The threshold with so many false alarms an hour at most where the model is right, whatever the tail:
     Page's sum of a log likelihood ratio passes h once in exp(h) samples or less often [Lorden1971]."""
-    return float(np.log(max(3600.0 * rate_hz / per_hour, 1.0)))
+    return float(np.log(max(3600.0 * rate_hz / false_alarms_per_hour, 1.0)))
 
 
-def minutes_missing(tail: Tail, per_hour: float) -> float:
+def missing_healthy_minutes(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """Minutes of health by which the rate asked would show without any tail, less those there are."""
-    return max(60.0 * SHOWN / per_hour - tail.minutes, 0.0)
+    return max(60.0 * EXPECTED_ALARMS_RULED_OUT / false_alarms_per_hour - tail.minutes, 0.0)
 
 
-def _rates(tail: Tail) -> Floats:
+def _peak_rate_quantiles(tail: PeakTail) -> Floats:
     """Peaks over the level an hour, at even steps of their posterior."""
     from scipy.stats import gamma
 
-    shape = len(tail.excess) / tail.dispersion + 0.5
-    return np.asarray(gamma.ppf(_RATES, shape) * tail.dispersion / (tail.minutes / 60.0))
+    gamma_shape = len(tail.excess) / tail.dispersion + 0.5
+    return np.asarray(
+        gamma.ppf(_PEAK_RATE_PROBABILITIES, gamma_shape) * tail.dispersion / (tail.minutes / 60.0)
+    )
 
 
-def _posterior(tail: Tail) -> tuple[Floats, Floats, Floats]:
+def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     """Shape, scale and the weight of both, each over the whole grid."""
     from scipy.stats import genpareto
 
     excess = np.array(tail.excess)
-    scales = max(float(excess.mean()), TINY) * _SCALES
-    shape, scale = (part.ravel() for part in np.meshgrid(_SHAPES, scales, indexing="ij"))
-    log = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.dispersion
-    log -= 0.5 * (shape / _SHAPE_SD) ** 2
-    weight = np.exp(log - log.max())
+    scales = max(float(excess.mean()), MIN_DIVISOR) * _SCALE_RATIO_GRID
+    shape, scale = (part.ravel() for part in np.meshgrid(_SHAPE_GRID, scales, indexing="ij"))
+    log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.dispersion
+    log_posterior -= 0.5 * (shape / _SHAPE_PRIOR_SD) ** 2
+    weight = np.exp(log_posterior - log_posterior.max())
     return shape, scale, weight / weight.sum()
 
 
-def _above(excess: float, shape: Floats, scale: Floats) -> Floats:
+def _exceedance_probability(excess: float, shape: Floats, scale: Floats) -> Floats:
     """Probability that a peak over the level exceeds it by more."""
     from scipy.stats import genpareto
 

@@ -21,99 +21,137 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc_logs.bank import Bank, adaptation_of, noise_of
-from beaver_ftc_logs.model import Colour, Model
+from beaver_ftc_logs.bank import HypothesisBank, build_adaptation_limits, build_residual_noise
+from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import in_white
-from beaver_ftc_logs.samples import Samples, first, whitened
+from beaver_ftc_logs.regression import split_whitened_response
+from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
 
 _DELAY_MEMORY_S = 600.0
-_FLOOR = 1e-15
-_CLIP = 3.0
-_SPANS_S, _LATELY_S = (0.0, 0.1), 2.0
+_MIN_HYPOTHESIS_PROBABILITY = 1e-15
+_MAX_CLIPPED_SQUARE = 3.0
+_RESIDUAL_SUM_SPANS_S, _SCALE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the seconds in which its size is taken."""
-_EXPECTED = 0.93
+_MEAN_CLIPPED_SQUARE = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
-_LEAST_WEIGHT = 1e-3
+_MIN_NOISE_MODEL_PROBABILITY = 1e-3
 """Probability of a colour of the noise below which it is left out."""
 
-Run = tuple[Floats, Floats, Floats, Floats]
+BankRun = tuple[Floats, Floats, Floats, Floats]
 """As `run_bank` returns it."""
 
 
-def posterior_of(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
+def hypothesis_posterior(
+    samples: Samples, model: Model, bank: HypothesisBank
+) -> tuple[Floats, Floats, Floats]:
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
 
     The mean over the delays of the model's settings, and the colours of its noise where the flight is not yet
     whitened, each weighted by how well it explains the last minutes.
     """
-    if model.colours and not samples.colour:
-        return _by_colours(samples, model, bank)
-    own, delays_s = model.with_noise_model(samples.colour), model.settings.delays_s
-    runs = [_filtered(_with_delay(samples, delay_s), own, bank) for delay_s in delays_s]
-    return _mean(list(_weights([run[3] for run in runs], model.rate_hz)), runs)
+    if model.colours and not samples.noise_average:
+        return _posterior_over_noise_models(samples, model, bank)
+    noise_model_of_flight, delays_s = model.with_noise_model(samples.noise_average), model.settings.delays_s
+    bank_runs = [
+        _run_bank_on_flight(_with_command_delay(samples, delay_s), noise_model_of_flight, bank)
+        for delay_s in delays_s
+    ]
+    return _average_bank_runs(
+        list(_delay_probabilities([run[3] for run in bank_runs], model.rate_hz)), bank_runs
+    )
 
 
-def _by_colours(samples: Samples, model: Model, bank: Bank) -> tuple[Floats, Floats, Floats]:
+def _posterior_over_noise_models(
+    samples: Samples, model: Model, bank: HypothesisBank
+) -> tuple[Floats, Floats, Floats]:
     """The mean over the colours of the noise. A colour is filtered up to the last sample at which its weight
     counts: within a second most are far less likely than another, and stay so."""
-    flights = [(whitened(samples, one.average), model.alone_with(one)) for one in model.colours]
-    likely = [_likelihood(flight, of, of.colours[0]) for flight, of in flights]
-    weights = _weights(likely, model.rate_hz)
-    kept = np.where(np.asarray(weights) < _LEAST_WEIGHT, 0.0, weights)
-    kept /= kept.sum(axis=0)
-    last = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in kept]
-    runs = [
-        _filtered(first(flight, count), of.with_noise_model(flight.colour), bank)
-        for (flight, of), count in zip(flights, last, strict=True) if count
+    whitened_flights = [
+        (whiten_samples(samples, one.average), model.with_single_noise_model(one)) for one in model.colours
+    ]
+    log_likelihoods = [
+        _noise_model_log_likelihood(flight, single_model, single_model.colours[0])
+        for flight, single_model in whitened_flights
+    ]
+    weights = _delay_probabilities(log_likelihoods, model.rate_hz)
+    kept_weights = np.where(np.asarray(weights) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, weights)
+    kept_weights /= kept_weights.sum(axis=0)
+    last_samples = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in kept_weights]
+    bank_runs = [
+        _run_bank_on_flight(
+            first_samples(flight, count), single_model.with_noise_model(flight.noise_average), bank
+        )
+        for (flight, single_model), count in zip(whitened_flights, last_samples, strict=True) if count
     ]  # fmt: skip
-    return _mean([weight for weight, count in zip(kept, last, strict=True) if count], runs)
+    return _average_bank_runs(
+        [weight for weight, count in zip(kept_weights, last_samples, strict=True) if count], bank_runs
+    )
 
 
-def _mean(weights: Sequence[Floats], runs: Sequence[Run]) -> tuple[Floats, Floats, Floats]:
+def _average_bank_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[Floats, Floats, Floats]:
     """Runs with weights (n,) each; a run ends where its weight stays 0."""
-    found: list[Floats] = []
-    for part in range(3):
-        shape = (len(weights[0]), *runs[0][part].shape[1:])
-        total = np.zeros(shape)
+    averages: list[Floats] = []
+    for output_index in range(3):
+        shape = (len(weights[0]), *runs[0][output_index].shape[1:])
+        average = np.zeros(shape)
         for weight, run in zip(weights, runs, strict=True):
-            values = run[part]
-            total[: len(values)] += weight[: len(values)].reshape(-1, *[1] * (values.ndim - 1)) * values
-        found.append(total)
-    return found[0], found[1], found[2]
+            output = run[output_index]
+            average[: len(output)] += weight[: len(output)].reshape(-1, *[1] * (output.ndim - 1)) * output
+        averages.append(average)
+    return averages[0], averages[1], averages[2]
 
 
-def _likelihood(flight: Samples, model: Model, of: Colour) -> Floats:
+def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
     """Log likelihood of a colour at each sample of a flight that is whitened by it, all in health, (n,): by
     its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
-    ok, unexplained, answers = in_white(flight, model)
-    e = np.nan_to_num(unexplained - answers.sum(axis=1) - model.constant(of.average))
-    square = np.einsum("na,ab,nb->n", e, np.linalg.inv(of.noise), e)
-    dof, size = model.settings.tail, np.linalg.slogdet(of.noise)[1]
-    found = -0.5 * ((dof + 3.0) * np.log1p(square / dof) + size) + 3.0 * np.log(sum(of.average))
-    return np.where(ok, model.settings.power * found, 0.0)
+    is_predictable, unexplained, responses = split_whitened_response(flight, model)
+    residual = np.nan_to_num(
+        unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.average)
+    )
+    squared_residual = np.einsum("na,ab,nb->n", residual, np.linalg.inv(noise_model.noise), residual)
+    dof, log_determinant = model.settings.tail, np.linalg.slogdet(noise_model.noise)[1]
+    log_likelihood = -0.5 * ((dof + 3.0) * np.log1p(squared_residual / dof) + log_determinant) + 3.0 * np.log(
+        sum(noise_model.average)
+    )
+    return np.where(is_predictable, model.settings.power * log_likelihood, 0.0)
 
 
-def evidence(posterior: Floats, bank: Bank) -> Floats:
-    """What each sample adds to the log odds of a fault, beyond what a change at random does, (n,): the sum of
-    it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the mean."""
-    fault = np.clip(posterior[:, bank.faults].sum(axis=1), _FLOOR, 1.0 - _FLOOR)
-    changes = bank.change * bank.weight[bank.faults].sum() / bank.weight.sum()
-    before = np.concatenate([[bank.start[bank.faults].sum()], (1.0 - bank.change) * fault[:-1] + changes])
-    return np.asarray(np.log(fault / (1.0 - fault)) - np.log(before / (1.0 - before)))
+def fault_evidence_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
+    """Return the gain of each sample in the log odds of a fault, beyond that of a random change, (n,): the
+    sum of it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the
+    mean."""
+    fault_probability = np.clip(
+        posterior[:, bank.is_fault].sum(axis=1),
+        _MIN_HYPOTHESIS_PROBABILITY,
+        1.0 - _MIN_HYPOTHESIS_PROBABILITY,
+    )
+    change_to_fault = (
+        bank.change_probability * bank.change_share[bank.is_fault].sum() / bank.change_share.sum()
+    )
+    predicted_probability = np.concatenate(
+        [
+            [bank.prior_probability[bank.is_fault].sum()],
+            (1.0 - bank.change_probability) * fault_probability[:-1] + change_to_fault,
+        ]
+    )
+    return np.asarray(
+        np.log(fault_probability / (1.0 - fault_probability))
+        - np.log(predicted_probability / (1.0 - predicted_probability))
+    )
 
 
 @kernel
-def accumulated(gained, most):
-    """Page's sum of gained (n,): never below zero, where it starts again, and never above most, (n,)."""
-    total, found = 0.0, np.zeros(len(gained))
-    for k in range(len(gained)):
-        total = min(max(total + gained[k], 0.0), most)
-        found[k] = total
-    return found
+def page_sum(evidence_gains, max_sum):
+    """Page's sum of evidence_gains (n,): never below zero, where it starts again, and never above max_sum,
+    (n,)."""
+    page_value, page_sums = 0.0, np.zeros(len(evidence_gains))
+    for k in range(len(evidence_gains)):
+        page_value = min(max(page_value + evidence_gains[k], 0.0), max_sum)
+        page_sums[k] = page_value
+    return page_sums
 
 
-def _with_delay(samples: Samples, delay_s: float) -> Samples:
+def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """The flight with commands that act by so much later, less than a sample, than the model says.
 
     Sooner takes from the command of the same sample, which is known; never from a later one: a command enters
@@ -121,37 +159,39 @@ def _with_delay(samples: Samples, delay_s: float) -> Samples:
     """
     if delay_s == 0.0:
         return samples
-    share, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
-    other = np.vstack([commands[:1], commands[:-1]] if delay_s > 0 else [commands[1:], commands[-1:]])
-    return replace(samples, commands=(1.0 - share) * commands + share * other)
+    delay_share, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
+    neighbouring_commands = np.vstack(
+        [commands[:1], commands[:-1]] if delay_s > 0 else [commands[1:], commands[-1:]]
+    )
+    return replace(samples, commands=(1.0 - delay_share) * commands + delay_share * neighbouring_commands)
 
 
-def _weights(evidence: Sequence[Floats], rate_hz: float) -> Floats:
+def _delay_probabilities(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
     """Probability of each delay at each sample, (D, n), by the evidence of some minutes."""
     from scipy.signal import lfilter
 
-    fade = np.exp(-1.0 / (_DELAY_MEMORY_S * rate_hz))
-    total = lfilter([1.0], [1.0, -fade], np.array(evidence), axis=1)
-    weights = np.exp(total - total.max(axis=0))
+    forgetting_factor = np.exp(-1.0 / (_DELAY_MEMORY_S * rate_hz))
+    cumulated = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
+    weights = np.exp(cumulated - cumulated.max(axis=0))
     return np.asarray(weights / weights.sum(axis=0))
 
 
-def _filtered(samples: Samples, model: Model, bank: Bank) -> Run:
+def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRun:
     """As the kernel gives it."""
-    ok, *parts = in_white(samples, model)
+    ok, *parts = split_whitened_response(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
-    noise = noise_of(model, samples.colour)
+    noise = build_residual_noise(model, samples.noise_average)
     least = np.zeros(len(ok))
     if model.vehicle.other_laws:
-        residual = np.where(ok[:, None], unexplained - noise.constant - answers.sum(axis=1), 0.0)
-        least = least_scale(residual, ok, noise.covariance, model.rate_hz)
-    found: Run = run_bank(unexplained, answers, ok, bank, adaptation_of(model), noise, least)
+        residual = np.where(ok[:, None], unexplained - noise.intercept_rad_s - answers.sum(axis=1), 0.0)
+        least = min_noise_scale(residual, ok, noise.covariance, model.rate_hz)
+    found: BankRun = run_bank(unexplained, answers, ok, bank, build_adaptation_limits(model), noise, least)
     return found
 
 
-def least_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
-    """How many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the last
-    seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
+def min_noise_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
+    """Return how many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the
+    last seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
 
     Air, gyros or a law that the fit has not seen leave more unexplained, and evidence is to weigh less at
     once. A fault leaves more, too; the hypothesis that is right explains it, and gains as much a sample.
@@ -161,13 +201,13 @@ def least_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: f
     known = np.concatenate([[0], np.cumsum(ok)])
     end = np.arange(1, len(white) + 1)
     found = np.zeros(len(white))
-    for span_s in _SPANS_S:
+    for span_s in _RESIDUAL_SUM_SPANS_S:
         begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
         square = ((total[end] - total[begin]) ** 2).sum(axis=1) / (
             3.0 * np.maximum(known[end] - known[begin], 1)
         )
         sums = np.concatenate([[0.0], np.cumsum(square)])
-        begin = np.maximum(end - max(round(_LATELY_S * rate_hz), 1), 0)
+        begin = np.maximum(end - max(round(_SCALE_WINDOW_S * rate_hz), 1), 0)
         found = np.maximum(found, (sums[end] - sums[begin]) / (end - begin))
     return found
 
@@ -181,27 +221,32 @@ def run_bank(y, f, ok, bank, own, noise, least):
     Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used. bank: Bank, own: Adaptation,
     noise: Noise (bank.py); least (n,): scale of the noise at least.
     """
-    n, hypotheses, states = len(y), len(bank.weight), len(own.mean)
+    n, hypotheses, states = len(y), len(bank.change_share), len(own.initial_mean)
     idle = hypotheses - 1
-    mu = bank.start.copy()
+    mu = bank.prior_probability.copy()
     m = np.zeros((hypotheses, states))
     p = np.zeros((hypotheses, states, states))
-    m[:] = own.mean
-    p[:] = own.covariance
+    m[:] = own.initial_mean
+    p[:] = own.initial_covariance
     posterior = np.zeros((n, hypotheses))
     trim = np.zeros((n, states))
     scales = np.zeros(n)
     evidence = np.zeros(n)
     scale = 1.0
     for k in range(n):
-        prior = _mix(mu, m, p, bank, own.walk)
-        _relax(m, p, own)
-        m[idle], p[idle] = own.mean, own.covariance  # while nothing answers, nothing is learnt
+        prior = _mix_hypotheses(mu, m, p, bank, own.walk_variance)
+        _relax_to_model(m, p, own)
+        m[idle], p[idle] = (
+            own.initial_mean,
+            own.initial_covariance,
+        )  # while nothing answers, nothing is learnt
         if ok[k]:
-            mu, square, evidence[k] = _correct(prior, m, p, y[k], f[k], bank, noise, max(scale, least[k]))
-            _bound(m, own.mean - own.bound, own.mean + own.bound)
-            scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _EXPECTED) / noise.memory)
-            scale = min(max(scale, noise.least), noise.largest)
+            mu, square, evidence[k] = _correct_hypotheses(
+                prior, m, p, y[k], f[k], bank, noise, max(scale, least[k])
+            )
+            _limit_states(m, own.initial_mean - own.max_deviation, own.initial_mean + own.max_deviation)
+            scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _MEAN_CLIPPED_SQUARE) / noise.memory_samples)
+            scale = min(max(scale, noise.min_scale), noise.max_scale)
         else:
             mu = prior
         posterior[k] = mu
@@ -212,10 +257,10 @@ def run_bank(y, f, ok, bank, own, noise, least):
 
 
 @kernel
-def _mix(mu, m, p, bank, walk):
+def _mix_hypotheses(mu, m, p, bank, walk):
     """Let each hypothesis pass to any other; m and p are replaced, the prior probabilities returned."""
     hypotheses, states = m.shape
-    stay = 1.0 - bank.change
+    stay = 1.0 - bank.change_probability
     mean = np.zeros(states)
     spread = np.zeros((states, states))
     for h in range(hypotheses):
@@ -227,14 +272,16 @@ def _mix(mu, m, p, bank, walk):
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
-        prior[h] = stay * mu[h] + bank.change * bank.weight[h]
+        prior[h] = stay * mu[h] + bank.change_probability * bank.change_share[h]
         total += prior[h]
-        _merge(stay * mu[h] / prior[h], m[h], p[h], mean, spread, bank.offset[h], walk)
+        _merge_gaussians(
+            stay * mu[h] / prior[h], m[h], p[h], mean, spread, bank.rate_offset_variance[h], walk
+        )
     return prior / total
 
 
 @kernel
-def _merge(own, m, p, mean, spread, offset, walk):
+def _merge_gaussians(own, m, p, mean, spread, offset, walk):
     """One Gaussian for two: the hypothesis' own (m, p) with weight `own`, everyone's with the rest.
 
     m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
@@ -252,17 +299,17 @@ def _merge(own, m, p, mean, spread, offset, walk):
 
 
 @kernel
-def _relax(m, p, own):
+def _relax_to_model(m, p, own):
     """Let all trims and gains return towards the model's; m (H, N) and p (H, N, N) are replaced."""
     for h in range(len(m)):
-        for i in range(len(own.keep)):
-            m[h, i] = own.mean[i] + own.keep[i] * (m[h, i] - own.mean[i])
-            for j in range(len(own.keep)):
-                p[h, i, j] *= own.keep[i] * own.keep[j]
+        for i in range(len(own.deviation_retention)):
+            m[h, i] = own.initial_mean[i] + own.deviation_retention[i] * (m[h, i] - own.initial_mean[i])
+            for j in range(len(own.deviation_retention)):
+                p[h, i, j] *= own.deviation_retention[i] * own.deviation_retention[j]
 
 
 @kernel
-def _correct(prior, m, p, y, f, bank, noise, scale):
+def _correct_hypotheses(prior, m, p, y, f, bank, noise, scale):
     """Kalman correction of every hypothesis by one sample; m and p are replaced.
 
     Returns the posterior probabilities, the clipped square of the residual under them, as if the noise were
@@ -272,27 +319,29 @@ def _correct(prior, m, p, y, f, bank, noise, scale):
     log = np.empty(hypotheses)
     squares = np.empty(hypotheses)
     nothing, certain = np.zeros(states), np.zeros((states, states))
-    covariance, dof = noise.covariance * scale, noise.tail
+    covariance, dof = noise.covariance * scale, noise.degrees_of_freedom
     for h in range(hypotheses):
-        seen = _seen(bank.effectiveness[h], bank.own[h], f, noise.constant, states)
+        seen = _state_sensitivity(
+            bank.effectiveness[h], bank.own_gain_share[h], f, noise.intercept_rad_s, states
+        )
         if h == hypotheses - 1:
-            squares[h], log_det = _update(nothing, certain, y, seen, covariance, noise)
+            squares[h], log_det = _update_gaussian(nothing, certain, y, seen, covariance, noise)
         else:
-            squares[h], log_det = _update(m[h], p[h], y, seen, covariance, noise)
-        square = min(squares[h], noise.farthest)
-        log[h] = noise.power * (-0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det)
+            squares[h], log_det = _update_gaussian(m[h], p[h], y, seen, covariance, noise)
+        square = min(squares[h], noise.max_squared_residual)
+        log[h] = noise.information_share * (-0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det)
     most = log.max()
-    mu = np.maximum(prior * np.exp(log - most), _FLOOR)
+    mu = np.maximum(prior * np.exp(log - most), _MIN_HYPOTHESIS_PROBABILITY)
     total = mu.sum()
     mu /= total
     clipped = 0.0
     for h in range(hypotheses):
-        clipped += mu[h] * min(noise.wider * squares[h], 3.0 * _CLIP)
+        clipped += mu[h] * min(noise.variance_factor * squares[h], 3.0 * _MAX_CLIPPED_SQUARE)
     return mu, clipped, most + np.log(total)
 
 
 @kernel
-def _seen(e, own, f, base, states):
+def _state_sensitivity(e, own, f, base, states):
     """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
     (G, 3), each as effective as e (G,) says, and each group's own gain of a share (G,) of its answer."""
     seen = np.zeros((states, 3))
@@ -305,20 +354,20 @@ def _seen(e, own, f, base, states):
 
 
 @kernel
-def _bound(m, low, high):
+def _limit_states(m, low, high):
     """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
     for h in range(len(m)):
         m[h] = np.minimum(np.maximum(m[h], low), high)
 
 
 @kernel
-def _update(m, p, y, seen, covariance, noise):
+def _update_gaussian(m, p, y, seen, covariance, noise):
     """Correct one Gaussian (m (N,), p (N, N), replaced) by y (3,) = seen' m + noise, seen (N, 3).
 
     Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
     out in the tail of the t distribution counts less, and one that is too far nothing.
     """
-    states, dof = len(m), noise.tail
+    states, dof = len(m), noise.degrees_of_freedom
     cross = np.zeros((states, 3))
     s = covariance.copy()
     v = y.copy()
@@ -331,7 +380,7 @@ def _update(m, p, y, seen, covariance, noise):
         for j in range(3):
             for k in range(3):
                 s[j, k] += seen[i, j] * cross[i, k]
-    inverse, determinant = _inverse(s)
+    inverse, determinant = _invert_symmetric(s)
     gain = np.zeros((states, 3))
     square = 0.0
     for j in range(3):
@@ -339,7 +388,7 @@ def _update(m, p, y, seen, covariance, noise):
             square += v[j] * inverse[j, k] * v[k]
             for i in range(states):
                 gain[i, j] += cross[i, k] * inverse[k, j]
-    gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.farthest else 0.0
+    gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.max_squared_residual else 0.0
     for j in range(3):
         for i in range(states):
             m[i] += gain[i, j] * v[j]
@@ -350,7 +399,7 @@ def _update(m, p, y, seen, covariance, noise):
 
 
 @kernel
-def _inverse(s):
+def _invert_symmetric(s):
     """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
     c = np.empty((3, 3))
     for i in range(3):

@@ -13,65 +13,69 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import trust
-from beaver_ftc_logs.bank import Bank, bank_of
-from beaver_ftc_logs.diagnose import UNKNOWN, Rows
+from beaver_ftc_logs.bank import HypothesisBank, build_hypothesis_bank
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.regression import predicted
-from beaver_ftc_logs.samples import Samples, constant_parts
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import split_response
+from beaver_ftc_logs.samples import Samples, constant_stretches
 
-BRIEF_S = 3.0
-HORIZONS_S = (5.0, 20.0, 60.0)
-_ALIKE = 0.9
-_LITTLE = 0.1
+MAX_BRIEF_EVENT_S = 3.0
+LOSS_HORIZONS_S = (5.0, 20.0, 60.0)
+_MIN_PROPORTIONAL_COSINE = 0.9
+_MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
-_TOGETHER = (
+_PROPORTIONAL_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
     "together."
 )
 
 
-def verdict_of(samples: Samples, model: Model, rows: Rows) -> Document:
+def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Document:
     """The document of verdict.json."""
-    found = statement(samples, model)
+    found = separability_statement(samples, model)
     return {
         "flight": samples.name,
         "vehicle": model.vehicle.name,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
         "recorded_s": len(samples.t_s) * samples.dt_s,
-        "gaps": int(samples.run[-1]),
+        "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(rows.faulty.any()),
-        "credible": trust.account(rows.reasons, rows.credible),
-        "events": events_of(rows, list(model.vehicle.surfaces)),
-        "can_separate": [*trust.unclaimed_lines(model), *sentences(found)],
+        "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
+        "events": fault_events(rows, list(model.vehicle.surfaces)),
+        "can_separate": [*trust.unknown_effect_lines(model), *separability_sentences(found)],
         "isolability": found,
         "settings": model.settings.model_dump(),
         "notes": list(samples.notes),
     }
 
 
-def events_of(rows: Rows, surfaces: list[str]) -> list[Document]:
+def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     """Each time with one name and one effectiveness: when, what, how much is left.
 
-    What lasts less than BRIEF_S between alarms is taken into the event before it; what stands alone is brief.
-    This is hindsight, for the reader; the rows have none.
+    What lasts less than BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone is
+    brief. This is hindsight, for the reader; the rows have none.
     """
-    _, name = np.unique(rows.named.astype(str), return_inverse=True)
-    said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.estimate])
-    runs = _joined(rows, constant_parts(said))
-    return [_event(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
+    _, name = np.unique(rows.named_surfaces.astype(str), return_inverse=True)
+    said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
+    runs = _join_events(rows, constant_stretches(said))
+    return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
-def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _join_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
     joined: list[tuple[int, int]] = []
     for begin, end in runs:
         last = joined[-1] if joined else (begin, begin)
-        goes_on = _brief(rows, begin, end) or _unsure(rows, *last) or _alike(rows, last[0], begin)
+        goes_on = (
+            _is_brief(rows, begin, end)
+            or _is_brief_and_unnamed(rows, *last)
+            or _have_same_verdict(rows, last[0], begin)
+        )
         if last[0] < begin and rows.faulty[last[0]] and rows.faulty[begin] and goes_on:
             joined[-1] = (last[0], end)
         else:
@@ -79,31 +83,33 @@ def _joined(rows: Rows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return joined
 
 
-def _brief(rows: Rows, begin: int, end: int) -> bool:
-    return bool(rows.t_s[end - 1] - rows.t_s[begin] < BRIEF_S)
+def _is_brief(rows: DiagnosisRows, begin: int, end: int) -> bool:
+    return bool(rows.t_s[end - 1] - rows.t_s[begin] < MAX_BRIEF_EVENT_S)
 
 
-def _unsure(rows: Rows, begin: int, end: int) -> bool:
-    return rows.named[begin] == UNKNOWN and begin < end and _brief(rows, begin, end)
+def _is_brief_and_unnamed(rows: DiagnosisRows, begin: int, end: int) -> bool:
+    return rows.named_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
 
 
-def _alike(rows: Rows, one: int, other: int) -> bool:
-    return rows.named[one] == rows.named[other] and bool((rows.estimate[one] == rows.estimate[other]).all())
+def _have_same_verdict(rows: DiagnosisRows, one: int, other: int) -> bool:
+    return rows.named_surfaces[one] == rows.named_surfaces[other] and bool(
+        (rows.effectiveness[one] == rows.effectiveness[other]).all()
+    )
 
 
-def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
+def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event; name and effectiveness as they stood for most of it."""
-    names, count = np.unique(rows.named[begin:end].astype(str), return_counts=True)
+    names, count = np.unique(rows.named_surfaces[begin:end].astype(str), return_counts=True)
     named = str(names[count.argmax()])
-    mentioned = surfaces if named in (UNKNOWN, ENGINE) else named.split("+")
-    known = {"estimate": rows.estimate, "low": rows.low, "high": rows.high}
+    mentioned = surfaces if named in (UNKNOWN_SURFACE, ENGINE) else named.split("+")
+    known = {"estimate": rows.effectiveness, "low": rows.effectiveness_low, "high": rows.effectiveness_high}
     middles = {key: np.median(values[begin:end], axis=0) for key, values in known.items()}
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
-        "brief": _brief(rows, begin, end),
+        "brief": _is_brief(rows, begin, end),
         "named": named,
-        "probability": float(rows.probability[begin:end].max()),
+        "probability": float(rows.fault_probability[begin:end].max()),
         "effectiveness": {
             name: {key: float(middle[i]) for key, middle in middles.items()}
             for i, name in enumerate(surfaces)
@@ -112,35 +118,35 @@ def _event(rows: Rows, begin: int, end: int, surfaces: list[str]) -> Document:
     }
 
 
-def lasting(events: list[Document]) -> list[Document]:
+def lasting_events(events: list[Document]) -> list[Document]:
     """The events that are not brief; all of them where every one is."""
     return [event for event in events if not event["brief"]] or events
 
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    shown, every = lasting(verdict["events"]), len(verdict["events"])
-    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _nothing(verdict)
-    lines = [f"{verdict['flight']}: {what} in {looked_at(verdict)}", *map(_event_line, shown)]
+    shown, every = lasting_events(verdict["events"]), len(verdict["events"])
+    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_line(verdict)
+    lines = [f"{verdict['flight']}: {what} in {duration_in_words(verdict)}", *map(_event_line, shown)]
     lines += credible_lines(verdict)
     if brief := every - len(shown):
-        lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {BRIEF_S:g} s")
+        lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s")
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
     return "\n".join(lines)
 
 
-def _nothing(verdict: Document) -> str:
+def _no_event_line(verdict: Document) -> str:
     """No event: because no fault shows, or because nothing can be said."""
     share = verdict["credible"]["share"]
-    if share < _LITTLE:
+    if share < _MIN_CREDIBLE_ROW_SHARE:
         return "no verdict"
     return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
 
 
 def credible_lines(verdict: Document) -> list[str]:
-    """Where nothing is said of a flight, and why."""
+    """Return lines on the parts of a flight without a statement, and the reasons."""
     known = verdict["credible"]
     if known["share"] >= 1.0:
         return []
@@ -151,7 +157,7 @@ def credible_lines(verdict: Document) -> list[str]:
     ]
 
 
-def looked_at(verdict: Document) -> str:
+def duration_in_words(verdict: Document) -> str:
     """How much flight was diagnosed, in words: a gap in the log is no flight."""
     if not (gaps := verdict["gaps"]):
         return f"{verdict['duration_s']:.0f} s"
@@ -167,49 +173,51 @@ def _event_line(event: Document) -> str:
     return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}{brief}"
 
 
-def statement(samples: Samples, model: Model) -> dict[str, Any]:
+def separability_statement(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
-    bank = bank_of(model)
-    answers = _whitened(samples, model)
+    bank = build_hypothesis_bank(model)
+    answers = _whitened_answers(samples, model)
     return {
         "together": [
-            {"surfaces": group, "says": _TOGETHER.format(", ".join(group))}
+            {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
             for group in model.groups
             if len(group) > 1
         ],
         "groups": [
-            {"surfaces": group, **_reach(answers, index, model, bank, samples.dt_s)}
+            {"surfaces": group, **_group_information(answers, index, model, bank, samples.dt_s)}
             for index, group in enumerate(model.groups)
         ],
-        "alike": _proportional(answers, model),
-        "columns_held_s": {name: round(age, 4) for name, age in samples.age_s.items()},
+        "alike": _proportional_groups(answers, model),
+        "columns_held_s": {name: round(age, 4) for name, age in samples.held_column_age_s.items()},
     }
 
 
-def _whitened(samples: Samples, model: Model) -> Floats:
+def _whitened_answers(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    ok, _, answers = predicted(samples, model)
+    ok, _, answers = split_response(samples, model)
     answers, noise = answers[ok], np.array(model.noise)
     whitened = np.linalg.solve(np.linalg.cholesky(noise), answers.reshape(-1, 3).T).T
     return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.power))
 
 
-def _reach(answers: Floats, group: int, model: Model, bank: Bank, dt_s: float) -> dict[str, Any]:
+def _group_information(
+    answers: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
+) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
-    odds = _odds_against(model, bank, group, dt_s)
+    odds = _alarm_log_odds(model, bank, group, dt_s)
     if not len(answers):
-        return {"information_per_s": 0.0, "smallest_loss": _smallest(0.0, odds)}
+        return {"information_per_s": 0.0, "smallest_loss": _smallest_losses(0.0, odds)}
     own = float((answers[:, group] ** 2).sum(axis=1).mean()) / dt_s
-    left = _conditional(answers, group) / dt_s
+    left = _conditional_information(answers, group) / dt_s
     return {
         "information_per_s": own,
         "information_per_s_of_its_motion": left,
-        "smallest_loss": _smallest(own, odds),
-        "smallest_loss_by_motion_alone": _smallest(left, odds),
+        "smallest_loss": _smallest_losses(own, odds),
+        "smallest_loss_by_motion_alone": _smallest_losses(left, odds),
     }
 
 
-def _conditional(answers: Floats, group: int) -> float:
+def _conditional_information(answers: Floats, group: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
     n, groups, axes = answers.shape
     constant = np.tile(np.eye(axes), (n, 1))
@@ -220,39 +228,43 @@ def _conditional(answers: Floats, group: int) -> float:
     return float(rest @ rest) / n
 
 
-def _odds_against(model: Model, bank: Bank, group: int, dt_s: float) -> float:
+def _alarm_log_odds(model: Model, bank: HypothesisBank, group: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, shares = model.settings, bank.weight[bank.faulty(group)]
+    settings, shares = model.settings, bank.change_share[bank.is_fault_of(group)]
     if not len(shares):
         return float("inf")
     change = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
     return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
 
 
-def _smallest(information: float, odds: float) -> dict[str, float | None]:
+def _smallest_losses(information: float, odds: float) -> dict[str, float | None]:
     """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in HORIZONS_S}
+    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in LOSS_HORIZONS_S}
     losses = {key: np.sqrt(2.0 * odds / much) if much > 0.0 else np.inf for key, much in gathered.items()}
     return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
-def _proportional(answers: Floats, model: Model) -> list[dict[str, Any]]:
+def _proportional_groups(answers: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for a, b in combinations(range(len(model.groups)), 2):
         one, other = answers[:, a].ravel(), answers[:, b].ravel()
         norms = float(np.sqrt((one @ one) * (other @ other)))
-        cosine = float(one @ other) / max(norms, TINY)
+        cosine = float(one @ other) / max(norms, MIN_DIVISOR)
         surfaces = [model.groups[a], model.groups[b]]
-        pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE})
+        pairs.append(
+            {"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _MIN_PROPORTIONAL_COSINE}
+        )
     return pairs
 
 
-def sentences(found: dict[str, Any]) -> list[str]:
+def separability_sentences(found: dict[str, Any]) -> list[str]:
     """The statement in words."""
     said = [entry["says"] for entry in found["together"]]
     for entry in found["groups"]:
-        said.append(f"{', '.join(entry['surfaces'])}: {_loss_in_words(entry['smallest_loss'])}")
+        said.append(
+            f"{', '.join(entry['surfaces'])}: {_smallest_visible_loss_in_words(entry['smallest_loss'])}"
+        )
     for pair in found["alike"]:
         if not pair["separable"]:
             one, other = (" and ".join(names) for names in pair["surfaces"])
@@ -263,9 +275,9 @@ def sentences(found: dict[str, Any]) -> list[str]:
     return said
 
 
-def _loss_in_words(smallest: dict[str, float | None]) -> str:
+def _smallest_visible_loss_in_words(smallest: dict[str, float | None]) -> str:
     seen = [f"{loss:.0%} within {horizon} s" for horizon, loss in smallest.items() if loss is not None]
     if not seen:
-        longest = f"{HORIZONS_S[-1]:g} s"
+        longest = f"{LOSS_HORIZONS_S[-1]:g} s"
         return f"not even a complete loss would show within {longest} by the mean of this flight's commands."
     return f"the smallest loss that shows on average is {', '.join(seen)}."

@@ -17,29 +17,36 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 
 
-def whitener(model: Model, process: Floats, gyro_rad_s: float, order: int) -> tuple[Floats, Floats]:
-    """Coefficients (3 order, 3), latest lag first, that predict the residual from earlier ones, and the
-    covariance (3, 3) of the rest. process: Q (3, 3), (rad/s)2; gyro_rad_s: standard deviation of a gyro."""
-    gamma = _autocovariance(model, process, gyro_rad_s, order)
-    lags = np.arange(order)
-    blocks = np.array([[_at(gamma, int(j - i)) for j in lags] for i in lags])
-    known = blocks.transpose(0, 2, 1, 3).reshape(3 * order, 3 * order)
-    wanted = np.concatenate([_at(gamma, -int(i) - 1) for i in lags])
-    by = np.linalg.solve(known, wanted)
-    return np.asarray(by), np.asarray(gamma[0] - wanted.T @ by)
+def fit_residual_predictor(
+    model: Model, process_covariance: Floats, gyro_noise_rad_s: float, n_lags: int
+) -> tuple[Floats, Floats]:
+    """Coefficients (3 n_lags, 3), latest lag first, that predict the residual from earlier ones, and the
+    covariance (3, 3) of the rest. process_covariance: Q (3, 3), (rad/s)2; gyro_noise_rad_s: standard
+    deviation of a gyro."""
+    autocovariance = _autocovariance(model, process_covariance, gyro_noise_rad_s, n_lags)
+    lags = np.arange(n_lags)
+    blocks = np.array([[_autocovariance_at_lag(autocovariance, int(j - i)) for j in lags] for i in lags])
+    lag_covariance = blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
+    cross_covariance = np.concatenate([_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in lags])
+    coefficients = np.linalg.solve(lag_covariance, cross_covariance)
+    return np.asarray(coefficients), np.asarray(autocovariance[0] - cross_covariance.T @ coefficients)
 
 
-def _autocovariance(model: Model, process: Floats, gyro_rad_s: float, order: int) -> NDArray[np.float64]:
-    """E w[k] w[k-t]' for t = 0 ... order, (order + 1, 3, 3)."""
-    by_past = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3)
-    moving = np.concatenate([np.eye(3)[None], -by_past.transpose(0, 2, 1)])
-    found = np.zeros((max(order, model.history) + 1, 3, 3))
-    for t in range(len(moving)):
-        found[t] = gyro_rad_s**2 * np.einsum("jab,jcb->ac", moving[t:], moving[: len(moving) - t])
-    found[0] += process
-    return found[: order + 1]
+def _autocovariance(
+    model: Model, process_covariance: Floats, gyro_noise_rad_s: float, n_lags: int
+) -> NDArray[np.float64]:
+    """E w[k] w[k-t]' for lags t = 0 ... n_lags, (n_lags + 1, 3, 3)."""
+    past_coefficients = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3)
+    average_coefficients = np.concatenate([np.eye(3)[None], -past_coefficients.transpose(0, 2, 1)])
+    autocovariance = np.zeros((max(n_lags, model.history) + 1, 3, 3))
+    for lag in range(len(average_coefficients)):
+        autocovariance[lag] = gyro_noise_rad_s**2 * np.einsum(
+            "jab,jcb->ac", average_coefficients[lag:], average_coefficients[: len(average_coefficients) - lag]
+        )
+    autocovariance[0] += process_covariance
+    return autocovariance[: n_lags + 1]
 
 
-def _at(gamma: Floats, lag: int) -> Floats:
+def _autocovariance_at_lag(autocovariance: Floats, lag: int) -> Floats:
     """E w[k] w[k-lag]' at any lag."""
-    return np.asarray(gamma[lag] if lag >= 0 else gamma[-lag].T)
+    return np.asarray(autocovariance[lag] if lag >= 0 else autocovariance[-lag].T)

@@ -11,27 +11,27 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
-from beaver_ftc_logs.extremes import Tail
+from beaver_ftc_logs.extremes import PeakTail
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_BYTES = 20_000_000
+_MAX_FILE_BYTES = 20_000_000
 
-_LARGEST = 1e6  # of any coefficient: those of logs are below 100
-_MOST_GROUPS = 24  # the filter tries all pairs
-_WORST_CONDITION = 1e12  # of a covariance
+_MAX_COEFFICIENT = 1e6  # of any coefficient: those of logs are below 100
+_MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
+_MAX_CONDITION_NUMBER = 1e12  # of a covariance
 
-Coefficient = Annotated[Number, Field(ge=-_LARGEST, le=_LARGEST)]
+Coefficient = Annotated[Number, Field(ge=-_MAX_COEFFICIENT, le=_MAX_COEFFICIENT)]
 Row = list[Coefficient]
 Matrix = list[Row]
 Share = Annotated[Number, Field(ge=0, lt=1)]
 
 
-class Settings(Section):
-    """What the filter believes before it sees a flight."""
+class FilterSettings(Section):
+    """Prior settings of the filter."""
 
     changes_per_hour: Number = Field(
-        12.0, gt=0, le=_LARGEST, description="how often a surface changes its effectiveness"
+        12.0, gt=0, le=_MAX_COEFFICIENT, description="how often a surface changes its effectiveness"
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
     levels: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
@@ -39,65 +39,68 @@ class Settings(Section):
     )
     level_share: Number = Field(0.9, ge=0, le=1, description="share of faults at the likelier levels")
     trim_sd: Number = Field(
-        0.5, gt=0, le=_LARGEST, description="free spread of the trim between flights, in residual sd"
+        0.5, gt=0, le=_MAX_COEFFICIENT, description="free spread of the trim between flights, in residual sd"
     )
     trim_shift: Number = Field(
-        0.0, ge=0, le=_LARGEST, description="spread of the trim as a shift of each group's command"
+        0.0, ge=0, le=_MAX_COEFFICIENT, description="spread of the trim as a shift of each group's command"
     )
-    trim_walk: list[Annotated[Number, Field(ge=0, le=_LARGEST)]] = Field(
+    trim_walk: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
         [3e-4] * 3, min_length=3, max_length=3, description="drift of the trim a sample, in residual sd"
     )
     gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain")
     gain_time_s: Number = Field(
-        5e4, gt=0, le=_LARGEST, description="in which the control gain returns to the model's, s"
+        5e4, gt=0, le=_MAX_COEFFICIENT, description="in which the control gain returns to the model's, s"
     )
     own_gain_sd: Number = Field(0.0, ge=0, lt=0.5, description="spread of each group's gain about the common")
     own_gain_time_s: Number = Field(
-        2000.0, gt=0, le=_LARGEST, description="in which that returns to the common gain, s"
+        2000.0, gt=0, le=_MAX_COEFFICIENT, description="in which that returns to the common gain, s"
     )
     trim_bound: Number = Field(
-        4.0, gt=0, le=_LARGEST, description="farthest the trim is adapted, in its spread"
+        4.0, gt=0, le=_MAX_COEFFICIENT, description="farthest the trim is adapted, in its spread"
     )
     gain_bound: Number = Field(
-        3.0, gt=0, le=_LARGEST, description="farthest the gain is adapted, in its spread"
+        3.0, gt=0, le=_MAX_COEFFICIENT, description="farthest the gain is adapted, in its spread"
     )
     delays_s: Row = Field(
         [0.0], min_length=1, max_length=9, description="delays tried beside the model's, each under a sample"
     )
     jam_sd: Number = Field(
-        2.0, gt=0, le=_LARGEST, description="offset of the rates a sample by a stuck surface, in sd"
+        2.0, gt=0, le=_MAX_COEFFICIENT, description="offset of the rates a sample by a stuck surface, in sd"
     )
     power: Number = Field(1.0, gt=0, le=1, description="share of a white residual's information in this one")
     tail: Number = Field(
-        8.0, gt=2, le=_LARGEST, description="degrees of freedom of the residual's t distribution"
+        8.0, gt=2, le=_MAX_COEFFICIENT, description="degrees of freedom of the residual's t distribution"
     )
     noise_memory_s: Number = Field(
-        60.0, gt=0, le=_LARGEST, description="memory of the running scale of the residual, s"
+        60.0, gt=0, le=_MAX_COEFFICIENT, description="memory of the running scale of the residual, s"
     )
     alarm: Number = Field(0.5, gt=0, lt=1, description="probability of a fault that raises the alarm")
-    hold_s: Number = Field(0.0, ge=0, le=_LARGEST, description="for how long the probability must stand, s")
+    hold_s: Number = Field(
+        0.0, ge=0, le=_MAX_COEFFICIENT, description="for how long the probability must stand, s"
+    )
     false_alarms_per_hour: Number | None = Field(
-        None, gt=0, le=_LARGEST, description="the rate that was asked for"
+        None, gt=0, le=_MAX_COEFFICIENT, description="the rate that was asked for"
     )
     threshold: Number | None = Field(
         None,
         gt=0,
-        le=_LARGEST,
+        le=_MAX_COEFFICIENT,
         description="evidence for a fault that raises the alarm, instead of both: for that rate",
     )
     name_evidence: Number = Field(
-        1.0, ge=1, le=_LARGEST, description="evidence for a name, over that for an alarm"
+        1.0, ge=1, le=_MAX_COEFFICIENT, description="evidence for a name, over that for an alarm"
     )
     rename_s: Number = Field(
-        0.0, ge=0, le=_LARGEST, description="for how long another name stands before it counts, s"
+        0.0, ge=0, le=_MAX_COEFFICIENT, description="for how long another name stands before it counts, s"
     )
     one_group: bool = Field(False, description="whether a name is of the likeliest group alone")
     level_step: Number = Field(0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness")
     bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
 
 
-class Fitted(Section):
-    """What a model was fitted on, and how well it explained what it was not: where it may be believed."""
+class FittedRanges(Section):
+    """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
+    credible."""
 
     commands: Matrix = Field(description="least and largest command of each surface, share of travel")
     rates: Matrix = Field(description="least and largest p, q and r, rad/s")
@@ -108,14 +111,17 @@ class Fitted(Section):
         default=[], description="share of each group's effect that past, signals and other groups make up"
     )
     gain_sd: Row = Field(default=[], description="standard error of each group's gain")
+    column_sd: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+        default={}, description="standard error of the gain of what the rates answer to each rate and signal"
+    )
     still_s: dict[str, Number] = Field(default={}, description="longest time each column stood still, s")
     scale: Number = Field(
-        1.0, gt=0, le=_LARGEST, description="largest scale of the noise on parts not fitted"
+        1.0, gt=0, le=_MAX_COEFFICIENT, description="largest scale of the noise on parts not fitted"
     )
     misread: Number = Field(
         0.0,
         ge=0,
-        le=_LARGEST,
+        le=_MAX_COEFFICIENT,
         description="how much likelier at most a sample of a part not fitted was with its columns read "
         "wrongly, in natural logarithms",
     )
@@ -123,10 +129,10 @@ class Fitted(Section):
         default=None, description="rate of the energy height as without power, m/s"
     )
     minutes: Number = Field(0.0, ge=0, le=1e9, description="what was fitted, min")
-    tail: Tail | None = Field(default=None, description="highest alarm statistic on parts not fitted")
+    tail: PeakTail | None = Field(default=None, description="highest alarm statistic on parts not fitted")
 
 
-class Colour(Section):
+class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained."""
 
     average: Row = Field(
@@ -140,7 +146,7 @@ class Colour(Section):
     wider: Number = Field(
         1.0,
         ge=1,
-        le=_LARGEST,
+        le=_MAX_COEFFICIENT,
         description="how many times as far, in squares, gains left out and other laws' differ",
     )
 
@@ -151,33 +157,37 @@ class Model(Section):
     vehicle: Vehicle
     rate_hz: Number = Field(ge=0.1, le=1000)
     groups: list[Annotated[list[str], Field(min_length=1)]] = Field(
-        min_length=1, max_length=_MOST_GROUPS, description="surfaces that move together when healthy"
+        min_length=1, max_length=_MAX_SURFACE_GROUPS, description="surfaces that move together when healthy"
     )
     history: Whole = Field(ge=1, le=50)
     lags: Whole = Field(ge=1, le=50)
     intercept: Row = Field(min_length=3, max_length=3)
-    past: Matrix = Field(description="(3 history + past_names of the vehicle, 3)")
+    past: Matrix = Field(description="(3 history + past_regressor_names x signal lags, 3)")
     response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
     response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
     noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
-    colours: list[Colour] = Field(
+    colours: list[NoiseModel] = Field(
         default=[], description="noises that flights were seen to have, for `moving_air`"
     )
-    settings: Settings = Settings()
-    fitted: Fitted | None = Field(default=None, description="what it was fitted on; None: nothing is known")
+    settings: FilterSettings = FilterSettings()
+    fitted: FittedRanges | None = Field(
+        default=None, description="what it was fitted on; None: nothing is known"
+    )
     identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
 
     @model_validator(mode="after")
-    def _fits(self) -> "Model":
-        rows = 3 * self.history + len(self.vehicle.past_names) * self.vehicle.felt(self.history)
+    def _check_consistent(self) -> "Model":
+        rows = 3 * self.history + len(self.vehicle.past_regressor_names) * self.vehicle.n_signal_lags(
+            self.history
+        )
         says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), says)] * (len(self.past) != rows)
-        conflicts += [*self._groups_wrong(), *self._shapes_wrong(len(self.past))]
+        conflicts += [*self._group_conflicts(), *self._shape_conflicts(len(self.past))]
         refuse(conflicts)  # before any of it is computed with
-        refuse(self._noise_wrong())
+        refuse(self._noise_conflicts())
         return self
 
-    def _groups_wrong(self) -> Iterator[Conflict]:
+    def _group_conflicts(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
         seen: set[str] = set()
         for i, group in enumerate(self.groups):
@@ -195,8 +205,8 @@ class Model(Section):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
-    def _shapes_wrong(self, rows: int) -> Iterator[Conflict]:
-        """Arrays of another shape than the number of groups, lags and rates says; a size 0 is left open."""
+    def _shape_conflicts(self, rows: int) -> Iterator[Conflict]:
+        """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         count = len(self.groups)
         shapes: list[tuple[Location, object, tuple[int, ...]]] = [
             (("past",), self.past, (rows, 3)),
@@ -223,7 +233,7 @@ class Model(Section):
                 size = " x ".join(map(str, shape))
                 yield where, f"has another shape, allowed: {size} numbers"
 
-    def _noise_wrong(self) -> Iterator[Conflict]:
+    def _noise_conflicts(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
         noises: list[tuple[Location, Matrix]] = [(("noise",), self.noise)]
         noises += [(("colours", i, "noise"), colour.noise) for i, colour in enumerate(self.colours)]
@@ -233,10 +243,11 @@ class Model(Section):
                 yield where, "is not symmetric, allowed: a covariance"
                 continue
             least, *_, largest = np.linalg.eigvalsh(noise)
-            if least <= 0.0 or largest > _WORST_CONDITION * least:
+            if least <= 0.0 or largest > _MAX_CONDITION_NUMBER * least:
                 yield (
                     where,
-                    f"is singular or nearly so, allowed: a covariance, conditioned to {_WORST_CONDITION:g}",
+                    "is singular or nearly so, allowed: a covariance, conditioned to "
+                    f"{_MAX_CONDITION_NUMBER:g}",
                 )
         if np.min(self.response_sd) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
@@ -244,22 +255,22 @@ class Model(Section):
         if fitted is not None and any(value < 0.0 for value in (*fitted.gain_sd, *fitted.spread)):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def alone_with(self, colour: Colour) -> "Model":
+    def with_single_noise_model(self, colour: NoiseModel) -> "Model":
         """The model with one colour of its noise only."""
         return self.model_copy(update={"colours": [colour]})
 
     def with_noise_model(self, average: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its `noise_factor`; the
-        model itself where none was fitted.
+        """The model with the noise fitted for flights of this moving average, times its `noise_inflation`;
+        the model itself where none was fitted.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
         known = [np.array(one.noise) for one in self.colours if one.average == list(average)]
         if not known:
             return self
-        return self.model_copy(update={"noise": (self.noise_factor(average) * known[0]).tolist()})
+        return self.model_copy(update={"noise": (self.noise_inflation(average) * known[0]).tolist()})
 
-    def noise_factor(self, average: Sequence[float]) -> float:
+    def noise_inflation(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
         return next((float(one.wider) for one in self.colours if one.average == list(average)), 1.0)
 
@@ -268,12 +279,12 @@ class Model(Section):
         known = [one.before for one in self.colours if one.average == list(average)]
         return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
 
-    def constant(self, average: Sequence[float]) -> Floats:
+    def whitened_intercept(self, average: Sequence[float]) -> Floats:
         """The intercept less its prediction by `noise_predictor`, (3,)."""
         constant = np.array(self.intercept)
         return np.asarray(constant - constant @ self.noise_predictor(average).sum(axis=0))
 
-    def arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
+    def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return np.array(self.intercept), np.array(self.past), np.array(self.response), np.array(self.noise)
 
@@ -291,7 +302,7 @@ def _has_shape(given: object, shape: tuple[int, ...]) -> bool:
 
 def load_model(path: Path) -> Model:
     """The model in a file. Raises ScenarioError with one line a mistake."""
-    return read_file(Model, path, _MAX_BYTES)
+    return read_file(Model, path, _MAX_FILE_BYTES)
 
 
 def as_text(model: Model) -> str:

@@ -14,27 +14,27 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import as_json, result_folder
 from beaver_ftc_logs import fitting
-from beaver_ftc_logs.diagnose import Rows
-from beaver_ftc_logs.findings import BRIEF_S, lasting, looked_at
+from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_in_words, lasting_events
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Fit, spectrum
-from beaver_ftc_logs.replay import columns
+from beaver_ftc_logs.regression import RateRegression, power_spectral_density
+from beaver_ftc_logs.replay import diagnosis_columns
 from beaver_ftc_logs.samples import Samples
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATES = Path(__file__).parent / "templates"
-_MOST_POINTS = 6000
-MARK = '<meta name="generator" content="beaver-ftc identify">'
-_SHOWN_S = 40.0
-_MOST_PARTS = 3
+_MAX_PLOTTED_POINTS = 6000
+IDENTIFICATION_PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
+_PREDICTION_WINDOW_S = 40.0
+_MAX_SHOWN_FLIGHTS = 3
 
 
 @cache
-def template(name: str) -> "Template":
+def load_template(name: str) -> "Template":
     """A page's template by its file name."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -42,132 +42,156 @@ def template(name: str) -> "Template":
     return loader.get_template(name)
 
 
-def render(samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> str:
+def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
-    quiet = f"The probability of a fault stayed below the alarm level of {model.settings.alarm}."
-    predicts = (
+    no_alarm_text = f"The probability of a fault stayed below the alarm level of {model.settings.alarm}."
+    model_text = (
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.history} of the rates and {model.lags} of the commands."
     )
-    words = {"bounds": "90 % bounds", "quiet": quiet, "predicts": predicts}
-    return _page(samples, list(model.vehicle.surfaces), rows, verdict, words)
+    words = {"bounds": "90 % bounds", "quiet": no_alarm_text, "predicts": model_text}
+    return _render_flight_page(samples, list(model.vehicle.surfaces), rows, verdict, words)
 
 
-def _page(
-    samples: Samples, surfaces: Sequence[str], rows: Rows, verdict: dict[str, Any], words: dict[str, str]
+def _render_flight_page(
+    samples: Samples,
+    surfaces: Sequence[str],
+    rows: DiagnosisRows,
+    verdict: dict[str, Any],
+    words: dict[str, str],
 ) -> str:
     """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
-    return template("flight.html.j2").render(
+    return load_template("flight.html.j2").render(
         verdict=verdict,
-        looked_at=looked_at(verdict),
-        events=lasting(verdict["events"]),
-        brief_s=BRIEF_S,
+        duration_in_words=duration_in_words(verdict),
+        events=lasting_events(verdict["events"]),
+        brief_s=MAX_BRIEF_EVENT_S,
         words=words,
-        picture=_encoded(picture(samples, surfaces, rows, words["bounds"])),
-        ages=samples.age_s,
-        notes=[*_notes(samples), words["predicts"]],
+        picture=_encode_png(flight_figure(samples, surfaces, rows, words["bounds"])),
+        ages=samples.held_column_age_s,
+        notes=[*_log_notes(samples), words["predicts"]],
     )
 
 
-def _notes(samples: Samples) -> list[str]:
-    gaps = int(samples.run[-1])
-    many = "1 gap" if gaps == 1 else f"{gaps} gaps"
-    said = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {many} in the log."]
-    said += [
+def _log_notes(samples: Samples) -> list[str]:
+    n_gaps = int(samples.stretch_number[-1])
+    gap_count_text = "1 gap" if n_gaps == 1 else f"{n_gaps} gaps"
+    notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gap_count_text} in the log."]
+    notes += [
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
-        for name, age in samples.age_s.items()
+        for name, age in samples.held_column_age_s.items()
     ]
-    return [*said, *samples.notes]
+    return [*notes, *samples.notes]
 
 
-def picture(samples: Samples, surfaces: Sequence[str], rows: Rows, bounds: str = "90 % bounds") -> Any:
+def flight_figure(
+    samples: Samples, surfaces: Sequence[str], rows: DiagnosisRows, bounds: str = "90 % bounds"
+) -> Any:
     """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. bounds:
     what they are called."""
-    figure = _figure(11, 3.4 + 1.25 * len(surfaces))
+    figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
-    _lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
-    limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
-    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
-    _lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
-    _lines(axes[2], rows.t_s, rows.probability[:, None], ["a fault"], "probability")
+    _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
+    rate_limit_deg_s = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
+    axes[0].set_ylim(
+        -max(rate_limit_deg_s, 1.0), max(rate_limit_deg_s, 1.0)
+    )  # a landing's spike does not flatten the flight
+    _draw_lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
+    _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
     for i, surface in enumerate(surfaces):
-        _effectiveness(axes[3 + i], rows, i, bounds)
-        _dress(axes[3 + i], f"{surface}\neffectiveness")
+        _draw_effectiveness(axes[3 + i], rows, i, bounds)
+        _label_axis(axes[3 + i], f"{surface}\neffectiveness")
     for axis in axes:
-        _shade(axis, rows)
+        _shade_alarms(axis, rows)
     axes[-1].set_xlabel("time, s")
     axes[-1].set_xlim(samples.t_s[0], samples.t_s[-1])
     return figure
 
 
-def _dress(axis: Any, label: str, **grid: Any) -> None:
+def _label_axis(axis: Any, label: str, **grid: Any) -> None:
     """Axis label, ticks and grid."""
     axis.set_ylabel(label, fontsize=8)
     axis.tick_params(labelsize=8)
     axis.grid(color="#dddddd", linewidth=0.5, **grid)
 
 
-def _lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
-    kept = slice(None, None, max(len(t_s) // _MOST_POINTS, 1))
+def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
+    shown_rows = slice(None, None, max(len(t_s) // _MAX_PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
-        axis.plot(t_s[kept], values[kept, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
+        axis.plot(
+            t_s[shown_rows], values[shown_rows, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name
+        )
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
-    _dress(axis, label)
+    _label_axis(axis, label)
 
 
-def _effectiveness(axis: Any, rows: Rows, surface: int, bounds: str) -> None:
-    kept = slice(None, None, max(len(rows.t_s) // _MOST_POINTS, 1))
+def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, bounds: str) -> None:
+    shown_rows = slice(None, None, max(len(rows.t_s) // _MAX_PLOTTED_POINTS, 1))
     axis.fill_between(
-        rows.t_s[kept], rows.low[kept, surface], rows.high[kept, surface], color="#9cc4e4", step="post",
-        linewidth=0, label=bounds,
+        rows.t_s[shown_rows], rows.effectiveness_low[shown_rows, surface_index],
+        rows.effectiveness_high[shown_rows, surface_index],
+        color="#9cc4e4", step="post", linewidth=0, label=bounds,
     )  # fmt: skip
-    axis.step(rows.t_s[kept], rows.estimate[kept, surface], where="post", color="#0b3d66", linewidth=1.1)
+    axis.step(
+        rows.t_s[shown_rows],
+        rows.effectiveness[shown_rows, surface_index],
+        where="post",
+        color="#0b3d66",
+        linewidth=1.1,
+    )
     axis.set_ylim(-0.05, 1.08)
 
 
-def _shade(axis: Any, rows: Rows) -> None:
-    """Where the alarm stands."""
+def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
+    """Shade the time in which the alarm stands."""
     edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
     times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
     for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
         axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
-def columns_of(surfaces: Iterable[str]) -> tuple[str, ...]:
+def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
     """Columns of diagnosis.parquet, by the vehicle's surfaces."""
     each = (f"{surface}_{what}" for surface in surfaces for what in ("effectiveness", "low", "high"))
     return ("t_s", "faulty", "named", *each, "fault_probability", "credible")
 
 
-def write_diagnosis(out: Path, samples: Samples, model: Model, rows: Rows, verdict: dict[str, Any]) -> Path:
+def write_diagnosis(
+    out: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
+) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
-    each = (column for of in zip(rows.estimate.T, rows.low.T, rows.high.T, strict=True) for column in of)
-    values = rows.t_s, rows.faulty, rows.named.tolist(), *each, rows.probability, rows.credible
-    columns = dict(zip(columns_of(model.vehicle.surfaces), values, strict=True))
-    return write_results(out, samples.name, columns, verdict, render(samples, model, rows, verdict))
+    each = (
+        column
+        for of in zip(rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True)
+        for column in of
+    )
+    values = rows.t_s, rows.faulty, rows.named_surfaces.tolist(), *each, rows.fault_probability, rows.credible
+    columns = dict(zip(diagnosis_column_names(model.vehicle.surfaces), values, strict=True))
+    return write_results(out, samples.name, columns, verdict, render_diagnosis(samples, model, rows, verdict))
 
 
-def write_by_aircraft(
+def write_diagnosis_by_aircraft(
     out: Path,
     samples: Samples,
     surfaces: Sequence[str],
-    rows: Rows,
+    rows: DiagnosisRows,
     verdict: dict[str, Any],
-    further: Callable[[Path], None] | None = None,
+    write_more: Callable[[Path], None] | None = None,
 ) -> Path:
-    """The same of a flight that an aircraft's own model diagnosed; further: writes into the folder, too."""
-    from beaver_ftc_logs.stepped import STANDS_S
+    """The same of a flight that an aircraft's own model diagnosed; write_more: writes into the folder,
+    too."""
+    from beaver_ftc_logs.stepped import EXCLUSION_MEMORY_S
 
     words = {
         "bounds": "bounds",
         "quiet": "No residual left the bound of the errors declared.",
         "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
-        f"is at fault, has stood for {STANDS_S:g} s, and the errors declared hold.",
+        f"is at fault, has stood for {EXCLUSION_MEMORY_S:g} s, and the errors declared hold.",
     }
-    page = _page(samples, surfaces, rows, verdict, words)
-    return write_results(out, samples.name, columns(rows, surfaces), verdict, page, further)
+    page = _render_flight_page(samples, surfaces, rows, verdict, words)
+    return write_results(out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_more)
 
 
 def write_results(
@@ -176,7 +200,7 @@ def write_results(
     columns: dict[str, Any],
     verdict: dict[str, Any],
     page: str | None = None,
-    further: Callable[[Path], None] | None = None,
+    write_more: Callable[[Path], None] | None = None,
 ) -> Path:
     """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
     import pyarrow as pa
@@ -187,91 +211,107 @@ def write_results(
         (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
         if page is not None:
             (folder / "report.html").write_text(page, encoding="utf-8")
-        if further is not None:
-            further(folder)
+        if write_more is not None:
+            write_more(folder)
     return out / name
 
 
-def check_page(path: Path) -> None:
+def refuse_to_replace_foreign_file(path: Path) -> None:
     """Raise BadInput where the page would take the place of a file that is not a page of ours."""
-    if path.exists() and (not path.is_file() or MARK not in path.read_text("utf-8", errors="replace")[:2000]):
+    if path.exists() and (
+        not path.is_file() or IDENTIFICATION_PAGE_MARK not in path.read_text("utf-8", errors="replace")[:2000]
+    ):
         raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
 
 
-def render_model(flights: Sequence[Samples], model: Model) -> str:
+def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    stretches = fitting.stretches_of(flights)
+    stretches = fitting.usable_stretches(flights)
     fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
-    return template("model.html.j2").render(
-        mark=MARK,
+    return load_template("model.html.j2").render(
+        mark=IDENTIFICATION_PAGE_MARK,
         model=model,
         found=model.identified,
-        used=sum(int(stretch.use.sum()) for stretch in stretches),
+        used=sum(int(stretch.usable.sum()) for stretch in stretches),
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
-        fits=_encoded(_fits(stretches, model)),
-        spectrum=_encoded(_spectrum(stretches, model)),
-        correlation=_encoded(_correlation(fit, names)),
+        fits=_encode_png(_prediction_figure(stretches, model)),
+        spectrum=_encode_png(_spectrum_figure(stretches, model)),
+        correlation=_encode_png(_correlation_figure(fit, names)),
     )
 
 
-def _figure(width: float, height: float) -> Any:
+def _new_figure(width: float, height: float) -> Any:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained", dpi=110)
 
 
-def _encoded(figure: Any) -> str:
+def _encode_png(figure: Any) -> str:
     buffer = BytesIO()
     figure.savefig(buffer, format="png")
     return b64encode(buffer.getvalue()).decode()
 
 
-def _fits(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    parts = [(fitting.fit_like(fitted, model), kept, name) for fitted, kept, name in fitting.folds(stretches)]
-    parts = [part for part in parts if part[1].use.any()][:_MOST_PARTS]
-    height = max(len(parts), 1)
-    figure = _figure(11, 4.6 * height)
-    blocks = figure.subfigures(height, squeeze=False)[:, 0]
-    for block, (fitted, kept, name) in zip(blocks, parts, strict=False):
+    folds = [
+        (fitting.fit_with_order_of(fitted, model), kept, name)
+        for fitted, kept, name in fitting.validation_folds(stretches)
+    ]
+    folds = [part for part in folds if part[1].usable.any()][:_MAX_SHOWN_FLIGHTS]
+    n_shown = max(len(folds), 1)
+    figure = _new_figure(11, 4.6 * n_shown)
+    blocks = figure.subfigures(n_shown, squeeze=False)[:, 0]
+    for block, (fitted, kept, name) in zip(blocks, folds, strict=False):
         axes = block.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _shown(fitted, kept, round(_SHOWN_S * model.rate_hz))
+        t_s, rates, residual = _liveliest_prediction(
+            fitted, kept, round(_PREDICTION_WINDOW_S * model.rate_hz)
+        )
         for i, axis in enumerate(axes):
-            left, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
-            axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
-            axis.plot(t_s, rate - left, color=SERIES[0], linewidth=0.9, label="predicted")
-            axis.plot(t_s, left, color=SERIES[1], linewidth=0.7, label="residual")
-            _dress(axis, f"{'pqr'[i]}, deg/s")
+            residual_deg_s, rate_deg_s = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
+            axis.plot(t_s, rate_deg_s, color="#888888", linewidth=2.2, label="measured")
+            axis.plot(t_s, rate_deg_s - residual_deg_s, color=SERIES[0], linewidth=0.9, label="predicted")
+            axis.plot(t_s, residual_deg_s, color=SERIES[1], linewidth=0.7, label="residual")
+            _label_axis(axis, f"{'pqr'[i]}, deg/s")
         axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
         axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
         axes[-1].set_xlabel("time, s", fontsize=8)
     return figure
 
 
-def _shown(model: Model, kept: fitting.Stretch, length: int) -> tuple[Floats, Floats, Floats]:
+def _liveliest_prediction(
+    model: Model, kept: fitting.Stretch, window_samples: int
+) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
-    rows, residual = fitting.residuals(model, kept)
-    rates, left = np.full_like(kept.samples.rates, np.nan), np.full_like(kept.samples.rates, np.nan)
-    rates[rows], left[rows] = kept.samples.rates[rows], residual
-    begin = _liveliest(rates, rows, length)
-    part = slice(begin, begin + length)
-    return kept.samples.t_s[part], rates[part], left[part]
+    rows, residual = fitting.one_step_residuals(model, kept)
+    rates, window_residual = (
+        np.full_like(kept.samples.rates, np.nan),
+        np.full_like(kept.samples.rates, np.nan),
+    )
+    rates[rows], window_residual[rows] = kept.samples.rates[rows], residual
+    begin = _start_of_liveliest_window(rates, rows, window_samples)
+    part = slice(begin, begin + window_samples)
+    return kept.samples.t_s[part], rates[part], window_residual[part]
 
 
-def _liveliest(rates: Floats, rows: NDArray[np.int64], length: int) -> int:
+def _start_of_liveliest_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
-    square = np.zeros(len(rates))
-    square[rows] = (rates[rows] ** 2).sum(axis=1)
-    total = np.concatenate([[0.0], np.cumsum(square)])
-    return int(np.argmax(total[length:] - total[:-length])) if len(rates) > length else 0
+    squared_rates = np.zeros(len(rates))
+    squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
+    cumulated = np.concatenate([[0.0], np.cumsum(squared_rates)])
+    return (
+        int(np.argmax(cumulated[window_samples:] - cumulated[:-window_samples]))
+        if len(rates) > window_samples
+        else 0
+    )
 
 
-def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+def _spectrum_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack([fitting.residuals(model, stretch)[1] for stretch in stretches])
-    frequency, density = spectrum(residual, 1.0 / model.rate_hz)
-    figure = _figure(7.5, 3.2)
+    residual = np.vstack([fitting.one_step_residuals(model, stretch)[1] for stretch in stretches])
+    frequency, density = power_spectral_density(residual, 1.0 / model.rate_hz)
+    figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
         axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
@@ -279,17 +319,17 @@ def _spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
         axis.axhline(white, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)
     axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
-    _dress(axis, "density, (rad/s)² / Hz", which="both")
+    _label_axis(axis, "density, (rad/s)² / Hz", which="both")
     axis.legend(fontsize=8)
     return figure
 
 
-def _correlation(fit: Fit, names: list[str]) -> Any:
+def _correlation_figure(fit: RateRegression, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
     size = 2.5 + 0.19 * len(names)
-    figure = _figure(size + 0.8, size)
+    figure = _new_figure(size + 0.8, size)
     axis = figure.subplots()
-    image = axis.imshow(fit.correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    image = axis.imshow(fit.error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
     axis.set_yticks(range(len(names)), names, fontsize=6)
     figure.colorbar(image, shrink=0.7).ax.tick_params(labelsize=7)

@@ -1,4 +1,4 @@
-"""What mechanics says of a log's units: the integrals of p, q and r are the changes of roll, pitch and yaw,
+"""Checks of a log's units by mechanics: the integrals of p, q and r are the changes of roll, pitch and yaw,
 and the mean of the specific force is 1 g.
 
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))        [SL03, eq. 1.4-4]
@@ -14,116 +14,137 @@ import numpy as np
 from beaver_ftc_logs.recording import Column, Floats
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, UNITS, nearest_unit
 
-_WINDOW_S, _LEAST_WINDOWS = 1.0, 8
-_MANY_WINDOWS, _SURE, _NEAR = 20, 0.7, 1.3
-_SURELY, _EXACTLY = 0.95, 0.99
-_APART, _APART_OF_FEW = 1.5, 1.8
-_UNLIKE, _UNLIKE_OF_FEW = 0.4, 0.2
-_G = UNITS["g"][1]
-_GRAVITY = (0.5, 2.0)
-_CIRCLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
-_UPRIGHT_RAD, _STEEP_RAD = 1.02 * 0.5 * np.pi, 1.0
+_INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
+_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _UNIT_TOLERANCE = 20, 0.7, 1.3
+_HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
+_MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW = 1.5, 1.8
+_LOW_CORRELATION, _LOW_CORRELATION_OF_FEW = 0.4, 0.2
+_GRAVITY_MPS2 = UNITS["g"][1]
+_GRAVITY_RANGE_G = (0.5, 2.0)
+_MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
+_MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
 
 
 @dataclass(frozen=True)
-class Followed:
-    """slope: change of an angle over the integral of its rate; correlation of the two; windows: how many were
-    seen; angle, rate: the largest, as the log says."""
+class AngleRateFit:
+    """slope: change of an angle over the integral of its rate; correlation of the two; n_windows: how many
+    were seen; largest_angle, largest_rate: as the log says."""
 
     slope: float
     correlation: float
-    windows: int
-    angle: float
-    rate: float
+    n_windows: int
+    largest_angle: float
+    largest_rate: float
 
     @property
-    def many(self) -> bool:
+    def has_many_windows(self) -> bool:
         """Whether so many windows were seen that less is needed to tell."""
-        return self.windows >= _MANY_WINDOWS
+        return self.n_windows >= _MIN_MANY_WINDOWS
 
 
-def roll_of(rates: list[Column], roll: Column, pitch: Column | None) -> Followed | None:
+def fit_roll(rates: list[Column], roll: Column, pitch: Column | None) -> AngleRateFit | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
     rates: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
     t_s = rates[0].t_s
-    p, q, r = (_at(column, t_s) for column in rates)
-    phi, full = _at(roll, t_s), _turn(roll.values)
-    angle = phi * 2.0 * np.pi / full  # the circle is known whatever the unit
+    p, q, r = (_interpolate_column(column, t_s) for column in rates)
+    phi, circle = _interpolate_column(roll, t_s), _full_circle(roll.values)
+    angle = phi * 2.0 * np.pi / circle  # the circle is known whatever the unit
     terms, theta = [p], None
     if pitch is not None:
-        theta = _pitched(roll, pitch, t_s)
+        theta = _pitch_rad_at(roll, pitch, t_s)
         terms += [np.tan(theta) * q * np.sin(angle), np.tan(theta) * r * np.cos(angle)]
-    return _followed(t_s, phi, terms, full, theta)
+    return _fit_angle_to_rate(t_s, phi, terms, circle, theta)
 
 
-def pitch_of(rates: list[Column], roll: Column, pitch: Column) -> Followed | None:
-    """How the pitch angle follows the rates, as `roll_of`."""
+def fit_pitch(rates: list[Column], roll: Column, pitch: Column) -> AngleRateFit | None:
+    """How the pitch angle follows the rates, as `fit_roll`."""
     t_s = rates[0].t_s
-    _, q, r = (_at(column, t_s) for column in rates)
-    angle = _at(roll, t_s) * 2.0 * np.pi / _turn(roll.values)
-    return _followed(t_s, _at(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
+    _, q, r = (_interpolate_column(column, t_s) for column in rates)
+    angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
+    return _fit_angle_to_rate(t_s, _interpolate_column(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
 
 
-def yaw_of(rates: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> Followed | None:
-    """How the yaw angle follows the rates, as `roll_of`: r and q in one unit, since what a turn makes of them
-    is alike."""
+def fit_yaw(rates: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> AngleRateFit | None:
+    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a turn changes both
+    alike."""
     t_s = rates[0].t_s
-    _, q, r = (_at(column, t_s) for column in rates)
-    angle = _at(roll, t_s) * 2.0 * np.pi / _turn(roll.values)
-    theta = np.zeros(len(t_s)) if pitch is None else _pitched(roll, pitch, t_s)
+    _, q, r = (_interpolate_column(column, t_s) for column in rates)
+    angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
+    theta = np.zeros(len(t_s)) if pitch is None else _pitch_rad_at(roll, pitch, t_s)
     turning = (q * np.sin(angle) + r * np.cos(angle)) / np.cos(theta)
-    return _followed(t_s, _at(yaw, t_s), [turning], _turn(yaw.values), theta)
+    return _fit_angle_to_rate(t_s, _interpolate_column(yaw, t_s), [turning], _full_circle(yaw.values), theta)
 
 
-def _pitched(roll: Column, pitch: Column, t_s: Floats) -> Floats:
+def _pitch_rad_at(roll: Column, pitch: Column, t_s: Floats) -> Floats:
     """The pitch angle at given times, rad, of two angles in one unit."""
-    return _at(pitch, t_s) * 2.0 * np.pi / _turn(np.append(4.0 * pitch.values, roll.values))
+    return (
+        _interpolate_column(pitch, t_s)
+        * 2.0
+        * np.pi
+        / _full_circle(np.append(4.0 * pitch.values, roll.values))
+    )
 
 
-def _followed(
-    t_s: Floats, angle: Floats, terms: list[Floats], full: float | None = None, theta: Floats | None = None
-) -> Followed | None:
+def _fit_angle_to_rate(
+    t_s: Floats,
+    angle: Floats,
+    terms: list[Floats],
+    circle: float | None = None,
+    pitch_rad: Floats | None = None,
+) -> AngleRateFit | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
-    unit they are; full: a circle, where it may go round; theta: the pitch angle, where windows in which it is
-    steep say nothing."""
-    step = np.diff(t_s)
-    gaps_out = np.where(step < _WINDOW_S, step, 0.0)
+    unit they are; circle: a circle, where it may go round; pitch_rad: the pitch angle, where windows in which
+    it is steep say nothing."""
+    step_s = np.diff(t_s)
+    step_without_gaps = np.where(step_s < _INTEGRATION_WINDOW_S, step_s, 0.0)
     integrals = np.vstack(
-        [np.zeros(len(terms)), np.cumsum([gaps_out * _mean(one) for one in terms], axis=1).T]
+        [
+            np.zeros(len(terms)),
+            np.cumsum([step_without_gaps * _means_of_neighbours(one) for one in terms], axis=1).T,
+        ]
     )
-    length = max(round(_WINDOW_S / max(float(np.median(step)), 1e-9)), 1)
-    begin, end = np.arange(0, len(t_s) - length, length), np.arange(length, len(t_s), length)
-    whole = (t_s[end] - t_s[begin]) < 2.0 * _WINDOW_S
-    if theta is not None:
-        steep = np.cumsum(np.abs(theta) > _STEEP_RAD)
-        whole &= steep[end] == steep[begin]
-    turned, moved = (angle[end] - angle[begin])[whole], (integrals[end] - integrals[begin])[whole]
-    if full is not None:
-        turned = (turned + 0.5 * full) % full - 0.5 * full
-    known = np.isfinite(turned) & np.isfinite(moved).all(axis=1)
-    turned, moved = turned[known], moved[known]
-    by_terms = np.linalg.lstsq(moved, turned, rcond=None)[0]
-    turned, moved = turned - moved[:, 1:] @ by_terms[1:], moved[:, 0]
-    power, answer = float(moved @ moved), float(turned @ turned)
-    if len(moved) < _LEAST_WINDOWS or not power * answer > 0.0:
+    window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
+    begin, end = (
+        np.arange(0, len(t_s) - window_samples, window_samples),
+        np.arange(window_samples, len(t_s), window_samples),
+    )
+    is_whole = (t_s[end] - t_s[begin]) < 2.0 * _INTEGRATION_WINDOW_S
+    if pitch_rad is not None:
+        steep = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
+        is_whole &= steep[end] == steep[begin]
+    angle_changes, rate_integrals = (
+        (angle[end] - angle[begin])[is_whole],
+        (integrals[end] - integrals[begin])[is_whole],
+    )
+    if circle is not None:
+        angle_changes = (angle_changes + 0.5 * circle) % circle - 0.5 * circle
+    is_known = np.isfinite(angle_changes) & np.isfinite(rate_integrals).all(axis=1)
+    angle_changes, rate_integrals = angle_changes[is_known], rate_integrals[is_known]
+    coefficients = np.linalg.lstsq(rate_integrals, angle_changes, rcond=None)[0]
+    angle_changes, rate_integrals = (
+        angle_changes - rate_integrals[:, 1:] @ coefficients[1:],
+        rate_integrals[:, 0],
+    )
+    rate_power, angle_power = float(rate_integrals @ rate_integrals), float(angle_changes @ angle_changes)
+    if len(rate_integrals) < _MIN_WINDOWS or not rate_power * angle_power > 0.0:
         return None
-    cross = float(moved @ turned)
-    return Followed(
-        slope=np.sign(cross) * np.sqrt(answer / power),
-        correlation=cross / np.sqrt(power * answer),
-        windows=len(moved),
-        angle=float(np.nanmax(np.abs(angle))),
-        rate=float(np.nanmax(np.abs(terms[0]))),
+    cross_power = float(rate_integrals @ angle_changes)
+    return AngleRateFit(
+        slope=np.sign(cross_power) * np.sqrt(angle_power / rate_power),
+        correlation=cross_power / np.sqrt(rate_power * angle_power),
+        n_windows=len(rate_integrals),
+        largest_angle=float(np.nanmax(np.abs(angle))),
+        largest_rate=float(np.nanmax(np.abs(terms[0]))),
     )
 
 
-def _mean(values: Floats) -> Floats:
+def _means_of_neighbours(values: Floats) -> Floats:
     return np.nan_to_num(0.5 * (values[1:] + values[:-1]))
 
 
-def _at(column: Column, t_s: Floats) -> Floats:
+def _interpolate_column(column: Column, t_s: Floats) -> Floats:
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values
     known = np.isfinite(column.values)
@@ -132,106 +153,128 @@ def _at(column: Column, t_s: Floats) -> Floats:
     return np.interp(t_s, column.t_s[known], column.values[known], left=np.nan, right=np.nan)
 
 
-def _turn(roll: Floats) -> float:
+def _full_circle(roll: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
     largest = float(np.nanmax(np.abs(roll), initial=0.0))
-    return next((full for full in (2.0 * np.pi, 360.0) if largest <= 1.02 * full), 36000.0)
+    return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
 
 
-Named = tuple[str, Column]
-_RATES = ("roll rate", "pitch rate", "yaw rate")
+NamedColumn = tuple[str, Column]
+_RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
-def attitude_says(
-    rates: Mapping[str, Column], angles: Sequence[Named | None], others: Mapping[str, Column]
+def find_attitude_mistake(
+    rates: Mapping[str, Column], angles: Sequence[NamedColumn | None], other_columns: Mapping[str, Column]
 ) -> str | None:
-    """What is wrong with the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one is
-    not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
-    rate."""
+    """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
+    is not known. The first that is wrong; None where nothing is. other_columns: what may have taken the place
+    of a rate."""
     columns = list(rates.values())
-    for place, (rate, angle) in enumerate(zip(rates, angles, strict=True)):
+    for axis, (rate, angle) in enumerate(zip(rates, angles, strict=True)):
         if angle is None:
             continue
-        if place == 1 and (says := pitch_remark(angle[1], angle[0])):
+        if axis == 1 and (says := pitch_angle_unit_remark(angle[1], angle[0])):
             return says
-        found = _follows(columns, angles, place)
-        if found is None:
+        fit = _fit_angle_of_axis(columns, angles, axis)
+        if fit is None:
             continue
-        for other, column in {**rates, **others}.items():
-            moved = _follows([*columns[:place], column, *columns[place + 1 :]], angles, place)
-            if moved is not None and abs(moved.correlation) > _asked(found, other in rates):
-                return _another_is(angle[0], (rate, found), (other, moved), _RATES[place])
-        if says := angle_remark(found, rate, angle[0]):
+        for other, column in {**rates, **other_columns}.items():
+            other_fit = _fit_angle_of_axis([*columns[:axis], column, *columns[axis + 1 :]], angles, axis)
+            if other_fit is not None and abs(other_fit.correlation) > _required_other_correlation(
+                fit, other in rates
+            ):
+                return _exchanged_column_text(angle[0], (rate, fit), (other, other_fit), _RATE_TITLES[axis])
+        if says := angle_remark(fit, rate, angle[0]):
             return says
     return None
 
 
-def _asked(found: Followed, is_rate: bool) -> float:
+def _required_other_correlation(fit: AngleRateFit, is_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
-    own = abs(found.correlation)
-    if is_rate and own < (_UNLIKE if found.many else _UNLIKE_OF_FEW):
-        return _SURE
-    return _SURELY if own < _SURE else _EXACTLY if own < _SURELY else np.inf
-
-
-def _follows(rates: list[Column], angles: Sequence[Named | None], place: int) -> Followed | None:
-    """How the angle of a place follows the rates; None where too little moves, or it is not known."""
-    (roll, pitch, yaw) = (None if one is None else one[1] for one in angles)
-    if roll is None or (known := (roll, pitch, yaw)[place]) is None:
-        return None
-    if place == 2:
-        return yaw_of(rates, roll, pitch, known)
-    return pitch_of(rates, roll, known) if place else roll_of(rates, roll, pitch)
-
-
-def _another_is(angle: str, of: tuple[str, Followed], by: tuple[str, Followed], rate: str) -> str:
-    (own, found), (other, moved) = of, by
+    own_correlation = abs(fit.correlation)
+    if is_rate and own_correlation < (_LOW_CORRELATION if fit.has_many_windows else _LOW_CORRELATION_OF_FEW):
+        return _MIN_AGREEING_CORRELATION
     return (
-        f"{angle} does not follow {own} (correlation {found.correlation:.2f}) but {other} "
-        f"({moved.correlation:.2f}): {other} is the {rate}"
+        _HIGH_CORRELATION
+        if own_correlation < _MIN_AGREEING_CORRELATION
+        else _EXACT_CORRELATION
+        if own_correlation < _HIGH_CORRELATION
+        else np.inf
     )
 
 
-def angle_remark(found: Followed, rate: str, angle: str) -> str | None:
-    """What is wrong with a rate or its angle by their proportion, and which factor fits; None where nothing
-    is. rate, angle: their columns.
+def _fit_angle_of_axis(
+    rates: list[Column], angles: Sequence[NamedColumn | None], axis: int
+) -> AngleRateFit | None:
+    """How the angle of a place follows the rates; None where too little moves, or it is not known."""
+    (roll, pitch, yaw) = (None if one is None else one[1] for one in angles)
+    if roll is None or (known := (roll, pitch, yaw)[axis]) is None:
+        return None
+    if axis == 2:
+        return fit_yaw(rates, roll, pitch, known)
+    return fit_pitch(rates, roll, known) if axis else fit_roll(rates, roll, pitch)
+
+
+def _exchanged_column_text(
+    angle: str, named: tuple[str, AngleRateFit], better: tuple[str, AngleRateFit], rate: str
+) -> str:
+    (named_column, named_fit), (other, other_fit) = named, better
+    return (
+        f"{angle} does not follow {named_column} (correlation {named_fit.correlation:.2f}) but {other} "
+        f"({other_fit.correlation:.2f}): {other} is the {rate}"
+    )
+
+
+def angle_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
+    """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
+    nothing is. rate, angle: their columns.
 
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
-    size = abs(found.slope)
-    apart = _APART if found.many else _APART_OF_FEW
-    near = 1.0 / apart < size < apart
-    if abs(found.correlation) < _SURE or (near and found.slope > 0.0):
+    slope_magnitude = abs(fit.slope)
+    max_slope_factor = _MAX_SLOPE_FACTOR if fit.has_many_windows else _MAX_SLOPE_FACTOR_OF_FEW
+    is_near_one = 1.0 / max_slope_factor < slope_magnitude < max_slope_factor
+    if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (is_near_one and fit.slope > 0.0):
         return None
-    fits = f"the change of {angle} is {found.slope:.4g} times the integral of {rate}"
-    if near:
+    fits = f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
+    if is_near_one:
         return f"{fits}: one of them has the other sign, `scale: -1` fits"
-    if found.angle > _CIRCLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / size, _NEAR)):
+    if fit.largest_angle > _MAX_ROLL_YAW_RAD and (
+        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_TOLERANCE)
+    ):
         return f"{fits}: {angle} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
-    if found.rate > _FAST_RAD_S and (unit := nearest_unit(RATE, size, _NEAR)):
+    if fit.largest_rate > _IMPLAUSIBLE_RATE_RAD_S and (
+        unit := nearest_unit(RATE, slope_magnitude, _UNIT_TOLERANCE)
+    ):
         return f"{fits}: {rate} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
-    return f"{fits}: a factor of {size:.4g} on {rate} fits, or of {1.0 / size:.4g} on {angle}"
+    return (
+        f"{fits}: a factor of {slope_magnitude:.4g} on {rate} fits, or of "
+        f"{1.0 / slope_magnitude:.4g} on {angle}"
+    )
 
 
-def pitch_remark(pitch: Column, name: str) -> str | None:
-    """What is wrong with a pitch angle by its size, and which unit fits; None where nothing is: it says what
-    no comparison can, where rates and angles are scaled alike."""
-    largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))
-    if largest <= _UPRIGHT_RAD:
+def pitch_angle_unit_remark(pitch: Column, name: str) -> str | None:
+    """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
+    what no comparison can, where rates and angles are scaled alike."""
+    max_pitch = float(np.nanmax(np.abs(pitch.values), initial=0.0))
+    if max_pitch <= _MAX_PITCH_RAD:
         return None
-    unit = next((one for one in ("deg", "cdeg") if largest * UNITS[one][1] <= _UPRIGHT_RAD), None)
+    unit = next((one for one in ("deg", "cdeg") if max_pitch * UNITS[one][1] <= _MAX_PITCH_RAD), None)
     fits = f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
-    return f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' too"
+    return f"{name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' too"
 
 
 def gravity_remark(acceleration: Column, name: str) -> str | None:
-    """What is wrong with the acceleration along z by its mean, and which unit fits; None where nothing is."""
+    """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
+    is."""
     values = acceleration.values[np.isfinite(acceleration.values)]
-    mean = float(np.median(np.abs(values))) if values.size else 0.0
-    if _GRAVITY[0] < mean / _G < _GRAVITY[1]:
+    median_mps2 = float(np.median(np.abs(values))) if values.size else 0.0
+    if _GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _GRAVITY_RANGE_G[1]:
         return None
-    unit = nearest_unit(ACCELERATION, _G / mean, 2.0) if mean > 0.0 else None
+    unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None
     fits = (
         f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits: is 1 g in it?"
     )
-    return f"{name}: is {mean:.4g} m/s2 on the middle of the flight, 1 g is {_G:.4g}: {fits}"
+    return (
+        f"{name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is {_GRAVITY_MPS2:.4g}: {fits}"
+    )

@@ -5,7 +5,7 @@ log: a column of the other sign, in another unit, or exchanged with another. Onl
 read the log, and it shows: with the mistake mended the log is likelier in every part of the flight.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
@@ -15,11 +15,11 @@ import numpy as np
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 
-_UNITS = (180.0 / np.pi, 1000.0)
+_UNIT_SIZE_RATIOS = (180.0 / np.pi, 1000.0)
 """Sizes of units in one another: degrees in a radian, thousandths in one."""
 
 
-class Reading(NamedTuple):
+class CorrectedReading(NamedTuple):
     """A log with one mistake mended.
 
     says: the mend; samples: the log by it; density: log of the factor by which the mend multiplies the rates.
@@ -27,38 +27,49 @@ class Reading(NamedTuple):
     density is a times as large.
     """
 
-    says: str
+    correction: str
     samples: Samples
-    density: float = 0.0
+    log_density: float = 0.0
 
 
-def mended(samples: Samples, vehicle: Vehicle) -> Iterator[Reading]:
-    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit."""
+def corrected_readings(
+    samples: Samples, vehicle: Vehicle, surfaces_of_unknown_effect: Collection[str] = ()
+) -> Iterator[CorrectedReading]:
+    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit.
+    surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
+    commands."""
     surfaces, rates = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    for a, b in combinations(range(len(surfaces)), 2):
+    for a, b in combinations(
+        [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
+    ):
         order = list(range(len(surfaces)))
         order[a], order[b] = b, a
         exchanged = replace(samples, commands=samples.commands[:, order])
-        yield Reading(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged)
+        yield CorrectedReading(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged)
     for one, other in combinations(rates, 2):
-        exchanged = _read(samples, vehicle, {one: other, other: one}, {})
-        yield Reading(f"{one} and {other} exchanged", exchanged)
-    for name in [*rates, *vehicle.signal_names]:
-        for factor in (-1.0, *_UNITS, *(1.0 / unit for unit in _UNITS)):
-            scaled = _read(samples, vehicle, {}, {name: factor})
-            density = float(np.log(abs(factor))) if name in rates else 0.0
-            yield Reading(f"`scale: {factor:.4g}` on {name}", scaled, density)
+        exchanged = _with_columns_from(samples, vehicle, {one: other, other: one}, {})
+        yield CorrectedReading(f"{one} and {other} exchanged", exchanged)
+    for name in [*rates, *vehicle.signal_columns]:
+        for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit for unit in _UNIT_SIZE_RATIOS)):
+            scaled = _with_columns_from(samples, vehicle, {}, {name: factor})
+            log_density = float(np.log(abs(factor))) if name in rates else 0.0
+            yield CorrectedReading(f"`scale: {factor:.4g}` on {name}", scaled, log_density)
 
 
-def _read(
-    samples: Samples, vehicle: Vehicle, source: Mapping[str, str], factor: Mapping[str, float]
+def _with_columns_from(
+    samples: Samples,
+    vehicle: Vehicle,
+    source_of_column: Mapping[str, str],
+    factor_of_column: Mapping[str, float],
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.past_names
+    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.past_regressor_names
     columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
-    found = []
+    new_columns = []
     for name in names:
         stem, suffix = name.removesuffix(" by airspeed"), name[len(name.removesuffix(" by airspeed")) :]
-        found.append(factor.get(stem, 1.0) * columns[source.get(stem, stem) + suffix])
-    signals = np.column_stack(found[3:]) if found[3:] else samples.signals
-    return replace(samples, rates=np.column_stack(found[:3]), signals=signals)
+        new_columns.append(
+            factor_of_column.get(stem, 1.0) * columns[source_of_column.get(stem, stem) + suffix]
+        )
+    signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
+    return replace(samples, rates=np.column_stack(new_columns[:3]), signals=signals)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 
 Floats = NDArray[np.float64]
-_US = 1e-6
-_NEAREST = 10
-TINY = float(np.sqrt(np.finfo(float).tiny))
-"""What a divisor is at least that may be zero."""
+_S_PER_US = 1e-6
+_N_NEAREST_NAMES = 10
+MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
+"""Least value of a divisor that may be zero."""
 
 
 @dataclass(frozen=True)
@@ -35,74 +35,88 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Event:
-    """What the log itself says happened: for scoring only, `diagnose` never reads it."""
+class LoggedFailure:
+    """A failure that the log itself states: for scoring only, `diagnose` never reads it."""
 
     t_s: float
     surface: str
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedFlight:
     """One flight: its columns by name, what went wrong by the log's own word, and remarks on the reading."""
 
     name: str
     columns: Mapping[str, Column]
-    events: tuple[Event, ...] = ()
+    logged_failures: tuple[LoggedFailure, ...] = ()
     notes: tuple[str, ...] = field(default=())
 
 
-def nearest_ten(given: str, names: Iterable[str]) -> str:
+def nearest_names(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
-    known = sorted(names)
-    ranked = sorted(known, key=lambda name: -SequenceMatcher(None, name.lower(), given.lower()).ratio())
-    shown = ", ".join(name if name.isprintable() else repr(name) for name in ranked[:_NEAREST]) or "none"
-    return shown if len(known) <= _NEAREST else f"{shown}, and {len(known) - _NEAREST} more"
+    sorted_names = sorted(names)
+    ranked = sorted(
+        sorted_names, key=lambda name: -SequenceMatcher(None, name.lower(), wanted_name.lower()).ratio()
+    )
+    shown = (
+        ", ".join(name if name.isprintable() else repr(name) for name in ranked[:_N_NEAREST_NAMES]) or "none"
+    )
+    return (
+        shown
+        if len(sorted_names) <= _N_NEAREST_NAMES
+        else f"{shown}, and {len(sorted_names) - _N_NEAREST_NAMES} more"
+    )
 
 
 @contextmanager
-def reading(path: Path, what: str, package: str, form: str) -> Iterator[None]:
+def open_log_with_package(path: Path, log_kind: str, package: str, file_form: str) -> Iterator[None]:
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
     here. Raises BadInput where the package is missing, or the file is none that it can read.
 
-    what: such a log is called; form: of the files that hold one.
+    log_kind: such a log is called; file_form: of the files that hold one.
     """
     try:
         with redirect_stdout(StringIO()):
             yield
     except ImportError:
-        extra = f"reading a {what} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
-        raise BadInput(f"{path}: {extra}") from None
+        missing_package = f"reading a {log_kind} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
+        raise BadInput(f"{path}: {missing_package}") from None
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
         says = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{path}: is no {what} that can be read ({says}), allowed: {form}") from None
+        raise BadInput(f"{path}: is no {log_kind} that can be read ({says}), allowed: {file_form}") from None
 
 
-def columns_of(topics: dict[str, dict[str, Any]], stamp: str) -> tuple[dict[str, Column], float]:
+def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tuple[dict[str, Column], float]:
     """The fields of all topics as columns `topic.field`, and the first stamp, from which time counts, s.
 
     topics: each topic's fields by name, one of them the stamps in us.
     """
-    ordered = {name: in_order(name, _numbers(fields[stamp])) for name, fields in topics.items()}
-    firsts = [float(topics[name][stamp][kept[0]]) for name, (kept, _) in ordered.items() if len(kept)]
-    origin_us = min(firsts, default=0.0)
+    rows_of_topic = {
+        name: rows_in_time_order(name, _as_floats(fields[stamp_field])) for name, fields in topics.items()
+    }
+    first_stamps = [
+        float(topics[name][stamp_field][kept_rows[0]])
+        for name, (kept_rows, _) in rows_of_topic.items()
+        if len(kept_rows)
+    ]
+    origin_us = min(first_stamps, default=0.0)
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
-        kept, note = ordered[name]
-        t_s = (_numbers(fields[stamp])[kept] - origin_us) * _US
+        kept_rows, note = rows_of_topic[name]
+        t_s = (_as_floats(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
         columns |= {
-            f"{name}.{field}": Column(t_s, _numbers(values)[kept], note)
+            f"{name}.{field}": Column(t_s, _as_floats(values)[kept_rows], note)
             for field, values in fields.items()
-            if field != stamp
+            if field != stamp_field
         }
-    return columns, origin_us * _US
+    return columns, origin_us * _S_PER_US
 
 
-def _numbers(values: Any) -> Floats:
+def _as_floats(values: Any) -> Floats:
     return np.asarray(values, dtype=float)
 
 
-def in_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
+def rows_in_time_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
     """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
 
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
@@ -111,14 +125,17 @@ def in_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
     if (np.diff(t_s) > 0).all() and np.isfinite(t_s).all():
         return np.arange(len(t_s)), ""
     stamped = np.flatnonzero(np.isfinite(t_s))
-    kept = stamped[_longest_increasing(t_s[stamped])]
-    left_out = np.setdiff1d(np.arange(len(t_s)), kept)
-    wrong = [k for k in left_out.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
-    if not wrong:
-        return kept, ""
-    more = len(wrong) - 1
-    others = f", as {'is' if more == 1 else 'are'} {more} more of {len(t_s)}" if more else ""
-    return kept, f"{topic}: row {wrong[0] + 1}: its stamp is out of order, the row is left out{others}"
+    kept_rows = stamped[_longest_increasing(t_s[stamped])]
+    left_out = np.setdiff1d(np.arange(len(t_s)), kept_rows)
+    misplaced_rows = [k for k in left_out.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
+    if not misplaced_rows:
+        return kept_rows, ""
+    n_further = len(misplaced_rows) - 1
+    others = f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(t_s)}" if n_further else ""
+    return (
+        kept_rows,
+        f"{topic}: row {misplaced_rows[0] + 1}: its stamp is out of order, the row is left out{others}",
+    )
 
 
 def _longest_increasing(t_s: Floats) -> NDArray[np.int64]:
@@ -126,15 +143,15 @@ def _longest_increasing(t_s: Floats) -> NDArray[np.int64]:
 
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
-    ends: list[float] = []
+    negated_ends: list[float] = []
     places: list[int] = []
-    after = np.full(len(t_s), -1)
+    next_place = np.full(len(t_s), -1)
     for k in range(len(t_s) - 1, -1, -1):
-        length = bisect_left(ends, -t_s[k])
-        after[k] = places[length - 1] if length else -1
-        ends[length : length + 1] = [-t_s[k]]
+        length = bisect_left(negated_ends, -t_s[k])
+        next_place[k] = places[length - 1] if length else -1
+        negated_ends[length : length + 1] = [-t_s[k]]
         places[length : length + 1] = [k]
     kept = places[-1:]
-    while kept and after[kept[-1]] >= 0:
-        kept.append(int(after[kept[-1]]))
+    while kept and next_place[kept[-1]] >= 0:
+        kept.append(int(next_place[kept[-1]]))
     return np.array(kept, dtype=np.int64)

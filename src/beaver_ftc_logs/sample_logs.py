@@ -9,19 +9,20 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.vehicle import further_keys
+from beaver_ftc_logs.vehicle import unused_keys_as_comments
 
-Left = Callable[[float], float]
+EffectivenessAtTime = Callable[[float], float]
 """How much of the left elevon is there at a time, s."""
 
-RATE_HZ, HEALTHY_S, SUSPECT_S = 20.0, 600.0, 180.0
-WEAK_FROM_S, WEAK = 90.0, 0.4
-_DAMPING = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
-_ELEVONS = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
+SAMPLE_RATE_HZ, HEALTHY_FLIGHT_S, FAULTY_FLIGHT_S = 20.0, 600.0, 180.0
+WEAK_ELEVON_FROM_S, WEAK_ELEVON_EFFECTIVENESS = 90.0, 0.4
+_DAMPING_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
+_ELEVON_EFFECTIVENESS_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
 """Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
-_AIR_RAD_S2, _GYRO_RAD_S = np.array([1.2, 0.8, 0.4]), 0.004
-_HOLD_S, _ROLL_RAD, _PITCH_RAD = 4.0, 0.5, 0.15
-VEHICLE = """\
+_TURBULENCE_INTENSITY = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second: of the noise that drives it
+_GYRO_NOISE_RAD_S = 0.004
+_COMMAND_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
+VEHICLE_FILE_TEXT = """\
 # The vehicle file of two sample logs: which column is what, and in which unit.
 name: sample-wing
 time: {column: time_ms, unit: ms}
@@ -36,47 +37,57 @@ surfaces:                                       # what each elevon makes of them
 attitude: {roll: roll_rad, pitch: pitch_rad}    # what the rates are checked against
 """
 
-_GIVEN = ("name", "time", "rates", "commands", "surfaces", "attitude")
+_USED_VEHICLE_KEYS = ("name", "time", "rates", "commands", "surfaces", "attitude")
 
 
 def files() -> dict[str, str]:
     """Names and texts of the sample files."""
     return {
-        "vehicle.yaml": VEHICLE + further_keys(_GIVEN),
-        "healthy.csv": _table(HEALTHY_S, seed=1, left=lambda t_s: 1.0),
-        "suspect.csv": _table(SUSPECT_S, seed=2, left=lambda t_s: WEAK if t_s >= WEAK_FROM_S else 1.0),
+        "vehicle.yaml": VEHICLE_FILE_TEXT + unused_keys_as_comments(_USED_VEHICLE_KEYS),
+        "healthy.csv": _table_text(HEALTHY_FLIGHT_S, seed=1, left_effectiveness=lambda t_s: 1.0),
+        "suspect.csv": _table_text(
+            FAULTY_FLIGHT_S,
+            seed=2,
+            left_effectiveness=lambda t_s: WEAK_ELEVON_EFFECTIVENESS if t_s >= WEAK_ELEVON_FROM_S else 1.0,
+        ),
     }
 
 
-def _table(duration_s: float, seed: int, left: Left) -> str:
-    head = "time_ms,gyro_x,gyro_y,gyro_z,roll_cmd,pitch_cmd,roll_rad,pitch_rad"
-    rows = _flown(duration_s, np.random.default_rng(seed), left)
-    return "\n".join([head, *(",".join(f"{cell:.7g}" for cell in row) for row in rows)]) + "\n"
+def _table_text(duration_s: float, seed: int, left_effectiveness: EffectivenessAtTime) -> str:
+    header = "time_ms,gyro_x,gyro_y,gyro_z,roll_cmd,pitch_cmd,roll_rad,pitch_rad"
+    rows = _simulate_rows(duration_s, np.random.default_rng(seed), left_effectiveness)
+    return "\n".join([header, *(",".join(f"{cell:.7g}" for cell in row) for row in rows)]) + "\n"
 
 
-def _flown(duration_s: float, rng: np.random.Generator, left: Left) -> Iterator[list[float]]:
+def _simulate_rows(
+    duration_s: float, rng: np.random.Generator, left_effectiveness: EffectivenessAtTime
+) -> Iterator[list[float]]:
     """Row by row: time, rates in deg/s, commands, attitude."""
-    dt = 1.0 / RATE_HZ
-    rates, air, attitude, wanted = np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2)
-    for k in range(round(duration_s * RATE_HZ)):
-        t_s = k * dt
-        if k % round(_HOLD_S * RATE_HZ) == 0:
-            wanted = rng.uniform(-1.0, 1.0, 2) * [_ROLL_RAD, _PITCH_RAD]
-        command = _law(attitude, rates, wanted)
-        measured = np.rad2deg(rates + _GYRO_RAD_S * rng.standard_normal(3))
+    dt_s = 1.0 / SAMPLE_RATE_HZ
+    rates, turbulence_rad_s2, attitude, demanded_attitude = np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2)
+    for k in range(round(duration_s * SAMPLE_RATE_HZ)):
+        t_s = k * dt_s
+        if k % round(_COMMAND_HOLD_S * SAMPLE_RATE_HZ) == 0:
+            demanded_attitude = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
+        command = _control_law(attitude, rates, demanded_attitude)
+        measured = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
         yield [1000.0 * t_s, *measured, *command, *attitude]
-        elevons = np.array([command.sum(), command[0] - command[1]]) / 2.0 * [1.0, left(t_s)]
-        air += dt * (-2.0 * air) + np.sqrt(dt) * _AIR_RAD_S2 * rng.standard_normal(3)
-        rates = rates + dt * (_DAMPING @ rates + elevons @ _ELEVONS + air)
-        attitude = attitude + dt * _euler(rates, attitude)
+        elevons = np.array([command.sum(), command[0] - command[1]]) / 2.0 * [1.0, left_effectiveness(t_s)]
+        turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + np.sqrt(
+            dt_s
+        ) * _TURBULENCE_INTENSITY * rng.standard_normal(3)
+        rates = rates + dt_s * (
+            _DAMPING_PER_S @ rates + elevons @ _ELEVON_EFFECTIVENESS_RAD_S2 + turbulence_rad_s2
+        )
+        attitude = attitude + dt_s * _euler_rates(rates, attitude)
 
 
-def _law(attitude: Floats, rates: Floats, wanted: Floats) -> Floats:
+def _control_law(attitude: Floats, rates: Floats, demanded_attitude: Floats) -> Floats:
     """Roll and pitch command."""
-    return np.clip(1.2 * (wanted - attitude) - 0.15 * rates[:2], -1.0, 1.0)
+    return np.clip(1.2 * (demanded_attitude - attitude) - 0.15 * rates[:2], -1.0, 1.0)
 
 
-def _euler(rates: Floats, attitude: Floats) -> Floats:
+def _euler_rates(rates: Floats, attitude: Floats) -> Floats:
     """Rates of the roll and the pitch angle."""
     p, q, r = rates
     phi, theta = attitude

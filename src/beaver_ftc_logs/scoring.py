@@ -7,98 +7,125 @@ from dataclasses import replace
 
 import numpy as np
 
-from beaver_ftc.results import Document
-from beaver_ftc.scenario import Onset
-from beaver_ftc_logs.diagnose import Rows
-from beaver_ftc_logs.recording import Event, Floats
+from beaver_ftc.results import Document, Onset
+from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.recording import Floats, LoggedFailure
 from beaver_ftc_logs.samples import Samples
 
 ENGINE = "engine"
-_SETTLED_S = 2.0
+_SIMULTANEOUS_FAILURE_SPAN_S = 2.0
 
 
-def score(samples: Samples, rows: Rows, groups: list[list[str]]) -> Document:
+def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str]]) -> Document:
     """Every figure that the log's own word allows: by labels where it has them, by its failure otherwise.
 
     Of a log faster than its samples each row has the label of its last sample; a surface of which the log
     says nothing is not judged.
     """
-    labelled = np.isfinite(samples.labels).any(axis=0)
-    if not labelled.any():
-        return by_event(rows, samples.events, groups)
-    last = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
-    judged = {name: getattr(rows, name).compress(labelled, axis=1) for name in ("estimate", "low", "high")}
-    return by_labels(replace(rows, **judged), samples.labels[last].compress(labelled, axis=1))
+    is_labelled = np.isfinite(samples.labels).any(axis=0)
+    if not is_labelled.any():
+        return score_against_failures(rows, samples.logged_failures, groups)
+    last_rows = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
+    judged_fields = {
+        name: getattr(rows, name).compress(is_labelled, axis=1)
+        for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
+    }
+    return score_against_labels(
+        replace(rows, **judged_fields), samples.labels[last_rows].compress(is_labelled, axis=1)
+    )
 
 
-def by_labels(rows: Rows, labels: Floats) -> Document:
+def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     """Against labelled effectiveness (n, S), on the rows where it is known.
 
     classes: share of rows whose estimate is nearest to the true one of the label's own settings, those that
     it takes for at least a hundredth of the flight, over all surfaces; side: whether the same surfaces are
     faulty.
     """
-    ok = np.isfinite(labels).all(axis=1)
-    truth, estimate = labels[ok], rows.estimate[ok]
-    found, count = np.unique(truth, axis=0, return_counts=True)
-    settings = found[count >= 0.005 * len(truth)]
-    faulty = (truth < 1.0).any(axis=1)
+    is_known = np.isfinite(labels).all(axis=1)
+    true_effectiveness, estimated_effectiveness = labels[is_known], rows.effectiveness[is_known]
+    label_settings, n_rows_of_setting = np.unique(true_effectiveness, axis=0, return_counts=True)
+    frequent_settings = label_settings[n_rows_of_setting >= 0.005 * len(true_effectiveness)]
+    is_truly_faulty = (true_effectiveness < 1.0).any(axis=1)
     return {
-        "rows": int(ok.sum()),
-        "settings": settings.tolist(),
-        "classes": float(np.mean(nearest(estimate, settings) == nearest(truth, settings))),
-        "healthy_or_faulty": float(np.mean((rows.faulty[ok] == 1) == faulty)),
-        "side": float(np.mean(((estimate < 1.0) == (truth < 1.0)).all(axis=1))),
-        "mean_error": float(np.abs(estimate - truth).mean()),
-        "held_by_bounds": float(np.mean((rows.low[ok] <= truth) & (truth <= rows.high[ok]))),
+        "rows": int(is_known.sum()),
+        "settings": frequent_settings.tolist(),
+        "classes": float(
+            np.mean(
+                nearest_setting(estimated_effectiveness, frequent_settings)
+                == nearest_setting(true_effectiveness, frequent_settings)
+            )
+        ),
+        "healthy_or_faulty": float(np.mean((rows.faulty[is_known] == 1) == is_truly_faulty)),
+        "side": float(np.mean(((estimated_effectiveness < 1.0) == (true_effectiveness < 1.0)).all(axis=1))),
+        "mean_error": float(np.abs(estimated_effectiveness - true_effectiveness).mean()),
+        "held_by_bounds": float(
+            np.mean(
+                (rows.effectiveness_low[is_known] <= true_effectiveness)
+                & (true_effectiveness <= rows.effectiveness_high[is_known])
+            )
+        ),
     }
 
 
-def nearest(estimate: Floats, settings: Floats) -> np.ndarray:
+def nearest_setting(estimate: Floats, settings: Floats) -> np.ndarray:
     """Index of the setting nearest to each row."""
-    distance = ((estimate[:, None, :] - settings[None, :, :]) ** 2).sum(axis=2)
-    return np.asarray(distance.argmin(axis=1))
+    squared_distance = ((estimate[:, None, :] - settings[None, :, :]) ** 2).sum(axis=2)
+    return np.asarray(squared_distance.argmin(axis=1))
 
 
-def by_event(rows: Rows, events: tuple[Event, ...], groups: list[list[str]]) -> Document:
+def score_against_failures(
+    rows: DiagnosisRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
+) -> Document:
     """Against the first failure the log tells of: alarms before it are false, those after it are late by."""
-    begins = min((event.t_s for event in events), default=np.inf)
-    onset = Onset(None if np.isinf(begins) else float(begins))
-    surfaces = sorted({event.surface for event in events if event.t_s < begins + _SETTLED_S})
-    before = onset.is_false(rows.t_s)
-    after = np.flatnonzero(~before & (rows.faulty == 1))
-    detected = bool(after.size)
-    named = _named(rows, after)
+    first_failure_s = min((failure.t_s for failure in failures), default=np.inf)
+    onset = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
+    surfaces = sorted(
+        {
+            failure.surface
+            for failure in failures
+            if failure.t_s < first_failure_s + _SIMULTANEOUS_FAILURE_SPAN_S
+        }
+    )
+    is_before_failure = onset.is_false(rows.t_s)
+    alarm_rows_after = np.flatnonzero(~is_before_failure & (rows.faulty == 1))
+    detected = bool(alarm_rows_after.size)
+    name_shares = _name_shares_after_failure(rows, alarm_rows_after)
     return {
         "failure": "+".join(surfaces) or None,
         "failure_s": onset.at_s,
-        "healthy_s": float(rows.t_s[before][-1] - rows.t_s[0]) if before.any() else 0.0,
-        "false_alarms": int(np.sum(np.diff(rows.faulty[before], prepend=0) == 1)),
+        "healthy_s": float(rows.t_s[is_before_failure][-1] - rows.t_s[0]) if is_before_failure.any() else 0.0,
+        "false_alarms": int(np.sum(np.diff(rows.faulty[is_before_failure], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": onset.delay_s(float(rows.t_s[after[0]])) if detected else None,
-        "named": named,
-        "right_group": _right_group(named, surfaces, groups),
+        "delay_s": onset.delay_s(float(rows.t_s[alarm_rows_after[0]])) if detected else None,
+        "named": name_shares,
+        "right_group": _is_right_group(name_shares, surfaces, groups),
     }
 
 
-def _named(rows: Rows, after: np.ndarray) -> dict[str, float]:
-    """What was named after the failure, as shares of the rows with an alarm."""
-    names, count = np.unique(rows.named[after].astype(str), return_counts=True)
-    return {str(name): float(share) for name, share in zip(names, count / max(len(after), 1), strict=True)}
+def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray) -> dict[str, float]:
+    """Return the names after the failure, as shares of the rows with an alarm."""
+    names, count = np.unique(rows.named_surfaces[alarm_rows_after].astype(str), return_counts=True)
+    return {
+        str(name): float(share)
+        for name, share in zip(names, count / max(len(alarm_rows_after), 1), strict=True)
+    }
 
 
-def _right_group(named: dict[str, float], surfaces: list[str], groups: list[list[str]]) -> bool | None:
+def _is_right_group(
+    name_shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
+) -> bool | None:
     """Whether the name held longest after the failure is of the group that failed; None: nothing to judge."""
-    endings = tuple(f"_{surface}" for surface in surfaces)
-    actual = {
+    name_endings = tuple(f"_{surface}" for surface in surfaces)
+    failed_groups = {
         index
         for index, group in enumerate(groups)
         for name in group
-        if name in surfaces or name.endswith(endings)
+        if name in surfaces or name.endswith(name_endings)
     }
-    names = {name: share for name, share in named.items() if name != "unknown"}
-    if not actual or not names:
+    names = {name: share for name, share in name_shares.items() if name != "unknown"}
+    if not failed_groups or not names:
         return None
-    longest = set(max(names, key=lambda name: names[name]).split("+"))
-    found = {index for index, group in enumerate(groups) if longest & set(group)}
-    return bool(found) and found <= actual
+    longest_name = set(max(names, key=lambda name: names[name]).split("+"))
+    named_groups = {index for index, group in enumerate(groups) if longest_name & set(group)}
+    return bool(named_groups) and named_groups <= failed_groups

@@ -9,79 +9,93 @@ from numpy.typing import NDArray
 
 from beaver_ftc_logs.recording import Column, Floats
 
-STILL_S, STILL_ROWS = 1.5, 12
+MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
-_CLIPPED_ROWS, _CLIPPED_SEEN = 3, 10
-_JUMP, _MOST_JUMPS = 40.0, 0.01
+_MIN_CLIPPED_ROWS, _MIN_CLIPPED_TOTAL_ROWS = 3, 10
+_MIN_JUMP_STEPS, _MAX_JUMP_SHARE = 40.0, 0.01
 
 Mask = NDArray[np.bool_]
 
 
-def still_s(column: Column) -> Floats:
-    """How long a column's value has been the same at each row, (n,) s; 0 for fewer than STILL_ROWS."""
-    rows = np.arange(len(column.values))
-    since = np.maximum.accumulate(np.where(_moved(column.values), rows, 0))
-    return np.where(rows - since >= STILL_ROWS, column.t_s - column.t_s[since], 0.0)
+def still_time_s(column: Column) -> Floats:
+    """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
+    row_index = np.arange(len(column.values))
+    unchanged_since = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row_index, 0))
+    return np.where(
+        row_index - unchanged_since >= MIN_STILL_ROWS, column.t_s - column.t_s[unchanged_since], 0.0
+    )
 
 
-def _moved(values: Floats) -> Mask:
+def _differs_from_previous(values: Floats) -> Mask:
     """Rows whose value is another than the row's before, the first among them; what is no number moves."""
     return np.concatenate([[True], values[1:] != values[:-1]])[: len(values)]
 
 
-def clipped(values: Floats) -> Mask:
+def is_clipped(values: Floats) -> Mask:
     """Rows at the largest value seen so far, either way, that stands for three rows and was met ten times.
 
     Uses nothing later than the row.
     """
-    found = np.zeros(len(values), dtype=bool)
-    for side in (values, -values):
-        known = np.where(np.isfinite(side), side, -np.inf)
-        at_most = (side == np.maximum.accumulate(known)) & (side > 0.0)
-        rows = np.arange(len(side))
-        since = np.maximum.accumulate(np.where(_moved(side) | ~at_most, rows, 0))
+    clipped = np.zeros(len(values), dtype=bool)
+    for signed_values in (values, -values):
+        finite_values = np.where(np.isfinite(signed_values), signed_values, -np.inf)
+        is_at_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (signed_values > 0.0)
+        row_index = np.arange(len(signed_values))
+        at_maximum_since = np.maximum.accumulate(
+            np.where(_differs_from_previous(signed_values) | ~is_at_maximum, row_index, 0)
+        )
         level = np.cumsum(
-            _moved(np.maximum.accumulate(known)).astype(np.int64)
+            _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
-        met = np.cumsum(at_most) - _before_level(at_most, level)
-        found |= at_most & (rows - since >= _CLIPPED_ROWS - 1) & (met >= _CLIPPED_SEEN)
-    return found
+        n_met = np.cumsum(is_at_maximum) - _rows_at_previous_level(is_at_maximum, level)
+        clipped |= (
+            is_at_maximum
+            & (row_index - at_maximum_since >= _MIN_CLIPPED_ROWS - 1)
+            & (n_met >= _MIN_CLIPPED_TOTAL_ROWS)
+        )
+    return clipped
 
 
-def _before_level(at_most: Mask, level: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many rows were at the largest value before the present one was reached."""
-    total = np.cumsum(at_most)
-    first = np.flatnonzero(np.diff(level, prepend=0))
-    return (total - at_most)[first][level - 1] if len(first) else np.zeros(len(level), dtype=np.int64)
+def _rows_at_previous_level(is_at_maximum: Mask, level: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Count the rows at the largest value before the present one was reached."""
+    n_at_maximum = np.cumsum(is_at_maximum)
+    first_rows = np.flatnonzero(np.diff(level, prepend=0))
+    return (
+        (n_at_maximum - is_at_maximum)[first_rows][level - 1]
+        if len(first_rows)
+        else np.zeros(len(level), dtype=np.int64)
+    )
 
 
-def jumps(values: Floats) -> NDArray[np.int64]:
+def find_jump_rows(values: Floats) -> NDArray[np.int64]:
     """Single rows that leave the signal by 40 times its usual step and come back, where these are few."""
-    known = np.flatnonzero(np.isfinite(values))
-    if len(known) < STILL_ROWS:
-        return known[:0]
-    steps = np.diff(values[known])
-    usual = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    away = (np.abs(steps[:-1]) > _JUMP * usual) & (np.abs(steps[1:]) > _JUMP * usual)
-    away &= steps[:-1] * steps[1:] < 0.0
-    found = known[1:-1][away]
-    return found if usual > 0.0 and len(found) <= _MOST_JUMPS * len(known) else known[:0]
+    finite_rows = np.flatnonzero(np.isfinite(values))
+    if len(finite_rows) < MIN_STILL_ROWS:
+        return finite_rows[:0]
+    steps = np.diff(values[finite_rows])
+    usual_step = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
+    is_jump = (np.abs(steps[:-1]) > _MIN_JUMP_STEPS * usual_step) & (
+        np.abs(steps[1:]) > _MIN_JUMP_STEPS * usual_step
+    )
+    is_jump &= steps[:-1] * steps[1:] < 0.0
+    jumps = finite_rows[1:-1][is_jump]
+    return jumps if usual_step > 0.0 and len(jumps) <= _MAX_JUMP_SHARE * len(finite_rows) else finite_rows[:0]
 
 
-def remarks(name: str, column: Column, measured: bool) -> list[str]:
-    """What is wrong with a column over the whole flight, in lines. measured: a rate, not a command."""
-    values, said = column.values, [column.note] if column.note else []
-    lost = int((~np.isfinite(values)).sum())
-    if lost:
-        said.append(f"{name}: rows without a number: {lost} of {len(values)}")
-    longest = float(still_s(column).max(initial=0.0))
-    if measured and longest > STILL_S:
-        said.append(f"{name}: frozen, the same to the last bit for {longest:.1f} s")
+def column_mistakes(name: str, column: Column, measured: bool) -> list[str]:
+    """Return a line for each mistake in a column over the whole flight. measured: a rate, not a command."""
+    values, lines = column.values, [column.note] if column.note else []
+    n_missing = int((~np.isfinite(values)).sum())
+    if n_missing:
+        lines.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
+    longest_still_s = float(still_time_s(column).max(initial=0.0))
+    if measured and longest_still_s > MIN_STILL_S:
+        lines.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
     if not measured and values.size and np.nanmin(values) == np.nanmax(values):
-        said.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if measured and (rows := clipped(values)).any():
-        said.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
-    if measured and len(places := jumps(values)):
-        many = "1 jump" if len(places) == 1 else f"{len(places)} jumps"
-        said.append(f"{name}: {many}, the first at {column.t_s[places[0]]:.2f} s")
-    return said
+        lines.append(f"{name}: does not move, nothing can be said of what it moves alone")
+    if measured and (rows := is_clipped(values)).any():
+        lines.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
+    if measured and len(jump_places := find_jump_rows(values)):
+        jump_count_text = "1 jump" if len(jump_places) == 1 else f"{len(jump_places)} jumps"
+        lines.append(f"{name}: {jump_count_text}, the first at {column.t_s[jump_places[0]]:.2f} s")
+    return lines

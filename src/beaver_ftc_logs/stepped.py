@@ -14,36 +14,37 @@ import numpy as np
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
-from beaver_ftc_logs.diagnose import UNKNOWN, Rows
-from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.regression import coefficient_bounds, quarters
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import coefficient_bounds, split_into_flight_parts
 
-LOSS = "loss_of_effectiveness"
-STANDS_S = 1.0
-_ROUNDING, _ROUNDING_RAD_S2 = 1e-9, 1e-12
-_POWER = 0.4
-_KEPT = ("fdi", "actuators", "design_model")  # between samples a log has no instants
+LOSS_FAULT_TYPE = "loss_of_effectiveness"
+EXCLUSION_MEMORY_S = 1.0
+_LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
+_INFORMATION_SHARE = 0.4
+_DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
 @dataclass(frozen=True)
-class Stepped:
-    """verdicts, one a sample; low, high (n, S): effectiveness of each surface if it alone is at fault; gains
-    (S,): of what each command does at most as much as this in all of it, 1 where it is too short."""
+class ReplayedVerdicts:
+    """verdicts, one a sample; effectiveness_low and effectiveness_high (n, S) of each surface if it alone is
+    at fault; max_command_gains (S,): of what each command does at most as much as this in all of it, 1 where
+    it is too short."""
 
     verdicts: list[Verdict]
-    low: Floats
-    high: Floats
-    gains: Floats
+    effectiveness_low: Floats
+    effectiveness_high: Floats
+    max_command_gains: Floats
 
 
-def declared_of(scenario: Any) -> dict[str, Any]:
-    """What a scenario tells the diagnosis, as `Diagnosis` takes it."""
+def declared_errors(scenario: Any) -> dict[str, Any]:
+    """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     keys = scenario.model_dump(mode="json", exclude_unset=True)
-    return {key: keys[key] for key in _KEPT if key in keys}
+    return {key: keys[key] for key in _DECLARING_SCENARIO_KEYS if key in keys}
 
 
-def inputs_of(aircraft: Any) -> tuple[list[str], ...]:
-    """What the diagnosis is given at each sample, by the columns of our log: rates, signals, commands,
+def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
+    """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
     attitude."""
     return (
         [f"{axis}_measured_rad_s" for axis in "pqr"],
@@ -53,102 +54,142 @@ def inputs_of(aircraft: Any) -> tuple[list[str], ...]:
     )
 
 
-def step_through(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float) -> Stepped:
-    """The verdicts of evenly spaced samples; inputs: as `inputs_of`, (n, ...) each."""
+def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float) -> ReplayedVerdicts:
+    """The verdicts of evenly spaced samples; inputs: as `log_input_columns`, (n, ...) each."""
     verdicts: list[Verdict] = []
-    innovation, bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
-    expected = np.empty((*innovation.shape, inputs[2].shape[1]))
+    innovation, innovation_bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
+    expected_effect = np.empty((*innovation.shape, inputs[2].shape[1]))
     for k, sample in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
         verdicts.append(diagnosis.step(*sample))
-        innovation[k], bound[k], expected[k] = diagnosis.innovation()
-    theta = _explaining(innovation[:, :, None], bound[:, :, None], expected)
-    theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample ends no frame
-    reach = max(round(STANDS_S * rate_hz), 1)
-    low, high = 1.0 + _latest(theta[0], reach), 1.0 - _latest(-theta[1], reach)
-    nothing = low > high
-    gains = _gains(innovation, expected)
-    return Stepped(verdicts, np.where(nothing, 0.0, low), np.where(nothing, 1.0, high), gains)
-
-
-def _gains(innovation: Floats, expected: Floats) -> Floats:
-    """As in `Stepped`, of the rates' innovation (n, 3) and what each surface was to do, (n, 3, S)."""
-    known = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
-    if (parts := quarters(known)) is None:
-        return np.ones(expected.shape[2])
-    white = np.maximum(innovation[known].std(axis=0), TINY)
-    x = np.concatenate([np.broadcast_to(np.eye(3), (len(expected), 3, 3)), expected / white[:, None]], axis=2)
-    y, found = innovation / white, np.full(expected.shape[2], -np.inf)
-    for part in parts:
-        theta, _ = coefficient_bounds(x[part].reshape(3 * len(part), -1), y[part].ravel(), _POWER)
-        found = np.maximum(found, 1.0 + theta[3:])
-    return found
-
-
-def _explaining(innovation: Floats, bound: Floats, expected: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest theta (n, S) of a loss that explains each frame on every axis; least above greatest
-    where none does."""
-    bound = bound + _ROUNDING_RAD_S2
-    moved = np.abs(expected) > TINY
-    slope = np.where(moved, expected, 1.0)
-    ends = np.sort(np.stack([(innovation - bound) / slope, (innovation + bound) / slope]), axis=0)
-    within = np.abs(innovation) <= bound
-    least = np.where(moved, ends[0], np.where(within, -1.0, 1.0)).max(axis=1)
-    greatest = np.where(moved, ends[1], np.where(within, 0.0, -2.0)).min(axis=1)
-    return np.maximum(least - _ROUNDING, -1.0), np.minimum(greatest + _ROUNDING, 0.0)
-
-
-def _latest(values: Floats, reach: int) -> Floats:
-    """The greatest of each sample's own and the `reach - 1` values before it, by column."""
-    from scipy.ndimage import maximum_filter1d
-
-    padded = np.concatenate([np.full((reach - 1, values.shape[1]), -np.inf), values])
-    found = maximum_filter1d(padded, reach, axis=0, origin=(reach - 1) // 2)
-    return np.asarray(found[reach - 1 :])
-
-
-def rows_of(t_s: Floats, stepped: Stepped, surfaces: Sequence[str], fdi: Any) -> Rows:
-    """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
-    faulty = np.array([verdict.detected for verdict in stepped.verdicts])
-    estimate, low, high = np.ones_like(stepped.low), np.zeros_like(stepped.low), np.ones_like(stepped.low)
-    sharp = fdi.is_ours and not fdi.pairs
-    for k, verdict in enumerate(stepped.verdicts):
-        if sharp:
-            _bound(verdict, surfaces, (stepped.low[k], stepped.high[k]), low[k], high[k])
-        if _lost(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
-            s = surfaces.index(verdict.isolated)
-            estimate[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
-    names = [_name(verdict, surfaces) for verdict in stepped.verdicts]
-    return Rows(
-        t_s=t_s,
-        faulty=faulty.astype(np.int64),
-        named=np.array(names, dtype=object),
-        estimate=estimate,
-        low=low,
-        high=high,
-        probability=faulty.astype(float),
+        innovation[k], innovation_bound[k], expected_effect[k] = diagnosis.innovation()
+    loss_bounds = _bounds_of_explaining_losses(
+        innovation[:, :, None], innovation_bound[:, :, None], expected_effect
+    )
+    loss_bounds[0][0], loss_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
+    memory_samples = max(round(EXCLUSION_MEMORY_S * rate_hz), 1)
+    low, high = (
+        1.0 + _sliding_maximum(loss_bounds[0], memory_samples),
+        1.0 - _sliding_maximum(-loss_bounds[1], memory_samples),
+    )
+    is_unexplained = low > high
+    max_command_gains = _max_command_gains(innovation, expected_effect)
+    return ReplayedVerdicts(
+        verdicts, np.where(is_unexplained, 0.0, low), np.where(is_unexplained, 1.0, high), max_command_gains
     )
 
 
-def _bound(
-    verdict: Verdict, surfaces: Sequence[str], alone: tuple[Floats, Floats], low: Floats, high: Floats
+def _max_command_gains(innovation: Floats, expected_effect: Floats) -> Floats:
+    """Gains as in `ReplayedVerdicts`, from the rates' innovation (n, 3) and the expected effect of each
+    surface, (n, 3, S)."""
+    finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
+    if (parts := split_into_flight_parts(finite_rows)) is None:
+        return np.ones(expected_effect.shape[2])
+    innovation_sd = np.maximum(innovation[finite_rows].std(axis=0), MIN_DIVISOR)
+    regressors = np.concatenate(
+        [np.broadcast_to(np.eye(3), (len(expected_effect), 3, 3)), expected_effect / innovation_sd[:, None]],
+        axis=2,
+    )
+    scaled_innovation, max_gains = innovation / innovation_sd, np.full(expected_effect.shape[2], -np.inf)
+    for part in parts:
+        theta, _ = coefficient_bounds(
+            regressors[part].reshape(3 * len(part), -1), scaled_innovation[part].ravel(), _INFORMATION_SHARE
+        )
+        max_gains = np.maximum(max_gains, 1.0 + theta[3:])
+    return max_gains
+
+
+def _bounds_of_explaining_losses(
+    innovation: Floats, innovation_bound: Floats, expected_effect: Floats
+) -> tuple[Floats, Floats]:
+    """Least and greatest theta (n, S) of a loss that explains each frame on every axis; least above greatest
+    where none does."""
+    innovation_bound = innovation_bound + _BOUND_ROUNDING_RAD_S2
+    has_effect = np.abs(expected_effect) > MIN_DIVISOR
+    slope = np.where(has_effect, expected_effect, 1.0)
+    interval_ends = np.sort(
+        np.stack([(innovation - innovation_bound) / slope, (innovation + innovation_bound) / slope]), axis=0
+    )
+    is_within_bound = np.abs(innovation) <= innovation_bound
+    least = np.where(has_effect, interval_ends[0], np.where(is_within_bound, -1.0, 1.0)).max(axis=1)
+    greatest = np.where(has_effect, interval_ends[1], np.where(is_within_bound, 0.0, -2.0)).min(axis=1)
+    return np.maximum(least - _LOSS_ROUNDING, -1.0), np.minimum(greatest + _LOSS_ROUNDING, 0.0)
+
+
+def _sliding_maximum(values: Floats, window_samples: int) -> Floats:
+    """The greatest of each sample's own and the `window_samples - 1` values before it, by column."""
+    from scipy.ndimage import maximum_filter1d
+
+    padded = np.concatenate([np.full((window_samples - 1, values.shape[1]), -np.inf), values])
+    found = maximum_filter1d(padded, window_samples, axis=0, origin=(window_samples - 1) // 2)
+    return np.asarray(found[window_samples - 1 :])
+
+
+def rows_of_replay(
+    t_s: Floats, replayed: ReplayedVerdicts, surfaces: Sequence[str], fdi_config: Any
+) -> DiagnosisRows:
+    """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""
+    faulty = np.array([verdict.detected for verdict in replayed.verdicts])
+    estimate, low, high = (
+        np.ones_like(replayed.effectiveness_low),
+        np.zeros_like(replayed.effectiveness_low),
+        np.ones_like(replayed.effectiveness_low),
+    )
+    gives_bounds = fdi_config.is_ours and not fdi_config.pairs
+    for k, verdict in enumerate(replayed.verdicts):
+        if gives_bounds:
+            _fill_effectiveness_bounds(
+                verdict,
+                surfaces,
+                (replayed.effectiveness_low[k], replayed.effectiveness_high[k]),
+                low[k],
+                high[k],
+            )
+        if _gives_effectiveness(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
+            surface_index = surfaces.index(verdict.isolated)
+            estimate[k, surface_index] = min(
+                max(1.0 + float(verdict.estimate), low[k, surface_index]), high[k, surface_index]
+            )
+    names = [_isolated_name(verdict, surfaces) for verdict in replayed.verdicts]
+    return DiagnosisRows(
+        t_s=t_s,
+        faulty=faulty.astype(np.int64),
+        named_surfaces=np.array(names, dtype=object),
+        effectiveness=estimate,
+        effectiveness_low=low,
+        effectiveness_high=high,
+        fault_probability=faulty.astype(float),
+    )
+
+
+def _fill_effectiveness_bounds(
+    verdict: Verdict,
+    surfaces: Sequence[str],
+    single_fault_bounds: tuple[Floats, Floats],
+    low: Floats,
+    high: Floats,
 ) -> None:
-    """Fill the bounds (S,) of one row, which are 0 and 1 where nothing is said. alone: as in Stepped."""
+    """Fill the bounds (S,) of one row, which are 0 and 1 where nothing is said. single_fault_bounds: as in
+    `ReplayedVerdicts`."""
     if not verdict.detected:
-        low[:] = alone[0]
+        low[:] = single_fault_bounds[0]
     elif verdict.isolated in surfaces:
-        low[:], s = 1.0, surfaces.index(str(verdict.isolated))
-        low[s], high[s] = (alone[0][s], alone[1][s]) if verdict.type == LOSS else (0.0, 1.0)
+        low[:], surface_index = 1.0, surfaces.index(str(verdict.isolated))
+        low[surface_index], high[surface_index] = (
+            (single_fault_bounds[0][surface_index], single_fault_bounds[1][surface_index])
+            if verdict.type == LOSS_FAULT_TYPE
+            else (0.0, 1.0)
+        )
     elif verdict.isolated is None and verdict.candidates and set(verdict.candidates) <= set(surfaces):
         low[:] = 1.0
         for name in verdict.candidates:
-            low[surfaces.index(name)] = alone[0][surfaces.index(name)]
+            low[surfaces.index(name)] = single_fault_bounds[0][surfaces.index(name)]
 
 
-def _lost(verdict: Verdict) -> bool:
-    return verdict.type in (None, LOSS)
+def _gives_effectiveness(verdict: Verdict) -> bool:
+    return verdict.type in (None, LOSS_FAULT_TYPE)
 
 
-def _name(verdict: Verdict, surfaces: Sequence[str]) -> str:
+def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:
     if not verdict.detected:
         return ""
-    return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN
+    return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN_SURFACE

@@ -1,6 +1,6 @@
 """Credible or silent: where a model may be believed, and why not elsewhere.
 
-What a model was fitted on is in its file (`Fitted`). A row is credible where the commands, rates and
+What a model was fitted on is in its file (`FittedRanges`). A row is credible where the commands, rates and
 the airspeed of the last seconds are such as the fit has seen, and where every signal lives. Elsewhere nothing
 is said: no name, and bounds of 0 and 1. The size of the residual does not count, since a fault makes it large
 too: where it is larger than in the flights of the model, the filter takes the noise to be as much larger, and
@@ -18,82 +18,89 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
-from beaver_ftc_logs.model import Fitted, Model
-from beaver_ftc_logs.readings import mended
-from beaver_ftc_logs.recording import TINY, Floats
-from beaver_ftc_logs.samples import NOISE_COLOURS, Samples, whitened
-from beaver_ftc_logs.signals import STILL_S
+from beaver_ftc_logs.model import FittedRanges, Model
+from beaver_ftc_logs.readings import corrected_readings
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.samples import NOISE_AVERAGE_CANDIDATES, Samples, whiten_samples
+from beaver_ftc_logs.signals import MIN_STILL_S
 
 Mask = NDArray[np.bool_]
 
-_WIDER = 0.5
+_RANGE_MARGIN = 0.5
 """Share of its span by which a range is passed before a row is outside."""
-_AIRSPEED = 0.15
-_WINDOW_S, _OUTSIDE = 5.0, 0.5
-_STILL_LONGER = 3.0
-_MISREAD, _ENOUGH = 0.001, 8000
+_AIRSPEED_MARGIN = 0.15
+_RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
+_STILL_TIME_FACTOR = 3.0
+_MISREAD_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
-_CLIPPED_S = 30.0
-_TIED, _PLAIN = 0.98, 12.5
+_CLIPPED_MEMORY_S = 30.0
+_MIN_EFFECT_NOISE_RATIO = 1e-6
+_MAX_EXPLAINED_SHARE, _MAX_EFFECT_NOISE_POWER_RATIO = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
-_UNIT, _SPREAD = 10.0, 1.6
-_ALIKE, _OTHER_UNIT = 3.0, 12.0
-_IN_UNITS = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
-_RARE = (0.001, 0.999)
-_MIDDLE = 2.366
+_MAX_RATE_SPREAD_RATIO, _RATE_SPREAD_FACTOR = 10.0, 1.6
+_ALIKE_MOTION_FACTOR, _OTHER_UNIT_FACTOR = 3.0, 12.0
+_COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
+_SPAN_QUANTILES = (0.001, 0.999)
+_MEDIAN_CHI_SQUARE_3 = 2.366
 """The median of a square of three axes."""
-REVERSED, _LITTLE, _FAINT = -0.3, 0.2, 0.5
+MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN, _MIN_COLUMN_GAIN = -0.3, 0.2, 0.5
 """Gains below which a command works the other way round, or hardly, and another column is another. Of 576
 correct logs with faults of any kind none was below 0.98 and 0.87, in light turbulence 0.93 and 0.99
 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
 
 
-def fitted_on(flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats, scale: float) -> Fitted:
-    """What a model was fitted on. flights: with the samples used; gain_sd (G,) and scale: of parts not
-    fitted."""
-    groups = regression.group_indices(model)
-    rates = np.vstack([samples.rates[use] for samples, use in flights])
-    commands = np.vstack([samples.commands[use] for samples, use in flights])
-    known = [samples.airspeed[use] for samples, use in flights if samples.airspeed is not None]
-    grouped = np.column_stack([commands[:, group].sum(axis=1) for group in groups])
-    return Fitted(
-        commands=span(commands),
-        rates=span(rates),
-        airspeed=span(np.concatenate(known)[:, None])[0] if known else None,
+def fitted_ranges(
+    flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats, noise_scale: float
+) -> FittedRanges:
+    """Compute the ranges in which a model was fitted. flights: with the samples used; gain_sd (G,) and
+    noise_scale: of parts not fitted."""
+    groups = regression.surface_indices_by_group(model)
+    rates = np.vstack([samples.rates[is_used] for samples, is_used in flights])
+    commands = np.vstack([samples.commands[is_used] for samples, is_used in flights])
+    known_airspeeds = [
+        samples.airspeed[is_used] for samples, is_used in flights if samples.airspeed is not None
+    ]
+    group_commands = np.column_stack([commands[:, group].sum(axis=1) for group in groups])
+    return FittedRanges(
+        commands=central_range(commands),
+        rates=central_range(rates),
+        airspeed=central_range(np.concatenate(known_airspeeds)[:, None])[0] if known_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        correlation=_correlation(grouped).tolist(),
-        tied=tied(flights, model).tolist(),
+        correlation=_column_correlation(group_commands).tolist(),
+        tied=explained_effect_share(flights, model).tolist(),
         gain_sd=gain_sd.tolist(),
-        still_s=_longest_still(flights),
-        scale=scale,
-        energy_climb=_unpowered(flights),
-        minutes=sum(int(use.sum()) * samples.dt_s for samples, use in flights) / 60.0,
+        still_s=_longest_still_times_s(flights),
+        scale=noise_scale,
+        energy_climb=_unpowered_climb_mps(flights),
+        minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
     )
 
 
-def _unpowered(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
-    """How fast the energy height falls in the lowest part of healthy flight, m/s; None where nobody knows."""
-    known = [one.energy_climb[use] for one, use in flights if one.energy_climb is not None]
-    values = np.concatenate(known) if known else np.empty(0)
+def _unpowered_climb_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
+    """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
+    known_climbs = [
+        one.energy_climb_mps[is_used] for one, is_used in flights if one.energy_climb_mps is not None
+    ]
+    values = np.concatenate(known_climbs) if known_climbs else np.empty(0)
     values = values[np.isfinite(values)]
-    return float(np.quantile(values, energy.LOWEST)) if values.size else None
+    return float(np.quantile(values, energy.UNPOWERED_CLIMB_QUANTILE)) if values.size else None
 
 
-def span(values: Floats) -> list[list[float]]:
+def central_range(values: Floats) -> list[list[float]]:
     """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
     if not values.shape[1]:
         return []
     known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
-    return np.nanquantile(known, _RARE, axis=0).T.tolist()
+    return np.nanquantile(known, _SPAN_QUANTILES, axis=0).T.tolist()
 
 
-def _correlation(values: Floats) -> Floats:
+def _column_correlation(values: Floats) -> Floats:
     centred = np.nan_to_num(values - np.nanmean(values, axis=0))
     size = np.sqrt((centred**2).sum(axis=0))
-    return np.asarray(centred.T @ centred / np.maximum(np.outer(size, size), TINY))
+    return np.asarray(centred.T @ centred / np.maximum(np.outer(size, size), MIN_DIVISOR))
 
 
-def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+def _longest_still_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
     names = dict.fromkeys(name for samples, _ in flights for name in samples.still_s)
     return {
         name: max((float(one.still_s[name].max(initial=0.0)) for one, _ in flights if name in one.still_s))
@@ -101,108 +108,165 @@ def _longest_still(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
     }
 
 
-def tied(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def explained_effect_share(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    groups = regression.group_indices(model)
-    order = model.history, model.lags, True, model.vehicle.felt(model.history)
-    parts = [regression.build(one, groups, *order) for one, _ in flights]
-    use = [mask & ok for (_, mask), (_, _, ok) in zip(flights, parts, strict=True)]
-    past = np.vstack([part[0][kept] for part, kept in zip(parts, use, strict=True)])
-    commands = np.vstack([part[1][kept] for part, kept in zip(parts, use, strict=True)])
+    effect_power, unexplained_power = _effect_powers(flights, model)
+    has_moved = effect_power > _MIN_EFFECT_NOISE_RATIO
+    explained_share = 1.0 - unexplained_power / np.minimum(
+        np.where(has_moved, effect_power, 1.0), _MAX_EFFECT_NOISE_POWER_RATIO
+    )
+    return np.where(has_moved, np.maximum(explained_share, 0.0), 1.0)
+
+
+def unexplained_effect_power(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+    """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
+    sample, (G,)."""
+    return _effect_powers(flights, model)[1]
+
+
+def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tuple[Floats, Floats]:
+    """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
+    signals and the other groups do not make up of it, (G,)."""
+    groups = regression.surface_indices_by_group(model)
+    regressor_order = model.history, model.lags, True, model.vehicle.n_signal_lags(model.history)
+    regressor_parts = [regression.build_regressors(one, groups, *regressor_order) for one, _ in flights]
+    is_used = [
+        mask & is_predictable
+        for (_, mask), (_, _, is_predictable) in zip(flights, regressor_parts, strict=True)
+    ]
+    past = np.vstack([part[0][used_rows] for part, used_rows in zip(regressor_parts, is_used, strict=True)])
+    commands = np.vstack(
+        [part[1][used_rows] for part, used_rows in zip(regressor_parts, is_used, strict=True)]
+    )
     response, noise = np.array(model.response), np.array(model.noise)
     whiten = np.linalg.inv(np.linalg.cholesky(noise)).T
-    found = np.ones(len(groups))
+    effect_power, unexplained_power = np.zeros(len(groups)), np.zeros(len(groups))
     for g in range(len(groups)):
-        others = [commands[:, other] for other in range(len(groups)) if other != g]
-        known = np.column_stack([np.ones(len(past)), past, *others])
+        other_commands = [commands[:, other] for other in range(len(groups)) if other != g]
+        other_regressors = np.column_stack([np.ones(len(past)), past, *other_commands])
         effect = commands[:, g] @ response[g] @ whiten
         effect = effect - effect.mean(axis=0)
-        power = float((effect**2).sum())
-        if power > 1e-6 * len(effect):
-            rest = effect - known @ np.linalg.lstsq(known, effect, rcond=None)[0]
-            found[g] = max(1.0 - float((rest**2).sum()) / min(power, _PLAIN * len(effect)), 0.0)
-    return found
+        effect_power[g] = float((effect**2).sum()) / len(effect)
+        if effect_power[g] > _MIN_EFFECT_NOISE_RATIO:
+            unexplained_effect = (
+                effect - other_regressors @ np.linalg.lstsq(other_regressors, effect, rcond=None)[0]
+            )
+            unexplained_power[g] = float((unexplained_effect**2).sum()) / len(effect)
+    return effect_power, unexplained_power
 
 
-def claimed(model: Model) -> list[bool]:
+def groups_with_known_effect(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
     if model.fitted is None or not model.fitted.tied:
         return [True] * len(model.groups)
-    return [tied < _TIED for tied in model.fitted.tied]
+    return [share < _MAX_EXPLAINED_SHARE for share in model.fitted.tied]
 
 
-def unclaimed(model: Model) -> set[str]:
+def groups_with_known_gain(model: Model) -> list[bool]:
+    """Whether the effect of each group is known under any law: the model may not err by all of it."""
+    has_known_effect = groups_with_known_effect(model)
+    if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
+        return has_known_effect
+    return [
+        known_effect and regression.BOUND_STANDARD_ERRORS * gain_sd < 1.0
+        for known_effect, gain_sd in zip(has_known_effect, model.fitted.gain_sd, strict=True)
+    ]
+
+
+def surfaces_of_unknown_effect(model: Model) -> set[str]:
     """The surfaces of which nothing is said."""
-    pairs = zip(model.groups, claimed(model), strict=True)
-    return {name for group, told in pairs if not told for name in group}
+    pairs = zip(model.groups, groups_with_known_effect(model), strict=True)
+    return {name for group, has_known_effect in pairs if not has_known_effect for name in group}
 
 
-def unclaimed_lines(model: Model) -> list[str]:
+def unknown_effect_lines(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
     if model.fitted is None:
         return []
     says = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
     return [
-        f"{says.format('+'.join(group), tied)}: its effect cannot be told, nothing is said of it"
-        for group, tied, told in zip(model.groups, model.fitted.tied, claimed(model), strict=False)
-        if not told
+        f"{says.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
+        for group, share, has_known_effect in zip(
+            model.groups, model.fitted.tied, groups_with_known_effect(model), strict=False
+        )
+        if not has_known_effect
     ]
 
 
-def check_units(samples: Samples, fitted: Fitted | None) -> None:
+def check_rate_units(samples: Samples, fitted: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
     if fitted is None or not fitted.spread:
         return
-    ratio = np.nanstd(samples.rates, axis=0) / np.maximum(fitted.spread, TINY)
-    middle = float(np.exp(np.mean(np.log(np.maximum(ratio, TINY)))))
-    for unit, size in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        alike = ratio.max() < _UNIT * ratio.min()
-        if alike and 1.0 / _SPREAD**2 < middle / size < _SPREAD**2:
+    if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
+        return
+    spread_ratio = np.nanstd(samples.rates, axis=0) / np.maximum(fitted.spread, MIN_DIVISOR)
+    mean_ratio = float(np.exp(np.mean(np.log(np.maximum(spread_ratio, MIN_DIVISOR)))))
+    for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
+        are_axes_alike = spread_ratio.max() < _MAX_RATE_SPREAD_RATIO * spread_ratio.min()
+        if (
+            are_axes_alike
+            and 1.0 / _RATE_SPREAD_FACTOR**2 < mean_ratio / units_per_rad < _RATE_SPREAD_FACTOR**2
+        ):
             raise BadInput(
-                f"{samples.name}: rates spread {middle:.3g} times as widely as in the flights of the model, "
-                f"allowed: rates in rad/s; a factor of {1.0 / size:.4g} (`unit: {unit}`) fits"
+                f"{samples.name}: rates spread {mean_ratio:.3g} times as widely as in the "
+                "flights of the model, "
+                f"allowed: rates in rad/s; a factor of {1.0 / units_per_rad:.4g} (`unit: {unit}`) fits"
             )
-        if alike and 1.0 / _SPREAD**2 < middle * size < _SPREAD**2:
+        if (
+            are_axes_alike
+            and 1.0 / _RATE_SPREAD_FACTOR**2 < mean_ratio * units_per_rad < _RATE_SPREAD_FACTOR**2
+        ):
             raise BadInput(
-                f"{samples.name}: rates spread {middle:.3g} times as widely as in the flights of the model, "
-                f"allowed: rates in rad/s; a factor of {size:.4g} fits: the model's own were in {unit}?"
+                f"{samples.name}: rates spread {mean_ratio:.3g} times as widely as in the "
+                "flights of the model, "
+                f"allowed: rates in rad/s; a factor of {units_per_rad:.4g} fits: the model's "
+                f"own were in {unit}?"
             )
 
 
-def check_commands(
-    name: str, commands: Floats, rates: Floats, fitted: Fitted, surfaces: Sequence[str]
+def check_command_units(
+    flight_name: str, commands: Floats, rates: Floats, fitted: FittedRanges, surfaces: Sequence[str]
 ) -> None:
     """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
     rate moves alike, that it is in another unit; or so much more than any rate does.
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    turned = _reach(span(rates)) / np.maximum(_reach(fitted.rates), TINY)
-    alike = turned.min() > 1.0 / _ALIKE and turned.max() < _ALIKE
-    most = _OTHER_UNIT * (1.0 if alike else max(turned.max(), 1.0))
-    ratios = _reach(span(commands)) / np.maximum(_reach(fitted.commands), TINY)
-    for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
-        if most < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _OTHER_UNIT):
+    rate_width_ratios = _range_widths(central_range(rates)) / np.maximum(
+        _range_widths(fitted.rates), MIN_DIVISOR
+    )
+    move_rates_alike = (
+        rate_width_ratios.min() > 1.0 / _ALIKE_MOTION_FACTOR
+        and rate_width_ratios.max() < _ALIKE_MOTION_FACTOR
+    )
+    max_ratio = _OTHER_UNIT_FACTOR * (1.0 if move_rates_alike else max(rate_width_ratios.max(), 1.0))
+    command_width_ratios = _range_widths(central_range(commands)) / np.maximum(
+        _range_widths(fitted.commands), MIN_DIVISOR
+    )
+    for surface, ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
+        if max_ratio < ratio < 1e4 or (move_rates_alike and 1e-4 < ratio < 1.0 / _OTHER_UNIT_FACTOR):
             raise BadInput(
-                f"{name}: the command of {surface} moves {ratio:.3g} times as much as in the other flights, "
-                f"the rates {turned.max():.2g} times at most, allowed: one unit (57.3 is deg for rad, 100 "
+                f"{flight_name}: the command of {surface} moves {ratio:.3g} times as much as "
+                "in the other flights, "
+                f"the rates {rate_width_ratios.max():.2g} times at most, allowed: one unit "
+                "(57.3 is deg for rad, 100 "
                 "percent: `unit`, `scale`)"
             )
 
 
-class _InAll(NamedTuple):
-    """Of all parts of a flight: at most, and at least, how much of the model's answer to each group's
+class _PartGains(NamedTuple):
+    """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
     log likelihood of a sample of each part, (4,), but for what all colours have alike."""
 
-    gains: list[float]
-    least: list[float]
-    columns: dict[str, float]
-    noise: float
-    likely: Floats
+    max_group_gains: list[float]
+    min_group_gains: list[float]
+    max_column_gains: dict[str, float]
+    min_noise_scale: float
+    log_likelihoods: Floats
 
 
 def check_columns(samples: Samples, model: Model) -> None:
@@ -211,263 +275,358 @@ def check_columns(samples: Samples, model: Model) -> None:
     since no fault has always been there and changes what is not its own.
 
     What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
-    answer is refused only where it is wrong by each colour of the noise that is likelier, too."""
-    tried = [(whitened(samples, one.average), model.alone_with(one)) for one in model.colours]
-    read = [(one, found) for one in tried or [(samples, model)] if (found := _likely_in_parts(*one))]
-    if not read:
+    answer is refused only where it is wrong by each colour of the noise that is likelier, too. A model that
+    knows the effect of no surface says nothing of any flight, and refuses none."""
+    if not any(groups_with_known_effect(model)):
         return
-    flight, likeliest = max(read, key=lambda one: one[1][0].mean())[0]
-    in_all = _in_all_parts(flight, likeliest)
-    if in_all is None:
+    whitened_readings = [
+        (whiten_samples(samples, one.average), model.with_single_noise_model(one)) for one in model.colours
+    ]
+    compared = [
+        (one, found)
+        for one in whitened_readings or [(samples, model)]
+        if (found := _part_log_likelihoods(*one))
+    ]
+    if not compared:
         return
-    wrong = _wrong_answers(samples, model, in_all)
-    for colour in NOISE_COLOURS if wrong else ():
-        other = _in_all_parts(whitened(samples, colour), model)
-        if other is not None and other.likely.mean() > in_all.likely.mean():
-            still = _wrong_answers(samples, model, other)
-            wrong = {what: says for what, says in wrong.items() if what in still}
-    says = next(iter(wrong.values()), None) or _likelier(flight, likeliest)
+    flight, likeliest_model = max(compared, key=lambda one: one[1][0].mean())[0]
+    part_gains = _bound_part_gains(flight, likeliest_model)
+    if part_gains is None:
+        return
+    mistakes = _column_mistakes(samples, model, part_gains)
+    for noise_average in NOISE_AVERAGE_CANDIDATES if mistakes else ():
+        other_gains = _bound_part_gains(whiten_samples(samples, noise_average), model)
+        if other_gains is not None and other_gains.log_likelihoods.mean() > part_gains.log_likelihoods.mean():
+            other_mistakes = _column_mistakes(samples, model, other_gains)
+            mistakes = {what: says for what, says in mistakes.items() if what in other_mistakes}
+    says = next(iter(mistakes.values()), None) or _likelier_column_mistake(flight, likeliest_model)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {says}, {allowed}")
 
 
-def _wrong_answers(samples: Samples, model: Model, found: _InAll) -> dict[str, str]:
-    """What is wrong with the rates' answers to a flight's columns, by what and which, the surest first."""
-    wrong = {}
-    for group, most, least in zip(model.groups, found.gains, found.least, strict=True):
-        name, moved = "+".join(group), _moved(samples, model, group)
-        command, than = f"the command of {name}", f"moves {moved:.3g} times as much as in the flights of the"
-        if most < REVERSED:
+def _column_mistakes(samples: Samples, model: Model, part_gains: _PartGains) -> dict[str, str]:
+    """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
+    first."""
+    mistakes, gain_known = {}, groups_with_known_gain(model)
+    for group, has_known_gain, max_gain, min_gain in zip(
+        model.groups, gain_known, part_gains.max_group_gains, part_gains.min_group_gains, strict=True
+    ):
+        name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
+        command, motion_text = (
+            f"the command of {name}",
+            f"moves {relative_motion:.3g} times as much as in the flights of the",
+        )
+        if max_gain < MAX_REVERSED_GAIN:
             says = f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
-            wrong[f"sign {name}"] = says
-        elif most < _LITTLE and moved > _ALIKE:
-            does = f"does at most {most:.2g} of what it did"
-            wrong[f"unit {name}"] = f"{command} {than} model, and {does}{_IN_UNITS}"
-        elif least > 1.0 / _LITTLE and 0.0 < moved < 1.0 / _ALIKE:
-            does = f"does at least {least:.3g} times what it did"
-            wrong[f"unit {name}"] = f"{command} {than} model, and {does}{_IN_UNITS}"
-    if odd := [name for name, share in found.columns.items() if share < _FAINT]:
-        says = f"what the rates answer to {', '.join(odd)} is not what it is in the model, in all of it"
-        wrong["columns"] = says
-    return wrong
+            mistakes[f"sign {name}"] = says
+        elif has_known_gain and max_gain < _MIN_COMMAND_GAIN and relative_motion > _ALIKE_MOTION_FACTOR:
+            effect_text = f"does at most {max_gain:.2g} of what it did"
+            mistakes[f"unit {name}"] = f"{command} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
+        elif (
+            has_known_gain
+            and min_gain > 1.0 / _MIN_COMMAND_GAIN
+            and 0.0 < relative_motion < 1.0 / _ALIKE_MOTION_FACTOR
+        ):
+            effect_text = f"does at least {min_gain:.3g} times what it did"
+            mistakes[f"unit {name}"] = f"{command} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
+    if odd_columns := [
+        name for name, share in part_gains.max_column_gains.items() if share < _least_column_gain(model, name)
+    ]:
+        says = (
+            f"what the rates answer to {', '.join(odd_columns)} is not what it is in the model, in all of it"
+        )
+        mistakes["columns"] = says
+    return mistakes
 
 
-def _likelier(samples: Samples, model: Model) -> str | None:
+def _least_column_gain(model: Model, name: str) -> float:
+    """The gain of what the rates answer to a column below which it is another: below what the model's error
+    explains; none where that may be all of it."""
+    gain_sd = model.fitted.column_sd.get(name, 0.0) if model.fitted is not None else 0.0
+    min_gain = 1.0 - regression.BOUND_STANDARD_ERRORS * gain_sd
+    return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
+
+
+def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
     """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
-    inequality for a likelihood ratio); all readings together have the chance `_MISREAD`. That is so of a
-    model that is right: the flight must be likelier by as much more as flights were that the model was not
-    fitted on, whose columns are right, and by as much again for another law (`Fitted.misread`).
+    inequality for a likelihood ratio); all readings together have the chance `_MISREAD_PROBABILITY`. That
+    holds for a correct model. The flight must be likelier by as much more as flights were that the model was
+    not fitted on, whose columns are right, and by as much again for another law (`FittedRanges.misread`).
     """
-    more, count = mended_likelier(samples, model)
-    if not more:
+    gain_of_mistake, n_part_samples = log_likelihood_gains(samples, model)
+    if not gain_of_mistake:
         return None
-    says, most = max(more.items(), key=lambda one: one[1])
-    usual = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
-    if most * count <= np.log(len(more) / _MISREAD) + usual * count:
+    says, largest_gain = max(gain_of_mistake.items(), key=lambda one: one[1])
+    usual_gain = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
+    if (
+        largest_gain * n_part_samples
+        <= np.log(len(gain_of_mistake) / _MISREAD_PROBABILITY) + usual_gain * n_part_samples
+    ):
         return None
-    size = most * count / np.log(10.0)
-    return f"each part of the flight is at least 10^{size:.0f} times as likely with {says}"
+    log10_ratio = largest_gain * n_part_samples / np.log(10.0)
+    return f"each part of the flight is at least 10^{log10_ratio:.0f} times as likely with {says}"
 
 
-def mended_likelier(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
+def log_likelihood_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
-    found, others = _likely_in_parts(samples, model), list(mended(samples, model.vehicle))
-    if found is None:
+    corrected = list(corrected_readings(samples, model.vehicle, surfaces_of_unknown_effect(model)))
+    log_likelihood = _part_log_likelihoods(samples, model)
+    if log_likelihood is None:
         return {}, 0.0
-    likely, counted = found
-    more = {}
-    for other in others:
-        read = _likely_in_parts(other.samples, model)
-        more[other.says] = -np.inf if read is None else float((read[0] + other.density - likely).min())
-    return more, counted
+    part_likelihoods, n_part_samples = log_likelihood
+    gain_of_mistake = {}
+    for correction in corrected:
+        corrected_likelihood = _part_log_likelihoods(correction.samples, model)
+        gain_of_mistake[correction.correction] = (
+            -np.inf
+            if corrected_likelihood is None
+            else float((corrected_likelihood[0] + correction.log_density - part_likelihoods).min())
+        )
+    return gain_of_mistake, n_part_samples
 
 
-def _likely_in_parts(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """As `_InAll`: the log likelihood of a sample of each part, and as how many white samples a part counts;
-    of a long flight every k-th sample is taken. None where a part is too short."""
-    whiten, power, size = _white_and_power(samples, model)
-    ok, unexplained, answers = regression.in_white(samples, model)
-    rows = np.flatnonzero(ok)
-    if (parts := regression.quarters(rows[:: max(len(rows) // _ENOUGH, 1)])) is None:
+def _part_log_likelihoods(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+    """Log likelihood of a sample of each part, as in `_PartGains`, and as how many white samples a part
+    counts; of a long flight every k-th sample is taken. None where a part is too short."""
+    whitening, information_share, log_noise_size = _flight_noise_whitening(samples, model)
+    is_predictable, unexplained, responses = regression.split_whitened_response(samples, model)
+    rows = np.flatnonzero(is_predictable)
+    if (
+        parts := regression.split_into_flight_parts(rows[:: max(len(rows) // _MAX_COMPARED_SAMPLES, 1)])
+    ) is None:
         return None
-    noises = [_noise(regression.coefficient_bounds(*_stacked(part, unexplained, answers, whiten), power)[1])
-              for part in parts]  # fmt: skip
-    return -size - 1.5 * np.log(noises), power * min(map(len, parts))
+    fits = [_trim_and_gain_regression(part, unexplained, responses, whitening) for part in parts]
+    noise_scales = [
+        _noise_variance_scale(regression.coefficient_bounds(x, y, information_share)[1]) for x, y in fits
+    ]
+    return -log_noise_size - 1.5 * np.log(noise_scales), information_share * min(map(len, parts))
 
 
-def _white_and_power(samples: Samples, model: Model) -> tuple[Floats, float, float]:
-    """What whitens the residual of a flight of a colour, (3, 3), as how many white samples one counts, and
-    the logarithm of the size of the noise of a sample that is not filtered."""
-    wider = model.noise_factor(samples.colour)
-    root = np.linalg.cholesky(model.with_noise_model(samples.colour).arrays()[3] / wider)
-    size = float(np.log(np.diag(root)).sum() - 3.0 * np.log(sum(samples.colour or (1.0,))))
-    return np.linalg.inv(root).T, model.settings.power / wider, size
+def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
+    """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
+    one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
+    noise_inflation = model.noise_inflation(samples.noise_average)
+    noise_root = np.linalg.cholesky(
+        model.with_noise_model(samples.noise_average).coefficient_arrays()[3] / noise_inflation
+    )
+    log_noise_size = float(
+        np.log(np.diag(noise_root)).sum() - 3.0 * np.log(sum(samples.noise_average or (1.0,)))
+    )
+    return np.linalg.inv(noise_root).T, model.settings.power / noise_inflation, log_noise_size
 
 
-def _stacked(
-    part: NDArray[np.int64], unexplained: Floats, answers: Floats, whiten: Floats
+def _trim_and_gain_regression(
+    part_rows: NDArray[np.int64], unexplained: Floats, responses: Floats, whitening: Floats
 ) -> tuple[Floats, Floats]:
-    """Regressors (3 n, 3 + K) of trim and answers (n, K, 3), and what they are to explain, (3 n,)."""
-    trim = np.broadcast_to(np.eye(3), (len(part), 3, 3))
-    x = np.concatenate([trim, answers[part]], axis=1) @ whiten
-    return x.transpose(0, 2, 1).reshape(3 * len(part), -1), (unexplained[part] @ whiten).ravel()
+    """Regressors (3 n, 3 + K) of trim and responses (n, K, 3), and what they are to explain, (3 n,)."""
+    trim = np.broadcast_to(np.eye(3), (len(part_rows), 3, 3))
+    regressors = np.concatenate([trim, responses[part_rows]], axis=1) @ whitening
+    return regressors.transpose(0, 2, 1).reshape(3 * len(part_rows), -1), (
+        unexplained[part_rows] @ whitening
+    ).ravel()
 
 
-def _noise(square: Floats) -> float:
+def _noise_variance_scale(squared_residual: Floats) -> float:
     """The scale of the noise by the squares of what is left, (3 n,)."""
-    return float(np.median(square.reshape(-1, 3).sum(axis=1)) / _MIDDLE)
+    return float(np.median(squared_residual.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3)
 
 
-def _in_all_parts(samples: Samples, model: Model) -> _InAll | None:
+def _bound_part_gains(samples: Samples, model: Model) -> _PartGains | None:
     """None where a part is too short."""
-    ok, unexplained, answers = regression.in_white(samples, model)
-    if (parts := regression.quarters(np.flatnonzero(ok))) is None:
+    is_predictable, unexplained, responses = regression.split_whitened_response(samples, model)
+    if (parts := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
         return None
-    columns, names = _by_column(samples, model)
-    columns = regression.less_predicted(columns, model.noise_predictor(samples.colour))
-    (whiten, power, size), groups = _white_and_power(samples, model), len(model.groups)
-    gains, least, shares = np.full(groups, -np.inf), np.full(groups, np.inf), np.full(len(names), -np.inf)
-    noises, both = [], np.concatenate([answers, columns], axis=1)
+    columns, names = _column_contributions(samples, model)
+    columns = regression.subtract_noise_prediction(columns, model.noise_predictor(samples.noise_average))
+    (whitening, information_share, log_noise_size), n_groups = (
+        _flight_noise_whitening(samples, model),
+        len(model.groups),
+    )
+    max_gains, min_gains, max_column_gains = (
+        np.full(n_groups, -np.inf),
+        np.full(n_groups, np.inf),
+        np.full(len(names), -np.inf),
+    )
+    noise_scales, all_responses = [], np.concatenate([responses, columns], axis=1)
     for part in parts:
-        flat, y = _stacked(part, unexplained, both, whiten)
-        gain, square = regression.coefficient_bounds(flat[:, : 3 + groups], y, power)
-        less, _ = regression.coefficient_bounds(-flat[:, : 3 + groups], y, power)
-        share, _ = regression.coefficient_bounds(flat, y, power)
-        gains, least = np.maximum(gains, gain[3:]), np.minimum(least, -less[3:])
-        shares = np.maximum(shares, 1.0 + share[3 + groups :])  # what the past does is taken off already
-        noises.append(_noise(square))
-    return _InAll(
-        gains.tolist(),
-        least.tolist(),
-        dict(zip(names, shares.tolist(), strict=True)),
-        min(noises),
-        -size - 1.5 * np.log(noises),
+        regressors, whitened_residual = _trim_and_gain_regression(part, unexplained, all_responses, whitening)
+        max_gain, squared_residual = regression.coefficient_bounds(
+            regressors[:, : 3 + n_groups], whitened_residual, information_share
+        )
+        negated_min_gain, _ = regression.coefficient_bounds(
+            -regressors[:, : 3 + n_groups], whitened_residual, information_share
+        )
+        column_gain, _ = regression.coefficient_bounds(regressors, whitened_residual, information_share)
+        max_gains, min_gains = (
+            np.maximum(max_gains, max_gain[3:]),
+            np.minimum(min_gains, -negated_min_gain[3:]),
+        )
+        max_column_gains = np.maximum(
+            max_column_gains, 1.0 + column_gain[3 + n_groups :]
+        )  # what the past does is taken off already
+        noise_scales.append(_noise_variance_scale(squared_residual))
+    return _PartGains(
+        max_gains.tolist(),
+        min_gains.tolist(),
+        dict(zip(names, max_column_gains.tolist(), strict=True)),
+        min(noise_scales),
+        -log_noise_size - 1.5 * np.log(noise_scales),
     )
 
 
-def _moved(samples: Samples, model: Model, group: list[str]) -> float:
-    """How many times as far as in the flights of the model a group's command moves; 0 where these are not
-    known."""
+def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -> float:
+    """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
+    not known."""
     if model.fitted is None or not model.fitted.commands:
         return 0.0
-    more = _reach(span(samples.commands)) / np.maximum(_reach(model.fitted.commands), TINY)
-    return max(float(more[list(model.vehicle.surfaces).index(name)]) for name in group)
+    width_ratios = _range_widths(central_range(samples.commands)) / np.maximum(
+        _range_widths(model.fitted.commands), MIN_DIVISOR
+    )
+    return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
 
-def _by_column(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
-    """What of each sample the model makes of each column: rates of the other axes, and signals, (n, C, 3);
-    and their names."""
-    _, by_past, _, _ = model.arrays()
-    own = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-    felt = model.vehicle.felt(model.history)
-    names = own * model.history + model.vehicle.past_names * felt
-    past, _, _ = regression.build(samples, [[0]], model.history, 1, False, felt)
-    cross = by_past.copy()
-    for k in range(3 * model.history):
-        cross[k, k % 3] = 0.0
-    called = list(dict.fromkeys(name.removesuffix(" by airspeed") for name in names))
-    parts = [[name.removesuffix(" by airspeed") == one for name in names] for one in called]
-    return np.stack([past[:, part] @ cross[part] for part in parts], axis=1), called
+def _column_contributions(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
+    """Compute the contribution of each column to each predicted sample: rates of the other axes, and signals,
+    (n, C, 3); and their names."""
+    n_signal_lags = model.vehicle.n_signal_lags(model.history)
+    past, _, _ = regression.build_regressors(samples, [[0]], model.history, 1, False, n_signal_lags)
+    parts = cross_coefficients(model)
+    return np.stack([past[:, rows] @ coefficients for rows, coefficients in parts.values()], axis=1), list(
+        parts
+    )
 
 
-def _reach(span: Sequence[Sequence[float]]) -> Floats:
-    return np.ptp(np.array(span, dtype=float).reshape(-1, 2), axis=1)
+def cross_coefficients(model: Model) -> dict[str, tuple[list[int], Floats]]:
+    """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
+    rate on its own axis."""
+    rates = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
+    names = rates * model.history + model.vehicle.past_regressor_names * model.vehicle.n_signal_lags(
+        model.history
+    )
+    coefficients, rows_of_column = np.array(model.past), dict[str, list[int]]()
+    for row, name in enumerate(names):
+        rows_of_column.setdefault(name.removesuffix(" by airspeed"), []).append(row)
+        if row < 3 * model.history:
+            coefficients[row, row % 3] = 0.0
+    return {name: (column_rows, coefficients[column_rows]) for name, column_rows in rows_of_column.items()}
 
 
-def outside(samples: Samples, model: Model) -> dict[str, Mask]:
+def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:
+    return np.ptp(np.array(ranges, dtype=float).reshape(-1, 2), axis=1)
+
+
+def rows_outside_model(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
-    found: dict[str, Mask] = {}
-    for name, most in _most_still(samples, model).items():
-        found[f"{name} stands still, for longer than {most:.3g} s"] = samples.still_s[name] > most
-    if samples.clipped is not None:
-        found[f"a rate was clipped in the last {_CLIPPED_S:g} s"] = _lately(samples.clipped, samples.dt_s)
+    reasons: dict[str, Mask] = {}
+    for name, max_still_s in _max_still_s(samples, model).items():
+        reasons[f"{name} stands still, for longer than {max_still_s:.3g} s"] = (
+            samples.still_s[name] > max_still_s
+        )
+    if samples.is_rate_clipped is not None:
+        reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
+            samples.is_rate_clipped, samples.dt_s
+        )
     if model.fitted is None:
-        return _any_of(found)
-    return _any_of(found | _out_of_range(samples, model, model.fitted))
+        return _drop_empty_reasons(reasons)
+    return _drop_empty_reasons(reasons | _rows_out_of_fitted_ranges(samples, model, model.fitted))
 
 
-def _lately(rows: Mask, dt_s: float) -> Mask:
+def _was_clipped_recently(is_clipped: Mask, dt_s: float) -> Mask:
     """Whether a condition held in the last half minute."""
-    order = np.arange(len(rows))
-    since = order - np.maximum.accumulate(np.where(rows, order, -len(rows) - round(_CLIPPED_S / dt_s)))
-    return np.asarray(since * dt_s <= _CLIPPED_S)
+    row_index = np.arange(len(is_clipped))
+    rows_since = row_index - np.maximum.accumulate(
+        np.where(is_clipped, row_index, -len(is_clipped) - round(_CLIPPED_MEMORY_S / dt_s))
+    )
+    return np.asarray(rows_since * dt_s <= _CLIPPED_MEMORY_S)
 
 
-def _any_of(found: dict[str, Mask]) -> dict[str, Mask]:
-    return {reason: rows for reason, rows in found.items() if rows.any()}
+def _drop_empty_reasons(reasons: dict[str, Mask]) -> dict[str, Mask]:
+    return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
-def _out_of_range(samples: Samples, model: Model, fitted: Fitted) -> dict[str, Mask]:
+def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRanges) -> dict[str, Mask]:
     names = [f"command of {surface}" for surface in model.vehicle.surfaces]
     columns = [
         *zip(names, samples.commands.T, fitted.commands, strict=False),
-        *zip(_rates(model), samples.rates.T, fitted.rates, strict=False),
+        *zip(_rate_columns(model), samples.rates.T, fitted.rates, strict=False),
     ]
-    found = {}
+    reasons = {}
     for name, values, (low, high) in columns:
-        more = _WIDER * (high - low) + TINY
-        found[_says(name, low, high)] = _often(~_within(values, low - more, high + more), samples)
+        margin = _RANGE_MARGIN * (high - low) + MIN_DIVISOR
+        reasons[_outside_range_text(name, low, high)] = _mostly_true_recently(
+            ~_is_within(values, low - margin, high + margin), samples
+        )
     if fitted.airspeed is not None and samples.airspeed is not None:
         low, high = fitted.airspeed
-        apart = ~_within(samples.airspeed, (1.0 - _AIRSPEED) * low, (1.0 + _AIRSPEED) * high)
-        found[_says("airspeed", low, high)] = _often(apart, samples)
-    return found
+        is_outside = ~_is_within(
+            samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * low, (1.0 + _AIRSPEED_MARGIN) * high
+        )
+        reasons[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(is_outside, samples)
+    return reasons
 
 
-def _says(name: str, low: float, high: float) -> str:
+def _outside_range_text(name: str, low: float, high: float) -> str:
     return f"{name} is outside {low:.3g} to {high:.3g}, where the model was fitted"
 
 
-def _within(values: Floats, low: float, high: float) -> Mask:
+def _is_within(values: Floats, low: float, high: float) -> Mask:
     return np.asarray(~np.isfinite(values) | ((values >= low) & (values <= high)))
 
 
-def _often(rows: Mask, samples: Samples) -> Mask:
-    """Where a condition held in half of the last seconds, or of what there is yet."""
-    length = max(round(_WINDOW_S / samples.dt_s), 1)
-    total, end = np.concatenate([[0], np.cumsum(rows)]), np.arange(1, len(rows) + 1)
-    begin = np.maximum(end - length, 0)
-    return np.asarray(total[1:] - total[begin] > _OUTSIDE * (end - begin))
+def _mostly_true_recently(is_true: Mask, samples: Samples) -> Mask:
+    """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
+    window_samples = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
+    n_true, end = np.concatenate([[0], np.cumsum(is_true)]), np.arange(1, len(is_true) + 1)
+    begin = np.maximum(end - window_samples, 0)
+    return np.asarray(n_true[1:] - n_true[begin] > _MIN_OUTSIDE_SHARE * (end - begin))
 
 
-def _rates(model: Model) -> list[str]:
+def _rate_columns(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _most_still(samples: Samples, model: Model) -> dict[str, float]:
+def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of STILL_S on."""
-    known = model.fitted.still_s if model.fitted else {}
-    usual = {name: 0.0 if name in _rates(model) else np.inf for name in samples.still_s} | known
-    least = {name: STILL_S / 3.0 if name in known and name in _rates(model) else STILL_S for name in usual}
-    return {name: max(least[name], _STILL_LONGER * usual[name]) for name in samples.still_s}
-
-
-def dead(samples: Samples, model: Model) -> Mask:
-    """Samples with a signal that does not live: what the filter is not to learn from."""
-    found = np.zeros(len(samples.t_s), dtype=bool)
-    for name, most in _most_still(samples, model).items():
-        found |= samples.still_s[name] > most
-    return found if samples.clipped is None else found | samples.clipped
-
-
-def without_dead(samples: Samples, model: Model) -> Samples:
-    """The flight with nothing known where a signal does not live."""
-    lost = dead(samples, model)
-    if not lost.any():
-        return samples
-    return replace(samples, rates=np.where(lost[:, None], np.nan, samples.rates))
-
-
-def account(found: Mapping[str, Mask], credible: NDArray[np.int64]) -> Document:
-    """Of verdict.json: the share of credible rows, and the reasons for the others with their shares."""
-    shares = {reason: float(rows.mean()) for reason, rows in found.items()}
-    ordered = sorted(shares, key=lambda reason: -shares[reason])
+    fitted_still_s = model.fitted.still_s if model.fitted else {}
+    usual_still_s = {
+        name: 0.0 if name in _rate_columns(model) else np.inf for name in samples.still_s
+    } | fitted_still_s
+    min_still_s = {
+        name: MIN_STILL_S / 3.0 if name in fitted_still_s and name in _rate_columns(model) else MIN_STILL_S
+        for name in usual_still_s
+    }
     return {
-        "share": float(credible.mean()) if len(credible) else 0.0,
-        "reasons": [{"says": reason, "share": shares[reason]} for reason in ordered],
+        name: max(min_still_s[name], _STILL_TIME_FACTOR * usual_still_s[name]) for name in samples.still_s
+    }
+
+
+def is_dead_sample(samples: Samples, model: Model) -> Mask:
+    """Samples with a signal that does not live: what the filter is not to learn from."""
+    is_dead = np.zeros(len(samples.t_s), dtype=bool)
+    for name, max_still_s in _max_still_s(samples, model).items():
+        is_dead |= samples.still_s[name] > max_still_s
+    return is_dead if samples.is_rate_clipped is None else is_dead | samples.is_rate_clipped
+
+
+def with_dead_rates_unknown(samples: Samples, model: Model) -> Samples:
+    """The flight with nothing known where a signal does not live."""
+    is_dead = is_dead_sample(samples, model)
+    if not is_dead.any():
+        return samples
+    return replace(samples, rates=np.where(is_dead[:, None], np.nan, samples.rates))
+
+
+def credibility_entry(reasons: Mapping[str, Mask], is_credible: NDArray[np.int64]) -> Document:
+    """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
+    their shares."""
+    shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}
+    reasons_by_share = sorted(shares, key=lambda reason: -shares[reason])
+    return {
+        "share": float(is_credible.mean()) if len(is_credible) else 0.0,
+        "reasons": [{"says": reason, "share": shares[reason]} for reason in reasons_by_share],
     }

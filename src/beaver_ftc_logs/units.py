@@ -7,10 +7,12 @@ from beaver_ftc.aircraft import GRAVITY_MPS2, M_PER_FT
 RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
     "rate", "angle", "speed", "acceleration", "length", "share", "time",
 )  # fmt: skip
-_DEG = pi / 180.0
+_RAD_PER_DEG = pi / 180.0
 UNITS: dict[str, tuple[str, float]] = {
-    "rad/s": (RATE, 1.0), "deg/s": (RATE, _DEG), "cdeg/s": (RATE, 0.01 * _DEG), "mrad/s": (RATE, 1e-3),
-    "rad": (ANGLE, 1.0), "deg": (ANGLE, _DEG), "cdeg": (ANGLE, 0.01 * _DEG), "mrad": (ANGLE, 1e-3),
+    "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),
+    "mrad/s": (RATE, 1e-3),
+    "rad": (ANGLE, 1.0), "deg": (ANGLE, _RAD_PER_DEG), "cdeg": (ANGLE, 0.01 * _RAD_PER_DEG),
+    "mrad": (ANGLE, 1e-3),
     "m/s": (SPEED, 1.0), "cm/s": (SPEED, 0.01), "km/h": (SPEED, 1.0 / 3.6), "kt": (SPEED, 1852.0 / 3600.0),
     "ft/s": (SPEED, M_PER_FT), "mph": (SPEED, 0.44704),
     "m/s2": (ACCELERATION, 1.0), "g": (ACCELERATION, GRAVITY_MPS2), "mg": (ACCELERATION, 1e-3 * GRAVITY_MPS2),
@@ -18,18 +20,18 @@ UNITS: dict[str, tuple[str, float]] = {
     "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
-"""Of each unit what it measures, and how much of the SI unit it is."""
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Kind of each unit, and its size in the SI unit."""
+SECONDS_PER_TIME_UNIT = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of the time column."""
 
 
-def units_of(kind: str) -> list[str]:
+def units_of_kind(kind: str) -> list[str]:
     """The units of one kind, the SI unit first."""
-    return [name for name, (of, _) in UNITS.items() if of == kind]
+    return [name for name, (unit_kind, _) in UNITS.items() if unit_kind == kind]
 
 
-def nearest_unit(kind: str, factor: float, within: float) -> str | None:
+def nearest_unit(kind: str, factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratios = {name: max(factor / UNITS[name][1], UNITS[name][1] / factor) for name in units_of(kind)}
+    ratios = {name: max(factor / UNITS[name][1], UNITS[name][1] / factor) for name in units_of_kind(kind)}
     best = min(ratios, key=lambda name: ratios[name])
-    return best if ratios[best] <= within else None
+    return best if ratios[best] <= max_ratio else None

@@ -15,29 +15,32 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import Recording, columns_of, reading
+from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, open_log_with_package
 
-_TIME, _INSTANCES = "TimeUS", ("I", "C", "Instance")
-_OVERHEAD = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
+_TIME_FIELD, _INSTANCE_FIELDS = "TimeUS", ("I", "C", "Instance")
+_IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
-Fields = dict[str, Any]
+MessageFields = dict[str, Any]
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> Recording:
+def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
     wanted: the columns that are kept in memory, all where None.
     """
-    messages = _messages(path, wanted)
+    messages = _read_messages(path, wanted)
     if not messages:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
-    return Recording(path.stem, columns_of(messages, _TIME)[0])
+    return RecordedFlight(path.stem, columns_of_topics(messages, _TIME_FIELD)[0])
 
 
-def _messages(path: Path, wanted: Collection[str] | None) -> dict[str, Fields]:
+def _read_messages(path: Path, wanted: Collection[str] | None) -> dict[str, MessageFields]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
-    found: dict[str, Fields] = {}
-    with reading(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"), _silence():
+    values_of_message: dict[str, MessageFields] = {}
+    with (
+        open_log_with_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
+        _silence_stderr(),
+    ):
         from pymavlink import DFReader
 
         text = path.suffix.lower() == ".log"
@@ -45,32 +48,36 @@ def _messages(path: Path, wanted: Collection[str] | None) -> dict[str, Fields]:
         while (message := log.recv_msg()) is not None:
             fields = message.to_dict()
             numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
-            if message.get_type() not in _OVERHEAD and _TIME in numbers:
-                name = _name(message.get_type(), fields)
-                for field, values in found.setdefault(name, _empty(name, numbers, wanted)).items():
+            if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numbers:
+                name = _message_name(message.get_type(), fields)
+                for field, values in values_of_message.setdefault(
+                    name, _empty_columns(name, numbers, wanted)
+                ).items():
                     values.append(numbers.get(field, nan))
-    return found
+    return values_of_message
 
 
-def _empty(name: str, numbers: Fields, wanted: Collection[str] | None) -> Fields:
-    kept = [field for field in numbers if wanted is None or field == _TIME or f"{name}.{field}" in wanted]
+def _empty_columns(name: str, numbers: MessageFields, wanted: Collection[str] | None) -> MessageFields:
+    kept = [
+        field for field in numbers if wanted is None or field == _TIME_FIELD or f"{name}.{field}" in wanted
+    ]
     return {field: array("d") for field in kept}
 
 
 @contextmanager
-def _silence() -> Iterator[None]:
+def _silence_stderr() -> Iterator[None]:
     """Nothing on standard error: pymavlink, and its indexer in C, print what they skip."""
     sys.stderr.flush()
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+    saved_stderr, null_device = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null_device, 2)
     try:
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(saved_stderr, 2)
+        os.close(saved_stderr)
+        os.close(null_device)
 
 
-def _name(kind: str, fields: dict[str, Any]) -> str:
-    number = next((fields[key] for key in _INSTANCES if isinstance(fields.get(key), int)), 0)
-    return kind if number == 0 else f"{kind}{number}"
+def _message_name(message_type: str, fields: dict[str, Any]) -> str:
+    instance = next((fields[key] for key in _INSTANCE_FIELDS if isinstance(fields.get(key), int)), 0)
+    return message_type if instance == 0 else f"{message_type}{instance}"

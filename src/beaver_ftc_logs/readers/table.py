@@ -10,32 +10,32 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.text import (
-    Cells,
-    Layout,
-    check_broken,
-    joined,
-    layout_of,
+    TableCells,
+    TableLayout,
+    check_broken_lines,
+    find_layout,
+    join_blocks,
     read_cells,
-    remarks,
+    text_cell_remarks,
 )
-from beaver_ftc_logs.recording import Column, Floats, Recording, nearest_ten
-from beaver_ftc_logs.units import SECONDS
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
+from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
 
-TIME = "t_s"
-_BYTES = 8
-_MOST_ROWS, _MOST_BYTES = 10_000_000, 2_000_000_000
-"""What is read of a file at most at once: 2.8 h at 1000 Hz."""
-_LAST, _ONCE_MORE, _BATCH_ROWS = 1.2, 0.1, 50_000
+TIME_COLUMN = "t_s"
+_BYTES_PER_NUMBER = 8
+_MAX_ROWS, _MAX_NUMBER_BYTES = 10_000_000, 2_000_000_000
+"""Largest part of a file that is read at once: 2.8 h at 1000 Hz."""
+_MAX_LAST_PART_FACTOR, _OVERLAP_SHARE, _BATCH_ROWS = 1.2, 0.1, 50_000
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
 
-Table = dict[str, Floats]
-Part = tuple[Cells, list[tuple[str, str]], bool]
+NumberTable = dict[str, Floats]
+TablePart = tuple[TableCells, list[tuple[str, str]], bool]
 """Cells, of each column what is said of it, and whether there is more."""
 
 
 def read(
     path: Path, time: str | None = None, unit: str = "s", columns: Collection[str] | None = None
-) -> Recording:
+) -> RecordedFlight:
     """The flight in a table. Columns and cells that hold no number are nan.
 
     time, unit: the column of the time and its unit, `t_s` in s where None. columns: what is read, all where
@@ -49,75 +49,81 @@ def read_parts(
     time: str | None = None,
     unit: str = "s",
     columns: Collection[str] | None = None,
-    rows: int | None = None,
-) -> Iterator[Recording]:
+    rows_per_part: int | None = None,
+) -> Iterator[RecordedFlight]:
     """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
     numbered, each of which begins with the end of the one before: memory does not grow with the file."""
-    name = time or TIME
-    names, found = _parts(path, None if columns is None else {name, *columns}, rows)
+    name = time or TIME_COLUMN
+    names, parts = _table_parts(path, None if columns is None else {name, *columns}, rows_per_part)
     if name not in names:
-        says = f"a table with {TIME} in seconds, or its `time` in the vehicle file"
-        raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_ten(name, names)}")
-    for number, (cells, said, more) in enumerate(found, 1):
-        table = _filled(names, cells)
+        says = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
+        raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_names(name, names)}")
+    for part_number, (cells, remarks, has_more) in enumerate(parts, 1):
+        table = _with_unread_columns(names, cells)
         notes: dict[str, str] = {}
-        for column, line in said:
+        for column, line in remarks:
             notes[column] = f"{notes[column]}\n{line}" if column in notes else line
-        t_s = table.pop(name) * SECONDS[unit]
-        kept, lost = _stamped(path, name, t_s)
-        of = slice(None) if kept is None else kept
-        t_s = t_s[of]
-        check_time(path, t_s, name, cells.before)
-        flight = {key: Column(t_s, values[of], notes.get(key, "")) for key, values in table.items()}
-        whole = number == 1 and not more
-        told = (*filter(None, notes.get("", "").split("\n")), *lost)
-        yield Recording(path.stem if whole else f"{path.stem}-part-{number}", flight, notes=told)
+        t_s = table.pop(name) * SECONDS_PER_TIME_UNIT[unit]
+        kept_rows, lost_lines = _rows_with_time(path, name, t_s)
+        row_selection = slice(None) if kept_rows is None else kept_rows
+        t_s = t_s[row_selection]
+        check_time(path, t_s, name, cells.n_rows_before)
+        flight_columns = {
+            key: Column(t_s, values[row_selection], notes.get(key, "")) for key, values in table.items()
+        }
+        is_whole = part_number == 1 and not has_more
+        all_notes = (*filter(None, notes.get("", "").split("\n")), *lost_lines)
+        yield RecordedFlight(
+            path.stem if is_whole else f"{path.stem}-part-{part_number}", flight_columns, notes=all_notes
+        )
 
 
-def _filled(names: Sequence[str], cells: Cells) -> Table:
+def _with_unread_columns(names: Sequence[str], cells: TableCells) -> NumberTable:
     """All columns, those that were not read nan."""
-    nothing = np.broadcast_to(np.nan, cells.rows)
+    nothing = np.broadcast_to(np.nan, cells.n_rows)
     return {name: cells.numbers.get(name, nothing) for name in names}
 
 
-def _stamped(path: Path, name: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
+def _rows_with_time(path: Path, name: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
-    lost = int(np.isnan(t_s).sum())
-    if not lost:
+    n_lost = int(np.isnan(t_s).sum())
+    if not n_lost:
         return None, []
-    if lost > len(t_s) // 2:
-        raise BadInput(f"{path}: {name}: {lost} of {len(t_s)} rows hold no number, allowed: increasing time")
-    return np.isfinite(t_s), [f"{name}: rows without a number, left out: {lost} of {len(t_s)}"]
+    if n_lost > len(t_s) // 2:
+        raise BadInput(
+            f"{path}: {name}: {n_lost} of {len(t_s)} rows hold no number, allowed: increasing time"
+        )
+    return np.isfinite(t_s), [f"{name}: rows without a number, left out: {n_lost} of {len(t_s)}"]
 
 
-def read_numbers(path: Path, columns: Sequence[str] | None = None) -> Table:
+def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
     """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
     it is no table, or larger than any flight."""
-    names, parts = _parts(path, columns, None)
-    table = _filled(names, next(parts)[0])
+    names, parts = _table_parts(path, columns, None)
+    table = _with_unread_columns(names, next(parts)[0])
     return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
-def names_of(path: Path) -> list[str]:
+def column_names(path: Path) -> list[str]:
     """The names of a table's columns. Raises BadInput where it is no table."""
-    return _parts(path, [], None)[0]
+    return _table_parts(path, [], None)[0]
 
 
-def first_of(path: Path, name: str) -> Floats:
+def first_numbers(path: Path, name: str) -> Floats:
     """The first numbers of a column."""
-    return next(_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
+    return next(_table_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
 
 
-def _layout(path: Path) -> Layout:
+def _text_table_layout(path: Path) -> TableLayout:
     try:
-        return layout_of(path)
+        return find_layout(path)
     except OSError as error:
         says = (error.strerror or str(error)).lower()
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[None]:
+def _refuse_unreadable(path: Path) -> Iterator[None]:
     """Within this a table is read. Raises BadInput where it is none."""
     import pyarrow as pa
 
@@ -128,76 +134,89 @@ def _readable(path: Path) -> Iterator[None]:
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
-def check_time(path: Path, t_s: Floats, name: str = TIME, before: int = 0) -> None:
+def check_time(path: Path, t_s: Floats, name: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
     """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
-    wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
-    if wrong.size:
-        row = before + int(wrong[0]) + 1
+    wrong_rows = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
+    if wrong_rows.size:
+        row = n_rows_before + int(wrong_rows[0]) + 1
         raise BadInput(f"{path}: {name}: row {row}: time does not increase, allowed: increasing seconds")
 
 
-def _parts(path: Path, columns: Collection[str] | None, rows: int | None) -> tuple[list[str], Iterator[Part]]:
+def _table_parts(
+    path: Path, columns: Collection[str] | None, rows_per_part: int | None
+) -> tuple[list[str], Iterator[TablePart]]:
     """The names of a table's columns, and its parts of so many rows; the whole where None."""
-    layout = None if path.suffix.lower() == ".parquet" else _layout(path)
-    with _readable(path):
-        names, numbers = (
-            _stored(path, columns) if layout is None else (list(layout.names), list(layout.names))
+    layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
+    with _refuse_unreadable(path):
+        names, number_columns = (
+            _stored_columns(path, columns)
+            if layout is None
+            else (list(layout.column_names), list(layout.column_names))
         )
-    _check_names(path, names)
-    wanted = [name for name in numbers if columns is None or name in columns]
-    blocks = _batches(path, wanted) if layout is None else read_cells(path, layout, wanted)
-    return names, _put_together(path, layout, blocks, rows)
+    _check_names_unique(path, names)
+    wanted_columns = [name for name in number_columns if columns is None or name in columns]
+    blocks = (
+        _read_parquet_batches(path, wanted_columns)
+        if layout is None
+        else read_cells(path, layout, wanted_columns)
+    )
+    return names, _join_blocks(path, layout, blocks, rows_per_part)
 
 
-def _put_together(
-    path: Path, layout: Layout | None, blocks: Iterator[Cells], rows: int | None
-) -> Iterator[Part]:
-    held: list[Cells] = []
-    with _readable(path):
+def _join_blocks(
+    path: Path, layout: TableLayout | None, blocks: Iterator[TableCells], rows_per_part: int | None
+) -> Iterator[TablePart]:
+    held_blocks: list[TableCells] = []
+    with _refuse_unreadable(path):
         for block in blocks:
-            held.append(block)
-            many = sum(one.rows for one in held)
-            if rows is None and many > _MOST_ROWS:
-                raise BadInput(f"{path}: has more than {_MOST_ROWS:,} rows, allowed: up to {_MOST_ROWS:,}")
-            while rows is not None and many > _LAST * rows:
-                found = joined(held)
-                part, rest = found.rows_from(0, rows), found.rows_from(rows - round(_ONCE_MORE * rows))
-                part.text, part.broken = found.text, found.broken
-                held, many = [rest], rest.rows
-                yield part, list(remarks(layout, part)) if layout else [], True
-        found = joined(held)
+            held_blocks.append(block)
+            n_held_rows = sum(one.n_rows for one in held_blocks)
+            if rows_per_part is None and n_held_rows > _MAX_ROWS:
+                raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
+            while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:
+                joined = join_blocks(held_blocks)
+                first_rows, rest = (
+                    joined.select_rows(0, rows_per_part),
+                    joined.select_rows(rows_per_part - round(_OVERLAP_SHARE * rows_per_part)),
+                )
+                first_rows.text_cells, first_rows.broken_lines = joined.text_cells, joined.broken_lines
+                held_blocks, n_held_rows = [rest], rest.n_rows
+                yield first_rows, list(text_cell_remarks(layout, first_rows)) if layout else [], True
+        joined = join_blocks(held_blocks)
         if layout:
-            check_broken(path, layout, found)
-        yield found, list(remarks(layout, found)) if layout else [], False
+            check_broken_lines(path, layout, joined)
+        yield joined, list(text_cell_remarks(layout, joined)) if layout else [], False
 
 
-def _stored(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
+def _stored_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
     """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
     cell may be any size."""
     from pyarrow import parquet
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        numbers = [field.name for field in schema if _is_number(field.type)]
+        numbers = [field.name for field in schema if _is_number_type(field.type)]
         _check_size(path, file.metadata, [name for name in numbers if columns is None or name in columns])
     return list(schema.names), numbers
 
 
-def _batches(path: Path, names: Sequence[str]) -> Iterator[Cells]:
+def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCells]:
     """The rows of a Parquet file, batch by batch, none last."""
     from pyarrow import parquet
 
-    rows = 0
+    n_rows_read = 0
     with parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
-            yield Cells({name: _numbers(batch[name]) for name in names}, batch.num_rows, rows)
-            rows += batch.num_rows
-    yield Cells({name: np.empty(0) for name in names}, 0, rows)
+            yield TableCells(
+                {name: _column_as_numbers(batch[name]) for name in names}, batch.num_rows, n_rows_read
+            )
+            n_rows_read += batch.num_rows
+    yield TableCells({name: np.empty(0) for name in names}, 0, n_rows_read)
 
 
-def _check_names(path: Path, names: Sequence[str]) -> None:
+def _check_names_unique(path: Path, names: Sequence[str]) -> None:
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise BadInput(f"{path}: has two columns {twice}, allowed: one of a name")
@@ -205,23 +224,25 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
 
 def _check_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
     """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
-    if metadata.num_rows > _MOST_ROWS:
-        raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MOST_ROWS:,}")
+    if metadata.num_rows > _MAX_ROWS:
+        raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
     groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
     chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
-    stored = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in set(names))
-    size = max(stored, _BYTES * metadata.num_rows * len(names))
-    if size > _MOST_BYTES:
+    stored_bytes = sum(
+        chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in set(names)
+    )
+    n_bytes = max(stored_bytes, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
+    if n_bytes > _MAX_NUMBER_BYTES:
         raise BadInput(
-            f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: up to {_MOST_BYTES / 1e9:g} GB"
+            f"{path}: holds {n_bytes / 1e9:,.1f} GB of numbers, allowed: up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
         )
 
 
-def _is_number(kind: Any) -> bool:
+def _is_number_type(kind: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
 
 
-def _numbers(column: Any) -> Floats:
+def _column_as_numbers(column: Any) -> Floats:
     return np.asarray(column.to_numpy(), dtype=float)

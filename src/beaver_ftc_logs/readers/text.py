@@ -17,153 +17,164 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Floats
 
-_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-_HEAD_BYTES, _HEAD_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
-_NUMBER = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
-_MOST_BROKEN = 0.1
+_DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+_LAYOUT_HEAD_BYTES, _MAX_LAYOUT_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
+_NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
+_MAX_BROKEN_SHARE = 0.1
 """Share of lines with another number of cells that a table may have."""
 
 
 @dataclass(frozen=True)
-class Layout:
+class TableLayout:
     """How a table is written: the place of the line with the names, what is between cells and in numbers."""
 
-    header: int
-    names: tuple[str, ...]
+    header_line: int
+    column_names: tuple[str, ...]
     delimiter: str
-    decimal: str
+    decimal_mark: str
 
 
 @dataclass
-class Cells:
-    """What was read: numbers by column, nan where there is none; of each column its cells of text, the first
-    of them with its row; the lines left out, by their beginnings; how many rows there are, and before."""
+class TableCells:
+    """Cells that were read: numbers by column, nan where there is none; of each column its cells of text, the
+    first of them with its row; the lines left out, by their beginnings; how many rows there are, and
+    before."""
 
     numbers: dict[str, Floats]
-    rows: int
-    before: int = 0
-    text: dict[str, tuple[int, int, str]] = field(default_factory=dict)
-    broken: list[str] = field(default_factory=list)
+    n_rows: int
+    n_rows_before: int = 0
+    text_cells: dict[str, tuple[int, int, str]] = field(default_factory=dict)
+    broken_lines: list[str] = field(default_factory=list)
 
-    def rows_from(self, first: int, end: int | None = None) -> "Cells":
+    def select_rows(self, first: int, end: int | None = None) -> "TableCells":
         """The rows from the first to the end, of which nothing else is said."""
         numbers = {name: values[first:end].copy() for name, values in self.numbers.items()}
-        return Cells(numbers, len(range(self.rows)[first:end]), self.before + first)
+        return TableCells(numbers, len(range(self.n_rows)[first:end]), self.n_rows_before + first)
 
 
-def joined(blocks: Sequence[Cells]) -> Cells:
+def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     """Blocks that follow one another as one; they are used up."""
     first = blocks[0]
     names = list(first.numbers)
     numbers = {name: np.concatenate([one.numbers.pop(name) for one in blocks]) for name in names}
-    found = Cells(numbers, sum(one.rows for one in blocks), first.before)
+    joined = TableCells(numbers, sum(one.n_rows for one in blocks), first.n_rows_before)
     for one in blocks:
-        found.broken += one.broken
-        for name, (many, row, cell) in one.text.items():
-            known = found.text.get(name, (0, row, cell))
-            found.text[name] = (known[0] + many, *known[1:])
-    return found
+        joined.broken_lines += one.broken_lines
+        for name, (n_cells, row, cell) in one.text_cells.items():
+            earlier = joined.text_cells.get(name, (0, row, cell))
+            joined.text_cells[name] = (earlier[0] + n_cells, *earlier[1:])
+    return joined
 
 
-def layout_of(path: Path) -> Layout:
+def find_layout(path: Path) -> TableLayout:
     """How a file's table is written, by its first lines. Raises BadInput with what was found instead."""
     with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise _no_table(path, "is written in UTF-16, not in UTF-8")
-    lines = head.decode("utf-8-sig", errors="replace").splitlines()[:_HEAD_LINES]
-    found = [layout for delimiter in _DELIMITERS if (layout := _layout(lines, delimiter))]
-    if not found:
-        raise _no_table(path, _instead(lines))
-    return max(found, key=lambda layout: len(layout.names))
+        first_bytes = file.read(_LAYOUT_HEAD_BYTES)
+    if first_bytes[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise _unreadable_error(path, "is written in UTF-16, not in UTF-8")
+    lines = first_bytes.decode("utf-8-sig", errors="replace").splitlines()[:_MAX_LAYOUT_LINES]
+    layouts = [
+        layout for delimiter in _DELIMITER_TITLES if (layout := _layout_with_delimiter(lines, delimiter))
+    ]
+    if not layouts:
+        raise _unreadable_error(path, _describe_unreadable(lines))
+    return max(layouts, key=lambda layout: len(layout.column_names))
 
 
-def _no_table(path: Path, says: str) -> BadInput:
+def _unreadable_error(path: Path, says: str) -> BadInput:
     return BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet")
 
 
-def _layout(lines: Sequence[str], delimiter: str) -> Layout | None:
+def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout | None:
     """The table that lines hold if this is what is between cells; None if they hold none."""
-    rows = [_cells(line, delimiter) for line in lines]
-    for place, names in enumerate(rows):
-        below = [row for row in rows[place + 1 :] if row][:4]
-        if not below and place == 0 and len(names) > 1:
-            return Layout(place, tuple(names), delimiter, ".")  # a table of no rows
-        counts = [len(row) == len(names) for row in below]
-        if len(names) < 2 or any(_is_number(name) for name in names) or not any(counts):
+    rows = [_split_cells(line, delimiter) for line in lines]
+    for line_index, names in enumerate(rows):
+        rows_below = [row for row in rows[line_index + 1 :] if row][:4]
+        if not rows_below and line_index == 0 and len(names) > 1:
+            return TableLayout(line_index, tuple(names), delimiter, ".")  # a table of no rows
+        has_as_many_cells = [len(row) == len(names) for row in rows_below]
+        if len(names) < 2 or any(_is_number_cell(name) for name in names) or not any(has_as_many_cells):
             continue
-        numbers = [cell for row in below if len(row) == len(names) for cell in row if _is_number(cell)]
+        numbers = [
+            cell for row in rows_below if len(row) == len(names) for cell in row if _is_number_cell(cell)
+        ]
         if numbers:
-            comma = delimiter != "," and any("," in cell for cell in numbers)
-            named = tuple(name.strip() for name in (names[0].lstrip("# "), *names[1:]))
-            return Layout(place, named, delimiter, "," if comma else ".")
+            has_decimal_comma = delimiter != "," and any("," in cell for cell in numbers)
+            column_names = tuple(name.strip() for name in (names[0].lstrip("# "), *names[1:]))
+            return TableLayout(line_index, column_names, delimiter, "," if has_decimal_comma else ".")
     return None
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def _split_cells(line: str, delimiter: str) -> list[str]:
     try:
         return next(lines_of.reader([line], delimiter=delimiter), [])
     except lines_of.Error:  # a cell longer than any
         return []
 
 
-def _is_number(cell: str) -> bool:
-    return bool(re.match(_NUMBER, cell.strip().replace(",", ".")))
+def _is_number_cell(cell: str) -> bool:
+    return bool(re.match(_NUMBER_PATTERN, cell.strip().replace(",", ".")))
 
 
-def _instead(lines: Sequence[str]) -> str:
-    """What a file has in the place of names and numbers."""
+def _describe_unreadable(lines: Sequence[str]) -> str:
+    """Describe the content of a file that has no names and numbers."""
     first = next((line for line in lines if line.strip()), None)
     if first is None:
         return "it is empty"
     if not all(character.isprintable() or character == "\t" for character in first[:80]):
         return "it holds bytes that are no text"
-    cells = max((_cells(first, delimiter) for delimiter in _DELIMITERS), key=len)
-    if all(map(_is_number, cells)):
+    cells = max((_split_cells(first, delimiter) for delimiter in _DELIMITER_TITLES), key=len)
+    if all(map(_is_number_cell, cells)):
         return f"its first line holds numbers and no names: {first[:60]!r}"
     return f"no line of names with a line of as many numbers below it; it begins {first[:60]!r}"
 
 
-def read_cells(path: Path, layout: Layout, wanted: Sequence[str]) -> Iterator[Cells]:
+def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterator[TableCells]:
     """The numbers of some of a file's columns, block by block, one at least."""
     from pyarrow import csv
 
-    broken: list[str] = []
+    broken_lines: list[str] = []
     options = {
         "read_options": csv.ReadOptions(
-            column_names=layout.names, skip_rows=layout.header + 1, block_size=_BLOCK_BYTES
+            column_names=layout.column_names, skip_rows=layout.header_line + 1, block_size=_BLOCK_BYTES
         ),
-        "parse_options": csv.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=_left_out(broken)),
-        "convert_options": _as_text(layout.names, wanted),
+        "parse_options": csv.ParseOptions(
+            delimiter=layout.delimiter, invalid_row_handler=_record_broken_lines(broken_lines)
+        ),
+        "convert_options": _all_text_conversion(layout.column_names, wanted),
     }
-    rows = 0
+    n_rows_read = 0
     with csv.open_csv(path, **options) as blocks:
         for block in blocks:
-            found = Cells({}, block.num_rows, rows)
-            found.numbers = {name: _numbers(block[name], layout.decimal, name, found) for name in wanted}
-            found.broken, broken[:] = broken[:], []
-            rows += block.num_rows
-            yield found
-    yield Cells({name: np.empty(0) for name in wanted}, 0, rows, broken=broken)
+            cells = TableCells({}, block.num_rows, n_rows_read)
+            cells.numbers = {
+                name: _column_as_numbers(block[name], layout.decimal_mark, name, cells) for name in wanted
+            }
+            cells.broken_lines, broken_lines[:] = broken_lines[:], []
+            n_rows_read += block.num_rows
+            yield cells
+    yield TableCells({name: np.empty(0) for name in wanted}, 0, n_rows_read, broken_lines=broken_lines)
 
 
-def check_broken(path: Path, layout: Layout, found: Cells) -> None:
+def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
     """Raise BadInput where too many lines have another number of cells than the header."""
-    lost, lines = len(found.broken), found.rows + len(found.broken)
-    if lost > _MOST_BROKEN * lines:
-        many = f"{lost} of {lines} lines have another number of cells than the header"
-        raise _no_table(path, f"{many}, {len(layout.names)}: the first {found.broken[0]!r}")
+    n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
+    if n_broken > _MAX_BROKEN_SHARE * n_lines:
+        text = f"{n_broken} of {n_lines} lines have another number of cells than the header"
+        raise _unreadable_error(
+            path, f"{text}, {len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
+        )
 
 
-def _left_out(broken: list[str]) -> Callable[[Any], str]:
-    def note(row: Any) -> str:
-        broken.append((row.text or "")[:60])
+def _record_broken_lines(broken_lines: list[str]) -> Callable[[Any], str]:
+    def record_line(row: Any) -> str:
+        broken_lines.append((row.text or "")[:60])
         return "skip"
 
-    return note
+    return record_line
 
 
-def _as_text(names: Sequence[str], wanted: Sequence[str]) -> Any:
+def _all_text_conversion(names: Sequence[str], wanted: Sequence[str]) -> Any:
     """Every cell as text: which of them hold numbers is found out here, and not by the first block."""
     import pyarrow as pa
     from pyarrow import csv
@@ -175,7 +186,7 @@ def _as_text(names: Sequence[str], wanted: Sequence[str]) -> Any:
     )
 
 
-def _numbers(cells: Any, decimal: str, name: str, found: Cells) -> Floats:
+def _column_as_numbers(cells: Any, decimal: str, column_name: str, counted_in: TableCells) -> Floats:
     """A block's column as numbers; text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
@@ -186,31 +197,35 @@ def _numbers(cells: Any, decimal: str, name: str, found: Cells) -> Floats:
     try:
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
-        fine = compute.fill_null(compute.match_substring_regex(cells, _NUMBER), True)
-        _count(name, cells, fine, found)
-        numbers = compute.cast(compute.if_else(fine, cells, None), pa.float64())
+        is_number = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
+        _count_text_cells(column_name, cells, is_number, counted_in)
+        numbers = compute.cast(compute.if_else(is_number, cells, None), pa.float64())
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _count(name: str, cells: Any, fine: Any, found: Cells) -> None:
-    places = np.flatnonzero(~fine.to_numpy(zero_copy_only=False))
-    texts = [place for place in places.tolist() if cells[place].as_py()]
-    if texts:
-        found.text[name] = (len(texts), found.before + texts[0] + 1, str(cells[texts[0]]))
+def _count_text_cells(column_name: str, cells: Any, is_number: Any, counted_in: TableCells) -> None:
+    places = np.flatnonzero(~is_number.to_numpy(zero_copy_only=False))
+    text_places = [place for place in places.tolist() if cells[place].as_py()]
+    if text_places:
+        counted_in.text_cells[column_name] = (
+            len(text_places),
+            counted_in.n_rows_before + text_places[0] + 1,
+            str(cells[text_places[0]]),
+        )
 
 
-def remarks(layout: Layout, found: Cells) -> Iterator[tuple[str, str]]:
-    """Of each column a line on its cells of text, where it holds numbers too; under an empty name what is
-    unusual about the whole."""
-    for name, (many, row, first) in found.text.items():
-        if np.isfinite(found.numbers[name]).any():
-            cells = "1 cell holds" if many == 1 else f"{many} cells hold"
+def text_cell_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
+    """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
+    is unusual about the whole."""
+    for name, (n_cells, row, first) in table_cells.text_cells.items():
+        if np.isfinite(table_cells.numbers[name]).any():
+            cells = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
             yield name, f"{name}: {cells} no number, the first in row {row}: {first[:30]!r}"
-    if layout.header:
-        yield "", f"names are in line {layout.header + 1}, what is above is left out"
+    if layout.header_line:
+        yield "", f"names are in line {layout.header_line + 1}, what is above is left out"
     if layout.delimiter != ",":
-        comma = ", with a decimal comma" if layout.decimal == "," else ""
-        yield "", f"cells are parted by {_DELIMITERS[layout.delimiter]}{comma}"
-    if found.broken:
-        yield "", f"lines with too few or too many cells, left out: {len(found.broken)}"
+        comma = ", with a decimal comma" if layout.decimal_mark == "," else ""
+        yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{comma}"
+    if table_cells.broken_lines:
+        yield "", f"lines with too few or too many cells, left out: {len(table_cells.broken_lines)}"

@@ -19,47 +19,54 @@ from beaver_ftc.results import Document, as_json
 from beaver_ftc.studies.engine import poisson
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import detector_names, diagnose_with, freeze
-from beaver_ftc_logs.diagnose import Rows
-from beaver_ftc_logs.fitting import Stretch, fit_model, folds, run_tests, stretches_of, trusted
-from beaver_ftc_logs.model import Model, Settings
-from beaver_ftc_logs.recording import Recording
-from beaver_ftc_logs.samples import Samples, read_for, sample
+from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with
+from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.fitting import (
+    Stretch,
+    add_validity_range,
+    fit_model,
+    score_folds,
+    usable_stretches,
+    validation_folds,
+)
+from beaver_ftc_logs.model import FilterSettings, Model
+from beaver_ftc_logs.recording import RecordedFlight
+from beaver_ftc_logs.samples import Samples, read_for_vehicle, resample
 from beaver_ftc_logs.scoring import ENGINE
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
-Table = tuple[list[str], list[list[str]]]
-FIGURES = {
+HeaderAndRows = tuple[list[str], list[list[str]]]
+SCORE_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
-PUBLISHED = Path(__file__).with_name("published.json")  # of each data set: what others found
-SOON_S = 5.0
-KINDS = ("aileron", "rudder", "elevator")
-_KIND_OF = {"left_aileron": "aileron", "right_aileron": "aileron"}
-OURS = "bank of filters (ours)"
-FREEZE = "freeze rule, 6 s, on the logged outputs"
-TITLES = {
-    "bank-of-filters": OURS,
+PUBLISHED_SCORES_FILE = Path(__file__).with_name("published.json")  # of each data set: what others found
+MAX_SHORT_DELAY_S = 5.0
+SURFACE_KINDS = ("aileron", "rudder", "elevator")
+_KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
+OUR_METHOD_TITLE = "bank of filters (ours)"
+FREEZE_RULE_TITLE = "freeze rule, 6 s, on the logged outputs"
+METHOD_TITLES = {
+    "bank-of-filters": OUR_METHOD_TITLE,
     "sliding-least-squares": "sliding least squares, 20 s",
     "forgetting-least-squares": "forgetting least squares, 20 s",
 }
-_LATEST_S = 30.0
+_MAX_SHOWN_DELAY_S = 30.0
 VEHICLE_FILE = "vehicle.yaml"
-_RAW = "*-mavros-imu-data_raw.csv"
+_ALFA_GYRO_FILE_PATTERN = "*-mavros-imu-data_raw.csv"
 
 
 @dataclass(frozen=True)
-class DataSet:
+class FlightDataSet:
     """Flights of one vehicle: as they were logged, and on one time base."""
 
     name: str
     vehicle: Vehicle
-    recordings: tuple[Recording, ...]
+    recordings: tuple[RecordedFlight, ...]
     flights: tuple[Samples, ...]
 
 
-def data_sets(folder: Path) -> list[DataSet]:
+def load_data_sets(folder: Path) -> list[FlightDataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
@@ -72,243 +79,260 @@ def data_sets(folder: Path) -> list[DataSet]:
     return found
 
 
-def _data_set(path: Path) -> DataSet | None:
+def _data_set(path: Path) -> FlightDataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
-        tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
-        return _read(path.name, load_vehicle(path / VEHICLE_FILE), tables) if tables else None
-    alfa = sorted(flight for flight in path.iterdir() if flight.is_dir() and any(flight.glob(_RAW)))
-    return _read(path.name, load_vehicle("alfa"), alfa) if alfa else None
+        score_tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
+        return (
+            _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), score_tables)
+            if score_tables
+            else None
+        )
+    alfa = sorted(
+        flight for flight in path.iterdir() if flight.is_dir() and any(flight.glob(_ALFA_GYRO_FILE_PATTERN))
+    )
+    return _read_data_set(path.name, load_vehicle("alfa"), alfa) if alfa else None
 
 
-def _read(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
-    recordings = tuple(read_for(path, vehicle) for path in paths)
-    return DataSet(name, vehicle, recordings, tuple(sample(one, vehicle) for one in recordings))
+def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
+    recordings = tuple(read_for_vehicle(path, vehicle) for path in paths)
+    return FlightDataSet(name, vehicle, recordings, tuple(resample(one, vehicle) for one in recordings))
 
 
 def run_benchmark(folder: Path) -> Document:
     """The document of the benchmark: a part a data set, a row a method."""
-    return {"sets": [_compare(one) for one in data_sets(folder)]}
+    return {"sets": [_compare_methods(one) for one in load_data_sets(folder)]}
 
 
-def files_of(document: Document) -> Files:
+def result_files(document: Document) -> Files:
     """The document, its tables and its figure."""
     return {
-        "flights.png": figure_of(document),
+        "flights.png": draw_comparison_figure(document),
         "flights.json": as_json(document),
         "flights.md": as_markdown(document),
     }
 
 
-def _compare(data: DataSet) -> Document:
-    stretches, alone = stretches_of(data.flights), len(data.flights) == 1
+def _compare_methods(data: FlightDataSet) -> Document:
+    stretches, is_single_flight = usable_stretches(data.flights), len(data.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    whole = settings_of(stretches, data) if alone else None
+    shared = settings_of_whole_flight(stretches, data) if is_single_flight else None
     flights: list[Document] = []
-    for fitted, kept, name in folds(stretches):
-        model = trusted(fitted, fit_model(fitted, data.vehicle, whole))
+    for fitted, kept, name in validation_folds(stretches):
+        model = add_validity_range(fitted, fit_model(fitted, data.vehicle, shared))
         recording = next(one for one in data.recordings if one.name == kept.samples.name)
         flights += [
-            {"left_out": name, "method": method, **_score(kept, rows, model)}
-            for method, rows in _diagnosed(recording, kept, model)
+            {"left_out": name, "method": method, **_score_against_log(kept, rows, model)}
+            for method, rows in _rows_of_methods(recording, kept, model)
         ]
     labelled = "classes" in flights[0]
-    summarise = by_labels if labelled else by_events
+    summarise = summarize_labels if labelled else summarize_failures
     methods = dict.fromkeys(one["method"] for one in flights)
     rows_of = {m: [one for one in flights if one["method"] == m] for m in methods}
     return {
         "set": data.name,
         "vehicle": data.vehicle.name,
         "scored_by": "labels" if labelled else "events",
-        "left_out": "halves of the one flight in turn" if alone else "each flight in turn",
+        "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
         "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items()],
-        "published": json.loads(PUBLISHED.read_text(encoding="utf-8")).get(data.name, []),
+        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
         "flights": flights,
     }
 
 
-def _diagnosed(recording: Recording, kept: Stretch, model: Model) -> Iterator[tuple[str, Rows]]:
+def _rows_of_methods(
+    recording: RecordedFlight, kept: Stretch, model: Model
+) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
-        yield TITLES.get(name, f"{name}, of the loop"), diagnose_with(name, kept.samples, model)
-    frozen = freeze(recording, kept.samples, model)
+        yield METHOD_TITLES.get(name, f"{name}, of the loop"), diagnose_with(name, kept.samples, model)
+    frozen = diagnose_by_freeze_rule(recording, kept.samples, model)
     if frozen is not None:
-        yield FREEZE, frozen
+        yield FREEZE_RULE_TITLE, frozen
 
 
-def settings_of(stretches: list[Stretch], data: DataSet) -> Settings:
-    """What a single flight says as a whole: levels, rate of change, and the mass of the bounds."""
+def settings_of_whole_flight(stretches: list[Stretch], data: FlightDataSet) -> FilterSettings:
+    """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
     model = fit_model(stretches, data.vehicle)
     if len(stretches) > 1:
         return model.settings
-    return model.settings.model_copy(update={"bounds": run_tests(stretches, model)[1]})
+    return model.settings.model_copy(update={"bounds": score_folds(stretches, model)[1]})
 
 
-def _score(kept: Stretch, rows: Rows, model: Model) -> Document:
+def _score_against_log(kept: Stretch, rows: DiagnosisRows, model: Model) -> Document:
     if np.isfinite(kept.samples.labels).any():
-        return scoring.by_labels(rows, kept_labels(kept))
-    return scoring.by_event(rows, kept.samples.events, model.groups)
+        return scoring.score_against_labels(rows, labels_in_usable_span(kept))
+    return scoring.score_against_failures(rows, kept.samples.logged_failures, model.groups)
 
 
-def kept_labels(kept: Stretch) -> np.ndarray:
+def labels_in_usable_span(kept: Stretch) -> np.ndarray:
     """Labels in the whole span of what is kept, their edges included: they count in the score; else NaN."""
-    used, labels = np.flatnonzero(kept.use), np.full_like(kept.samples.labels, np.nan)
-    if used.size:
-        span = slice(used[0], used[-1] + 1)
+    usable_rows, labels = np.flatnonzero(kept.usable), np.full_like(kept.samples.labels, np.nan)
+    if usable_rows.size:
+        span = slice(usable_rows[0], usable_rows[-1] + 1)
         labels[span] = kept.samples.labels[span]
     return labels
 
 
-def by_events(scores: Sequence[Document]) -> Document:
+def summarize_failures(scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
-    failed = [one for one in scores if one["failure"]]
-    engine = [one for one in failed if ENGINE in one["failure"]]
-    surface = [one for one in failed if ENGINE not in one["failure"]]
-    found = [one for one in surface if one["detected"]]
-    falsely = [one for one in scores if one["false_alarms"]]
-    healthy = [one for one in scores if one["failure"] is None]
-    quiet = [one for one in healthy if not one["false_alarms"]]
+    failed_flights = [one for one in scores if one["failure"]]
+    engine_failures = [one for one in failed_flights if ENGINE in one["failure"]]
+    surface_failures = [one for one in failed_flights if ENGINE not in one["failure"]]
+    found_failures = [one for one in surface_failures if one["detected"]]
+    false_alarm_flights = [one for one in scores if one["false_alarms"]]
+    healthy_flights = [one for one in scores if one["failure"] is None]
+    quiet_flights = [one for one in healthy_flights if not one["false_alarms"]]
     hours = sum(one["healthy_s"] for one in scores) / 3600.0
     alarms = poisson(sum(one["false_alarms"] for one in scores), hours)
-    right = len(found) + len(quiet)
+    n_right = len(found_failures) + len(quiet_flights)
     return {
-        "surface_failures": len(surface),
-        "found": len(found),
-        "precision": len(found) / max(len(found) + len(falsely), 1),
-        "recall": len(found) / max(len(surface), 1),
-        "accuracy": right / max(len(surface) + len(healthy), 1),
-        "healthy_flights": len(healthy),
-        "healthy_flights_with_an_alarm": len(healthy) - len(quiet),
+        "surface_failures": len(surface_failures),
+        "found": len(found_failures),
+        "precision": len(found_failures) / max(len(found_failures) + len(false_alarm_flights), 1),
+        "recall": len(found_failures) / max(len(surface_failures), 1),
+        "accuracy": n_right / max(len(surface_failures) + len(healthy_flights), 1),
+        "healthy_flights": len(healthy_flights),
+        "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_flights),
         "false_alarms_per_hour": {"value": alarms.value, "low": alarms.low, "high": alarms.high},
         "healthy_hours": hours,
-        "wrong_group": sum(one["right_group"] is False for one in found),
-        "delay_s": {kind: _delays(surface, kind) for kind in KINDS},
-        "engine_failures_with_an_alarm": sum(one["detected"] for one in engine),
+        "wrong_group": sum(one["right_group"] is False for one in found_failures),
+        "delay_s": {kind: _summarize_delays(surface_failures, kind) for kind in SURFACE_KINDS},
+        "engine_failures_with_an_alarm": sum(one["detected"] for one in engine_failures),
     }
 
 
-def _delays(surface: Sequence[Document], kind: str) -> Document:
-    """Where several fail in one flight, the first in the alphabet counts: an aileron before a rudder."""
-    ours = [one for one in surface if min(_KIND_OF.get(s, s) for s in one["failure"].split("+")) == kind]
-    delays = [one["delay_s"] for one in ours if one["detected"]]
+def _summarize_delays(surface_failures: Sequence[Document], kind: str) -> Document:
+    """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
+    counts: an aileron before a rudder."""
+    failures_of_kind = [
+        one
+        for one in surface_failures
+        if min(_KIND_OF_SURFACE.get(s, s) for s in one["failure"].split("+")) == kind
+    ]
+    delays_s = [one["delay_s"] for one in failures_of_kind if one["detected"]]
     return {
-        "failures": len(ours),
-        "found": len(delays),
-        "within_5_s": sum(delay <= SOON_S for delay in delays),
-        "mean": float(np.mean(delays)) if delays else None,
+        "failures": len(failures_of_kind),
+        "found": len(delays_s),
+        "within_5_s": sum(delay <= MAX_SHORT_DELAY_S for delay in delays_s),
+        "mean": float(np.mean(delays_s)) if delays_s else None,
     }
 
 
-def by_labels(scores: Sequence[Document]) -> Document:
+def summarize_labels(scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows."""
     weights = np.array([one["rows"] for one in scores], dtype=float)
-    means = {key: float(np.average([one[key] for one in scores], weights=weights)) for key in FIGURES}
+    means = {key: float(np.average([one[key] for one in scores], weights=weights)) for key in SCORE_TITLES}
     return means | {"rows": int(weights.sum())}
 
 
-def tables(document: Document) -> list[tuple[str, Table]]:
+def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set."""
     if "other_days" in document:
-        return _of_days(document["other_days"])
+        return _tables_of_other_days(document["other_days"])
     found = []
     for part in document["sets"]:
-        header, row_of = (LABELS, _label_row) if part["scored_by"] == "labels" else (EVENTS, _event_row)
+        header, row_of = (
+            (LABEL_TABLE_HEADER, _label_score_cells)
+            if part["scored_by"] == "labels"
+            else (FAILURE_TABLE_HEADER, _failure_score_cells)
+        )
         rows = [row_of(row) for row in (*part["rows"], *part["published"])]
         found.append((f"{part['set']}: left out, {part['left_out']}", (header, rows)))
     return found
 
 
-def _of_days(document: Document) -> list[tuple[str, Table]]:
+def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    header = ["day", *FIGURES.values(), "classes by sliding least squares"]
+    header = ["day", *SCORE_TITLES.values(), "classes by sliding least squares"]
     found = []
     for part in document["sets"]:
-        cells = [[row["day"], *_cells(row)] for row in part["rows"] if row["kind"] == "one change"]
+        cells = [[row["day"], *_score_texts(row)] for row in part["rows"] if row["kind"] == "one change"]
         for one in part["summary"]:
-            cells += [[f"{one['kind']}: {what}", *_cells(one[what])] for what in ("mean", "worst")]
+            cells += [[f"{one['kind']}: {what}", *_score_texts(one[what])] for what in ("mean", "worst")]
         found.append((f"{part['set']}: other days made of it, halves left out in turn", (header, cells)))
     return found
 
 
-def _cells(row: Document) -> list[str]:
-    return [f"{row[key]:.3f}" for key in (*FIGURES, "beside")]
+def _score_texts(row: Document) -> list[str]:
+    return [f"{row[key]:.3f}" for key in (*SCORE_TITLES, "beside")]
 
 
-LABELS = ["method", *FIGURES.values()]
-EVENTS = [
+LABEL_TABLE_HEADER = ["method", *SCORE_TITLES.values()]
+FAILURE_TABLE_HEADER = [
     "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
     "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
     "wrong group",
 ]  # fmt: skip
 
 
-def _label_row(row: Document) -> list[str]:
-    return [row["method"], *_shares(row, FIGURES)]
+def _label_score_cells(row: Document) -> list[str]:
+    return [row["method"], *_share_texts(row, SCORE_TITLES)]
 
 
-def _event_row(row: Document) -> list[str]:
-    """Of what others published only some is known."""
-    delays = [row["delay_s"].get(kind, {}) for kind in KINDS]
-    cells = [row["method"], *_shares(row, EVENTS[1:4]), *map(_delay, delays)]
+def _failure_score_cells(row: Document) -> list[str]:
+    """Return the cells of a method's row; figures that its authors did not publish are left empty."""
+    delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
+    cells = [row["method"], *_share_texts(row, FAILURE_TABLE_HEADER[1:4]), *map(_delay_text, delays)]
     if "false_alarms_per_hour" not in row:
-        return cells + [""] * (len(EVENTS) - len(cells))
-    soon, failures = (sum(of[key] for of in delays[:2]) for key in ("within_5_s", "failures"))
+        return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
+    n_soon, n_failures = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
     alarms = row["false_alarms_per_hour"]
     return [
         *cells,
-        f"{soon} of {failures}",
+        f"{n_soon} of {n_failures}",
         f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})",
         f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
         str(row["wrong_group"]),
     ]
 
 
-def _shares(row: Document, keys: Iterable[str]) -> list[str]:
+def _share_texts(row: Document, keys: Iterable[str]) -> list[str]:
     return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
 
 
-def _delay(of: Document) -> str:
-    if of.get("mean") is None:
-        return "not found" if of.get("failures") else ""
-    count = f" ({of['found']} of {of['failures']})" if "found" in of else ""
-    return f"{of['mean']:.1f}{count}"
+def _delay_text(delay_summary: Document) -> str:
+    if delay_summary.get("mean") is None:
+        return "not found" if delay_summary.get("failures") else ""
+    count = f" ({delay_summary['found']} of {delay_summary['failures']})" if "found" in delay_summary else ""
+    return f"{delay_summary['mean']:.1f}{count}"
 
 
 def as_text(document: Document) -> str:
     """The tables for a terminal."""
-    return "\n".join(f"{title}\n{aligned([head, *rows])}\n" for title, (head, rows) in tables(document))
+    return "\n".join(f"{title}\n{aligned([head, *rows])}\n" for title, (head, rows) in score_tables(document))
 
 
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
-    found = tables(document)
+    found = score_tables(document)
     return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in found)
 
 
-def marks(document: Document) -> tuple[str, str]:
-    """What stands before and after the tables in a page."""
+def table_markers(document: Document) -> tuple[str, str]:
+    """Return the marks before and after the tables in a page."""
     name = "other days" if "other_days" in document else "recorded flights"
     return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
 
 
 def update_page(document: Document, page: Path) -> None:
     """Put the tables between the marks of a Markdown page. Raises BadInput where it has none."""
-    replace_between(page, *marks(document), as_markdown(document))
+    replace_between(page, *table_markers(document), as_markdown(document))
 
 
-def figure_of(document: Document) -> Any:
+def draw_comparison_figure(document: Document) -> Any:
     """How late each method found each failure, and how near it came to the labels: a panel a data set."""
     sets = document["sets"]
-    figure, grid = panels(len(sets), 1, 8.6, sum(0.27 * len(_methods(part)) + 1.3 for part in sets))
+    figure, grid = panels(len(sets), 1, 8.6, sum(0.27 * len(_method_titles(part)) + 1.3 for part in sets))
     for axis, part in zip(grid[:, 0], sets, strict=True):
-        draw = _draw_labels if part["scored_by"] == "labels" else _draw_events
+        draw = _draw_label_shares if part["scored_by"] == "labels" else _draw_failure_delays
         draw(axis, part)
         axis.set_title(f"{part['set']}: left out, {part['left_out']}", fontsize=10, loc="left")
-        axis.set_yticks(range(len(_methods(part))), _methods(part))
-        axis.set_ylim(len(_methods(part)) - 0.5, -0.5)
+        axis.set_yticks(range(len(_method_titles(part))), _method_titles(part))
+        axis.set_ylim(len(_method_titles(part)) - 0.5, -0.5)
         axis.tick_params(labelsize=8)
         axis.grid(color=GRID, linewidth=0.5)
         axis.set_axisbelow(True)
@@ -316,33 +340,41 @@ def figure_of(document: Document) -> Any:
     return figure
 
 
-def _methods(part: Document) -> list[str]:
+def _method_titles(part: Document) -> list[str]:
     return [row["method"] for row in (*part["rows"], *part.get("published", ()))]
 
 
-def _draw_events(axis: Any, part: Document) -> None:
+def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
-    methods = _methods(part)
-    named = {one["left_out"]: one["failure"] for one in part["flights"]}
-    surfaces = [failure for failure in dict.fromkeys(named.values()) if failure and ENGINE not in failure]
+    methods = _method_titles(data_set)
+    failure_of_flight = {one["left_out"]: one["failure"] for one in data_set["flights"]}
+    surfaces = [
+        failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
+    ]
     for i, surface in enumerate(surfaces):
-        mine = [one for one in part["flights"] if one["failure"] == surface and one["method"] in methods]
-        delays = [_LATEST_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in mine]
-        heights = [methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(surfaces) - 0.5) for one in mine]
+        shown_flights = [
+            one for one in data_set["flights"] if one["failure"] == surface and one["method"] in methods
+        ]
+        delays_s = [
+            _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in shown_flights
+        ]
+        heights = [
+            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(surfaces) - 0.5) for one in shown_flights
+        ]
         label = surface.replace("_", " ").replace("+", " + ")
         axis.plot(
-            [min(delay, _LATEST_S + 1.0) for delay in delays],
+            [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
             heights,
             marker(i),
             color=SERIES[i],
             label=label,
         )
-    axis.axvspan(_LATEST_S, _LATEST_S + 2.0, color=GRID)
-    axis.set_xlim(-0.5, _LATEST_S + 2.0)
-    axis.set_xlabel(f"delay, s (grey: not found within {_LATEST_S:g} s)", fontsize=9)
+    axis.axvspan(_MAX_SHOWN_DELAY_S, _MAX_SHOWN_DELAY_S + 2.0, color=GRID)
+    axis.set_xlim(-0.5, _MAX_SHOWN_DELAY_S + 2.0)
+    axis.set_xlabel(f"delay, s (grey: not found within {_MAX_SHOWN_DELAY_S:g} s)", fontsize=9)
 
 
-def _draw_labels(axis: Any, part: Document) -> None:
+def _draw_label_shares(axis: Any, part: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
     keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*part["rows"], *part["published"]]

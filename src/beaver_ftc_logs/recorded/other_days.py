@@ -15,173 +15,219 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import BANK, diagnose_with
-from beaver_ftc_logs.fitting import Stretch, fit_model, folds, stretches_of
+from beaver_ftc_logs.detectors import BANK_OF_FILTERS, diagnose_with
+from beaver_ftc_logs.fitting import Stretch, fit_model, usable_stretches, validation_folds
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.samples import Samples, mixer
+from beaver_ftc_logs.samples import Samples, mixer_matrix
 
-CHOSEN_ON, JUDGED_ON = range(8), range(8, 16)
-_BESIDE = "sliding-least-squares"
-_WORST = {"mean_error": max}
-_SLOW_S = 30.0  # of the mean that is called slow
+TUNING_SEEDS, TEST_SEEDS = range(8), range(8, 16)
+_RIVAL_DETECTOR = "sliding-least-squares"
+_WORST_OF_SCORE = {"mean_error": max}
+_TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
 
 
 @dataclass(frozen=True)
-class Day:
-    """What another day changes.
+class DayChanges:
+    """Changes from the recorded day to another one.
 
-    trim (S,): moment of another loading or rigging, in commands of each surface, behind the fault: a weak
-    surface needs more command for it. neutral (S,): the same ahead of the fault. gain: of all surfaces on the
-    motion about trim (airspeed). own (S,): gain of each surface. late_s: by which commands act later.
-    excitation: size of all motion, at the same noise. noise: standard deviation of the air's share in the
-    rates, over that of the day we have. drift: wander of the trim, in commands.
+    trim_commands (S,): moment of another loading or rigging, in commands of each surface, behind the fault: a
+    weak surface needs more command for it. neutral_commands (S,): the same ahead of the fault. common_gain:
+    of all surfaces on the motion about trim (airspeed). surface_gains (S,). command_delay_s: by which
+    commands act later. motion_scale: of all motion, at the same noise. noise_ratio: standard deviation of the
+    air's share in the rates, over that of the day we have. trim_drift: wander of the trim, in commands.
     """
 
     name: str
-    trim: Floats
-    neutral: Floats
-    own: Floats
-    gain: float = 1.0
-    late_s: float = 0.0
-    excitation: float = 1.0
-    noise: float = 1.0
-    drift: float = 0.0
+    trim_commands: Floats
+    neutral_commands: Floats
+    surface_gains: Floats
+    common_gain: float = 1.0
+    command_delay_s: float = 0.0
+    motion_scale: float = 1.0
+    noise_ratio: float = 1.0
+    trim_drift: float = 0.0
 
 
-def nominal(surfaces: int) -> Day:
+def unchanged_day(n_surfaces: int) -> DayChanges:
     """The day as it was."""
-    return Day("as it was", np.zeros(surfaces), np.zeros(surfaces), np.ones(surfaces))
+    return DayChanges("as it was", np.zeros(n_surfaces), np.zeros(n_surfaces), np.ones(n_surfaces))
 
 
-def grid(mixer: Floats, commands: list[str]) -> list[Day]:
+def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     """One thing changed at a time. mixer (S, C)."""
-    same = nominal(len(mixer))
-    days = [same]
-    for command, moves in zip(commands, mixer.T, strict=True):
+    unchanged = unchanged_day(len(mixer))
+    days = [unchanged]
+    for command, surface_shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            days.append(replace(same, name=f"trim of {command} {shift:+.2f}", trim=shift * moves))
-            days.append(replace(same, name=f"neutral of {command} {shift:+.2f}", neutral=shift * moves))
-    days += [replace(same, name=f"gain {gain:.2f}", gain=gain) for gain in (0.85, 1.15)]
-    days += [replace(same, name=f"commands {late:+.2f} s", late_s=late) for late in (-0.04, 0.04)]
-    days += [replace(same, name=f"excitation {size:.1f}", excitation=size) for size in (0.6, 1.5)]
-    days += [replace(same, name="noise 1.5", noise=1.5), replace(same, name="trim drifts", drift=0.01)]
+            days.append(
+                replace(
+                    unchanged, name=f"trim of {command} {shift:+.2f}", trim_commands=shift * surface_shares
+                )
+            )
+            days.append(
+                replace(
+                    unchanged,
+                    name=f"neutral of {command} {shift:+.2f}",
+                    neutral_commands=shift * surface_shares,
+                )
+            )
+    days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
+    days += [
+        replace(unchanged, name=f"commands {delay_s:+.2f} s", command_delay_s=delay_s)
+        for delay_s in (-0.04, 0.04)
+    ]
+    days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
+    days += [
+        replace(unchanged, name="noise 1.5", noise_ratio=1.5),
+        replace(unchanged, name="trim drifts", trim_drift=0.01),
+    ]
     for i, surface in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
-            own = np.where(surface, gain, 1.0)
-            days.append(replace(same, name=f"surface {i + 1} by {gain:.2f}", own=own))
+            surface_gains = np.where(surface, gain, 1.0)
+            days.append(
+                replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
+            )
     return days
 
 
-def drawn(surfaces: int, seeds: range) -> list[Day]:
+def random_days(n_surfaces: int, seeds: range) -> list[DayChanges]:
     """Days on which everything differs a little."""
-    return [_draw(surfaces, seed) for seed in seeds]
+    return [_draw_day(n_surfaces, seed) for seed in seeds]
 
 
-def _draw(surfaces: int, seed: int) -> Day:
+def _draw_day(n_surfaces: int, seed: int) -> DayChanges:
     rng = np.random.default_rng([20, seed])
-    return Day(
+    return DayChanges(
         name=f"drawn {seed}",
-        trim=0.015 * rng.standard_normal(surfaces),
-        neutral=0.01 * rng.standard_normal(surfaces),
-        own=np.exp(0.03 * rng.standard_normal(surfaces)),
-        gain=float(np.exp(0.1 * rng.standard_normal())),
-        late_s=float(0.02 * rng.standard_normal()),
-        excitation=float(np.exp(0.25 * rng.standard_normal())),
-        noise=float(1.0 + 0.3 * abs(rng.standard_normal())),
-        drift=float(0.006 * abs(rng.standard_normal())),
+        trim_commands=0.015 * rng.standard_normal(n_surfaces),
+        neutral_commands=0.01 * rng.standard_normal(n_surfaces),
+        surface_gains=np.exp(0.03 * rng.standard_normal(n_surfaces)),
+        common_gain=float(np.exp(0.1 * rng.standard_normal())),
+        command_delay_s=float(0.02 * rng.standard_normal()),
+        motion_scale=float(np.exp(0.25 * rng.standard_normal())),
+        noise_ratio=float(1.0 + 0.3 * abs(rng.standard_normal())),
+        trim_drift=float(0.006 * abs(rng.standard_normal())),
     )
 
 
-def on(day: Day, samples: Samples, past: Floats, noise: Floats) -> Samples:
-    """The flight as it might have been on that day. past (3 h, 3) and noise (3, 3) of its model."""
+def apply_day_changes(
+    day: DayChanges, samples: Samples, past_coefficients: Floats, noise_covariance: Floats
+) -> Samples:
+    """The flight as it might have been on that day. past_coefficients (3 h, 3) and noise_covariance (3, 3) of
+    its model."""
     rng = np.random.default_rng(20)
     effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    commands = _shifted(samples.commands, day.late_s / samples.dt_s)
-    slow = _running_mean(commands, round(_SLOW_S / samples.dt_s))
-    commands = slow + day.excitation * (commands - slow) / (day.gain * day.own)
-    wander = day.drift * _wander(rng, commands.shape, 300.0 / samples.dt_s)
-    commands = commands + day.neutral + (day.trim + wander) / effectiveness
-    mean = _running_mean(samples.rates, round(_SLOW_S / samples.dt_s))
-    rates = mean + day.excitation * (samples.rates - mean)
-    extra = np.sqrt(max(day.noise**2 - min(day.excitation, 1.0) ** 2, 0.0))
-    rates = rates + extra * _air(rng, past, noise, len(rates))
+    commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
+    trim_commands = _running_mean(commands, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
+    commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
+        day.common_gain * day.surface_gains
+    )
+    trim_wander = day.trim_drift * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    commands = commands + day.neutral_commands + (day.trim_commands + trim_wander) / effectiveness
+    trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
+    rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
+    extra_noise = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
+    rates = rates + extra_noise * _rates_under_noise(rng, past_coefficients, noise_covariance, len(rates))
     return replace(samples, commands=commands, rates=rates)
 
 
-def _shifted(values: Floats, length: float) -> Floats:
-    """Values that act `length` samples later than these: logged earlier by as much, (n, S)."""
-    at = np.arange(len(values)) + length
-    return np.column_stack([np.interp(at, np.arange(len(values)), column) for column in values.T])
+def _shift_values_earlier(values: Floats, n_samples: float) -> Floats:
+    """Values that act `n_samples` samples later than these: logged earlier by as much, (n, S)."""
+    shifted_index = np.arange(len(values)) + n_samples
+    return np.column_stack([np.interp(shifted_index, np.arange(len(values)), column) for column in values.T])
 
 
-def _running_mean(values: Floats, length: int) -> Floats:
+def _running_mean(values: Floats, window_samples: int) -> Floats:
     """Centred running mean, (n, S)."""
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(values, length, axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(values, window_samples, axis=0, mode="nearest"))
 
 
-def _wander(rng: np.random.Generator, shape: tuple[int, ...], length: float) -> Floats:
-    """Coloured noise of standard deviation 1 and correlation time `length`."""
+def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlation_samples: float) -> Floats:
+    """Coloured noise of standard deviation 1 and correlation time `correlation_samples`."""
     from scipy.signal import lfilter
 
-    keep = np.exp(-1.0 / length)
-    white = rng.standard_normal(shape) * np.sqrt(1.0 - keep**2)
-    return np.asarray(lfilter([1.0], [1.0, -keep], white, axis=0))
+    retention = np.exp(-1.0 / correlation_samples)
+    white = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
+    return np.asarray(lfilter([1.0], [1.0, -retention], white, axis=0))
 
 
-def _air(rng: np.random.Generator, past: Floats, noise: Floats, n: int) -> Floats:
-    """What white moments of the model's noise make of the rates, (n, 3)."""
-    moments = rng.standard_normal((n, 3)) @ np.linalg.cholesky(noise).T
-    history = len(past) // 3
-    rates = np.zeros((n + history, 3))
-    for k in range(n):
-        rates[k + history] = rates[k : k + history][::-1].ravel() @ past[: 3 * history] + moments[k]
-    return rates[history:]
+def _rates_under_noise(
+    rng: np.random.Generator, past_coefficients: Floats, noise_covariance: Floats, n_samples: int
+) -> Floats:
+    """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
+    moments = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
+    n_lags = len(past_coefficients) // 3
+    rates = np.zeros((n_samples + n_lags, 3))
+    for k in range(n_samples):
+        rates[k + n_lags] = rates[k : k + n_lags][::-1].ravel() @ past_coefficients[: 3 * n_lags] + moments[k]
+    return rates[n_lags:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled = [data for data in benchmark.data_sets(folder) if np.isfinite(data.flights[0].labels).any()]
+    labelled = [
+        data for data in benchmark.load_data_sets(folder) if np.isfinite(data.flights[0].labels).any()
+    ]
     if not labelled:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
-    return {"sets": [_part(data) for data in labelled]}
+    return {"sets": [_test_data_set_on_days(data) for data in labelled]}
 
 
-def _part(data: benchmark.DataSet) -> Document:
-    stretches = stretches_of(data.flights)
-    settings = benchmark.settings_of(stretches, data)
-    models = [(fit_model(fitted, data.vehicle, settings), kept) for fitted, kept, _ in folds(stretches)]
+def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
+    stretches = usable_stretches(data.flights)
+    settings = benchmark.settings_of_whole_flight(stretches, data)
+    models = [
+        (fit_model(fitted, data.vehicle, settings), kept) for fitted, kept, _ in validation_folds(stretches)
+    ]
     whole = fit_model(stretches, data.vehicle, settings)
     surfaces = len(data.vehicle.surfaces)
     kinds = {
-        "one change": grid(mixer(data.vehicle), data.vehicle.command_names),
-        "drawn, settings chosen on these": drawn(surfaces, CHOSEN_ON),
-        "drawn, not looked at": drawn(surfaces, JUDGED_ON),
+        "one change": one_change_days(mixer_matrix(data.vehicle), data.vehicle.command_columns),
+        "drawn, settings chosen on these": random_days(surfaces, TUNING_SEEDS),
+        "drawn, not looked at": random_days(surfaces, TEST_SEEDS),
     }
-    rows = [row for kind, days in kinds.items() for row in _rows(kind, days, models, whole)]
-    summaries = [_summary(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
+    rows = [row for kind, days in kinds.items() for row in _day_scores(kind, days, models, whole)]
+    summaries = [_summarize_days(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
     return {"set": data.name, "rows": rows, "summary": summaries}
 
 
-def _rows(
-    kind: str, days: Sequence[Day], models: Sequence[tuple[Model, Stretch]], whole: Model
+def _day_scores(
+    kind: str, days: Sequence[DayChanges], models: Sequence[tuple[Model, Stretch]], whole_model: Model
 ) -> Iterator[Document]:
-    past, noise = whole.arrays()[1], whole.arrays()[3]
+    past_coefficients, noise_covariance = (
+        whole_model.coefficient_arrays()[1],
+        whole_model.coefficient_arrays()[3],
+    )
     for day in days:
-        scores: dict[str, list[Document]] = {BANK: [], _BESIDE: []}
+        scores: dict[str, list[Document]] = {BANK_OF_FILTERS: [], _RIVAL_DETECTOR: []}
         for model, kept in models:
-            altered, labels = on(day, kept.samples, past, noise), benchmark.kept_labels(kept)
-            for name, found in scores.items():
-                found.append(scoring.by_labels(diagnose_with(name, altered, model), labels))
-        beside = benchmark.by_labels(scores[_BESIDE])["classes"]
-        yield {"kind": kind, "day": day.name, **benchmark.by_labels(scores[BANK]), "beside": beside}
+            altered, labels = (
+                apply_day_changes(day, kept.samples, past_coefficients, noise_covariance),
+                benchmark.labels_in_usable_span(kept),
+            )
+            for name, method_scores in scores.items():
+                method_scores.append(
+                    scoring.score_against_labels(diagnose_with(name, altered, model), labels)
+                )
+        rival_classes = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
+        yield {
+            "kind": kind,
+            "day": day.name,
+            **benchmark.summarize_labels(scores[BANK_OF_FILTERS]),
+            "beside": rival_classes,
+        }
 
 
-def _summary(kind: str, rows: Sequence[Document]) -> Document:
+def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values = {key: [row[key] for row in rows] for key in (*benchmark.FIGURES, "beside")}
+    values = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
     mean = {key: float(np.mean(of)) for key, of in values.items()}
-    return {"kind": kind, "mean": mean, "worst": {k: _WORST.get(k, min)(of) for k, of in values.items()}}
+    return {
+        "kind": kind,
+        "mean": mean,
+        "worst": {k: _WORST_OF_SCORE.get(k, min)(of) for k, of in values.items()},
+    }

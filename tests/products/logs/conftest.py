@@ -1,16 +1,25 @@
 """What the tests of recorded flights share: a synthetic vehicle, and the real flights if there are any."""
 
 import os
+import warnings
 from pathlib import Path
 
 import pytest
 
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
 REAL = "BEAVER_FTC_FLIGHTS"
+
+
+@pytest.fixture(autouse=True)
+def _no_warning_of_numpy():
+    """A mean of nothing, or a division by zero, is a mistake here: none may reach a user's screen."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -39,4 +48,4 @@ def wing(wing_folder):
 def wing_model(wing, wing_folder):
     flown = synthetic.fly(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)
     path = synthetic.write_csv(wing_folder / "training.csv", flown)
-    return identify(load_flights([path], wing), wing)
+    return identify(load_flights_for_fit([path], wing), wing)

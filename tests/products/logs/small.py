@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from beaver_ftc_logs.diagnose import Rows
+from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Event
-from beaver_ftc_logs.regression import groups_of
-from beaver_ftc_logs.samples import Samples, mixer
+from beaver_ftc_logs.recording import LoggedFailure
+from beaver_ftc_logs.regression import group_surfaces
+from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 
 RATES = {"p": "p_rad_s", "q": "q_rad_s", "r": "r_rad_s"}
@@ -19,6 +19,10 @@ TAIL = {
     "name": "tail", "rates": RATES, "commands": ["roll", "pitch"], "signals": ["airspeed_m_s"],
     "surfaces": {"left_aileron": {"roll": 1.0}, "elevator": {"pitch": 0.8}, "right_aileron": {"roll": 0.5}},
     "outputs": {"left_aileron": "left_output", "elevator": "elevator_output"}, "faults": ["loss", "stuck"],
+}  # fmt: skip
+FIELD_OF_KEPT = {
+    "estimate": "effectiveness", "low": "effectiveness_low", "high": "effectiveness_high",
+    "probability": "fault_probability",
 }  # fmt: skip
 RESPONSE = np.array(
     [
@@ -35,7 +39,7 @@ def vehicle(of=WING, **changes):
 def model(of=WING, settings=None, history=2, lags=3, **changes):
     """A model whose coefficients differ in everything. of: its vehicle file."""
     its = vehicle(of)
-    groups = groups_of(its)
+    groups = group_surfaces(its)
     names = list(its.surfaces)
     further = [(-1) ** j * 0.2 * np.eye(3) - 0.01 for j in range(1, history)]
     past = np.vstack([np.diag([0.5, 0.6, 0.7]) + 0.02, *further])
@@ -57,7 +61,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     rng = np.random.default_rng(seed)
     its, step = model.vehicle, 1.0 / model.rate_hz
     commands = 0.3 * np.sin(np.outer(np.arange(n), [0.31, 0.47])) + 0.1 * rng.standard_normal((n, 2)) + 0.1
-    surfaces = commands @ mixer(its).T
+    surfaces = commands @ mixer_matrix(its).T
     signals = 20.0 + np.sin(0.1 * np.arange(n))[:, None] * np.ones(len(its.signals))
     labels = np.ones((n, len(its.surfaces)))
     for surface, begin, end, left in lost:
@@ -78,7 +82,8 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     labels = labels if its.labels else np.full_like(labels, np.nan)
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
-        "run": run, "dt_s": step, "age_s": {}, "events": (), "stamps": t_s,
+        "stretch_number": run, "dt_s": step, "held_column_age_s": {}, "logged_failures": (),
+        "log_stamps_s": t_s,
     }  # fmt: skip
     return Samples(**(given | changes))
 
@@ -90,7 +95,11 @@ def rows(parts, surfaces=2, step_s=0.5):
     faulty = np.array([int(bool(name)) for name in named], dtype=np.int64)
     t_s = 10.0 + step_s * np.arange(len(named))
     probability = np.where(faulty, 0.9, 0.1) + 0.001 * np.arange(len(named))
-    return Rows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
+    return DiagnosisRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
 
 
-FAILURE = (Event(12.0, "left_aileron"), Event(13.9, "elevator"), Event(14.1, "rudder"))
+FAILURE = (
+    LoggedFailure(12.0, "left_aileron"),
+    LoggedFailure(13.9, "elevator"),
+    LoggedFailure(14.1, "rudder"),
+)

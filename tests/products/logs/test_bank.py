@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.bank import GROUP, HEALTHY, IDLE, PAIR, UNKNOWN, adaptation_of, bank_of, noise_of
+from beaver_ftc_logs.bank import (
+    GROUP_LOSS,
+    HEALTHY,
+    NO_RESPONSE,
+    PAIR_LOSS,
+    UNKNOWN_OFFSET,
+    build_adaptation_limits,
+    build_hypothesis_bank,
+    build_residual_noise,
+)
 from products.logs import small
 
 SETTINGS = {
@@ -23,42 +32,53 @@ MODELS = {
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_hypotheses_of_a_model(changed, name):
-    assert not changed(bank_of(MODELS[name])._asdict())
+    assert not changed(build_hypothesis_bank(MODELS[name])._asdict())
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_what_may_differ_from_a_model(changed, name):
     model = MODELS[name]
-    assert not changed({"adaptation": adaptation_of(model)._asdict(), "noise": noise_of(model)._asdict()})
+    assert not changed(
+        {
+            "adaptation": build_adaptation_limits(model)._asdict(),
+            "noise": build_residual_noise(model)._asdict(),
+        }
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_shares_are_those_of_the_settings(name):
     """Of changes a fifth restores health, and the others are all the rest; a flight begins healthy at 0.7."""
     model = MODELS[name]
-    bank = bank_of(model)
-    assert bank.weight[0] == 0.2
-    assert bank.weight.sum() == pytest.approx(1.0)
-    assert (bank.start[0], bank.start[-1], bank.start.sum()) == (0.7, 0.2, pytest.approx(1.0))
-    assert bank.change == pytest.approx(9.0 / 36000.0)
-    assert bank.idle == len(bank.kind) - 1
-    assert bank.kind[[0, -1]].tolist() == [HEALTHY, IDLE]
-    assert bank.faults.tolist() == [kind in (GROUP, PAIR) for kind in bank.kind]
+    bank = build_hypothesis_bank(model)
+    assert bank.change_share[0] == 0.2
+    assert bank.change_share.sum() == pytest.approx(1.0)
+    assert (bank.prior_probability[0], bank.prior_probability[-1], bank.prior_probability.sum()) == (
+        0.7,
+        0.2,
+        pytest.approx(1.0),
+    )
+    assert bank.change_probability == pytest.approx(9.0 / 36000.0)
+    assert bank.no_response_index == len(bank.hypothesis_kind) - 1
+    assert bank.hypothesis_kind[[0, -1]].tolist() == [HEALTHY, NO_RESPONSE]
+    assert bank.is_fault.tolist() == [kind in (GROUP_LOSS, PAIR_LOSS) for kind in bank.hypothesis_kind]
     lost = (bank.effectiveness < 1.0).sum(axis=1)
-    assert {kind: set(lost[bank.kind == kind]) for kind in (HEALTHY, GROUP, UNKNOWN)} == {
+    assert {
+        kind: set(lost[bank.hypothesis_kind == kind]) for kind in (HEALTHY, GROUP_LOSS, UNKNOWN_OFFSET)
+    } == {
         HEALTHY: {0},
-        GROUP: {1},
-        UNKNOWN: {0} if UNKNOWN in bank.kind else set(),
+        GROUP_LOSS: {1},
+        UNKNOWN_OFFSET: {0} if UNKNOWN_OFFSET in bank.hypothesis_kind else set(),
     }
     for group in range(len(model.groups)):
         expected = [left < 1.0 for left in bank.effectiveness[:-1, group]]
-        assert bank.faulty(group).tolist() == [*expected, False]
+        assert bank.is_fault_of(group).tolist() == [*expected, False]
 
 
 def test_levels_seen_carry_their_share_of_a_groups_faults():
-    bank = bank_of(MODELS["two groups, levels seen of one"])
-    left = (bank.kind == GROUP) & (bank.effectiveness[:, 1] < 1.0)
-    weight = dict(zip(bank.effectiveness[left, 1].tolist(), bank.weight[left], strict=True))
+    bank = build_hypothesis_bank(MODELS["two groups, levels seen of one"])
+    left = (bank.hypothesis_kind == GROUP_LOSS) & (bank.effectiveness[:, 1] < 1.0)
+    weight = dict(zip(bank.effectiveness[left, 1].tolist(), bank.change_share[left], strict=True))
     assert sorted(weight) == [0.0, 0.25, 0.4, 0.5, 0.75]
     assert weight[0.4] / sum(weight.values()) == pytest.approx(0.7)
     assert len({round(share, 12) for level, share in weight.items() if level != 0.4}) == 1
@@ -67,21 +87,25 @@ def test_levels_seen_carry_their_share_of_a_groups_faults():
 def test_a_stuck_surface_offsets_the_axes_it_moves_most():
     """0.3 to 1 of 1.7 residual sd, by the sum of its responses; a loss brings none."""
     model = MODELS["slaved, may be stuck"]
-    bank = bank_of(model)
+    bank = build_hypothesis_bank(model)
     noise = np.diag(model.noise)
     moved = np.abs(np.array(model.response)).sum(axis=1) / np.sqrt(noise)
     for group in range(2):
-        mine = (bank.kind == GROUP) & (bank.effectiveness[:, group] < 1.0)
-        found = np.unique(bank.offset[mine], axis=0)
+        mine = (bank.hypothesis_kind == GROUP_LOSS) & (bank.effectiveness[:, group] < 1.0)
+        found = np.unique(bank.rate_offset_variance[mine], axis=0)
         share = np.clip(moved[group] / moved[group].max(), 0.3, 1.0)
         np.testing.assert_allclose(found, [[0.0] * 3, noise * (1.7 * share) ** 2], rtol=1e-12)
-    np.testing.assert_allclose(bank.offset[bank.kind == UNKNOWN], [noise * 1.7**2], rtol=1e-12)
+    np.testing.assert_allclose(
+        bank.rate_offset_variance[bank.hypothesis_kind == UNKNOWN_OFFSET], [noise * 1.7**2], rtol=1e-12
+    )
 
 
 def test_a_group_of_which_nothing_is_said_has_no_hypothesis():
     told = {"commands": [], "rates": [], "tied": [1.0, 0.2]}
-    bank = bank_of(small.model(settings=SETTINGS, fitted=told))
+    bank = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told))
     assert (bank.effectiveness[:-1, 0] == 1.0).all()
-    assert bank.weight.sum() == pytest.approx(1.0)
-    nothing = bank_of(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
-    assert len(nothing.weight) == len(bank_of(small.model(settings=SETTINGS)).weight)
+    assert bank.change_share.sum() == pytest.approx(1.0)
+    nothing = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
+    assert len(nothing.change_share) == len(
+        build_hypothesis_bank(small.model(settings=SETTINGS)).change_share
+    )

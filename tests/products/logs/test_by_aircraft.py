@@ -16,13 +16,13 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDINGS, write_recording
 from beaver_ftc_logs import by_aircraft, stepped
-from beaver_ftc_logs.by_aircraft import diagnose_as, known
-from beaver_ftc_logs.recording import Column, Recording
-from beaver_ftc_logs.samples import read_for
+from beaver_ftc_logs.by_aircraft import diagnose_by_aircraft, load_aircraft
+from beaver_ftc_logs.recording import Column, RecordedFlight
+from beaver_ftc_logs.samples import read_for_vehicle
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
-BEAVER = known("beaver")
+BEAVER = load_aircraft("beaver")
 
 
 @pytest.fixture(scope="module")
@@ -45,20 +45,20 @@ def exported(folder, kind, to):
 def log(flown, tmp_path_factory):
     """A table of the flight, and what its vehicle file says."""
     path, vehicle = exported(flown[0], "table", tmp_path_factory.mktemp("log"))
-    return read_for(path, vehicle), vehicle
+    return read_for_vehicle(path, vehicle), vehicle
 
 
-def changed(recording, **columns):
+def changed(recording, **functions):
     """The recording with some columns as functions of their values."""
-    known = dict(recording.columns)
-    for name, of in columns.items():
-        known[name] = Column(known[name].t_s, of(known[name].values))
-    return Recording(recording.name, known)
+    columns = dict(recording.columns)
+    for name, of in functions.items():
+        columns[name] = Column(columns[name].t_s, of(columns[name].values))
+    return RecordedFlight(recording.name, columns)
 
 
 def only(recording, rows):
     columns = {name: Column(one.t_s[rows], one.values[rows]) for name, one in recording.columns.items()}
-    return Recording(recording.name, columns)
+    return RecordedFlight(recording.name, columns)
 
 
 @pytest.mark.parametrize("kind", RECORDINGS)
@@ -66,7 +66,7 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     path, vehicle = exported(flown[0], kind, tmp_path)
-    _, rows, verdict = diagnose_as(read_for(path, vehicle), vehicle, BEAVER)
+    _, rows, verdict = diagnose_by_aircraft(read_for_vehicle(path, vehicle), vehicle, BEAVER)
     flight = flown[1]
     assert verdict["detection_s"] == pytest.approx(flight.detection.time_s, abs=1e-9)
     assert verdict["isolation_s"] == pytest.approx(flight.isolation.time_s, abs=1e-9)
@@ -77,21 +77,28 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
 
 def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):
     recording, vehicle = log
-    _, rows, _ = diagnose_as(recording, vehicle, BEAVER)
+    _, rows, _ = diagnose_by_aircraft(recording, vehicle, BEAVER)
     truth = np.ones((len(rows.t_s), 4))
     truth[rows.t_s >= 6.0 - 1e-9, 1] = 0.6
-    held = (rows.low <= truth) & (truth <= rows.high)
+    held = (rows.effectiveness_low <= truth) & (truth <= rows.effectiveness_high)
     wrong = rows.t_s[~held.all(axis=1)]
-    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.STANDS_S)).all()
+    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.EXCLUSION_MEMORY_S)).all()
     later = rows.t_s > 7.0
-    assert np.median((rows.high - rows.low)[later, 1]) < 0.1
+    assert np.median((rows.effectiveness_high - rows.effectiveness_low)[later, 1]) < 0.1
 
 
 def test_a_flight_cut_short_says_the_same_up_to_the_cut(log):
     recording, vehicle = log
-    _, whole, _ = diagnose_as(recording, vehicle, BEAVER)
-    _, cut, _ = diagnose_as(only(recording, slice(0, 700)), vehicle, BEAVER)
-    for name in ("faulty", "named", "estimate", "low", "high", "credible"):
+    _, whole, _ = diagnose_by_aircraft(recording, vehicle, BEAVER)
+    _, cut, _ = diagnose_by_aircraft(only(recording, slice(0, 700)), vehicle, BEAVER)
+    for name in (
+        "faulty",
+        "named_surfaces",
+        "effectiveness",
+        "effectiveness_low",
+        "effectiveness_high",
+        "credible",
+    ):
         np.testing.assert_array_equal(getattr(whole, name)[:700], getattr(cut, name), err_msg=name)
 
 
@@ -99,10 +106,12 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
     recording, vehicle = log
     rows = np.r_[0:300, 330:900]
     holed = changed(only(recording, rows), p_rad_s=lambda p: np.where(np.arange(len(p)) == 100, np.nan, p))
-    _, found, verdict = diagnose_as(holed, vehicle, BEAVER)
+    _, found, verdict = diagnose_by_aircraft(holed, vehicle, BEAVER)
     assert found.credible[100] == 0
     assert (found.credible == 0).sum() == 1
-    assert (found.low[[100, 101, 300]] == 0.0).all()  # a frame has to end before anything is known
+    assert (
+        found.effectiveness_low[[100, 101, 300]] == 0.0
+    ).all()  # a frame has to end before anything is known
     assert [one["says"] for one in verdict["credible"]["reasons"]] == ["a number is missing"]
     assert verdict["isolated"] == "elevator"
 
@@ -110,7 +119,7 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
 def test_outside_the_envelope_nothing_is_said(log):
     recording, vehicle = log
     fast = changed(recording, airspeed_mps=lambda v: 2.0 * v, qdyn_pa=lambda q: 4.0 * q)
-    _, rows, verdict = diagnose_as(fast, vehicle, BEAVER)
+    _, rows, verdict = diagnose_by_aircraft(fast, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert rows.credible.mean() < 0.02
     assert verdict["detection_s"] is None
@@ -122,7 +131,7 @@ def test_a_log_of_another_aircraft_is_not_credible(log):
     recording, vehicle = log
     turned = changed(recording, **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), lambda rate: 2.0 * rate))
     vehicle = vehicle.model_copy(update={"attitude": None})
-    _, rows, verdict = diagnose_as(turned, vehicle, BEAVER)
+    _, rows, verdict = diagnose_by_aircraft(turned, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
 
@@ -135,10 +144,10 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     rng = np.random.default_rng(6)
     expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
     innovation = np.einsum("nas,s->na", expected, theta) + np.array([0.5, 0.0, -0.2]) + noise
-    found = stepped._gains(innovation, expected)
+    found = stepped._max_command_gains(innovation, expected)
     assert np.all(found > gain)
     assert found == pytest.approx(gain, abs=0.05)
-    assert (stepped._gains(innovation[:200], expected[:200]) == 1.0).all()
+    assert (stepped._max_command_gains(innovation[:200], expected[:200]) == 1.0).all()
 
 
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
@@ -146,14 +155,14 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     scenario = bf.load({"name": "swung", "duration_s": 8.0, "reference": dict.fromkeys("pqr", sine)})
     bf.fly(scenario).save(tmp_path, report=False)
     path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
-    recording = read_for(path, vehicle)
+    recording = read_for_vehicle(path, vehicle)
     turned = changed(recording, rudder_command=np.negative)
-    assert diagnose_as(recording, vehicle, BEAVER)[2]["faulty"] is False
+    assert diagnose_by_aircraft(recording, vehicle, BEAVER)[2]["faulty"] is False
     with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
-        diagnose_as(turned, vehicle, BEAVER)
+        diagnose_by_aircraft(turned, vehicle, BEAVER)
     (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
-    moving = known("beaver", str(tmp_path / "moving.yaml"))
-    assert diagnose_as(turned, vehicle, moving)[2]["faulty"] in (False, True)
+    moving = load_aircraft("beaver", str(tmp_path / "moving.yaml"))
+    assert diagnose_by_aircraft(turned, vehicle, moving)[2]["faulty"] in (False, True)
 
 
 def without(vehicle, **keys):
@@ -175,17 +184,17 @@ def test_what_a_log_lacks_is_said(log, keys, factors, says):
     recording, vehicle = log
     scaled = {name: (lambda values, by=by: values * by) for name, by in factors.items()}
     with pytest.raises(BadInput, match=says):
-        diagnose_as(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
+        diagnose_by_aircraft(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
 
 
 @pytest.mark.parametrize(("rate_hz", "taken"), [(20.0, True), (19.98, False), (1e3, True), (1001.0, False)])
 def test_rates_that_an_aircraft_s_model_takes(rate_hz, taken):
     samples = SimpleNamespace(name="log", t_s=np.arange(500) / rate_hz, dt_s=1.0 / rate_hz)
     if taken:
-        assert by_aircraft._rate_hz(samples) == rate_hz
+        assert by_aircraft._log_rate_hz(samples) == rate_hz
     else:
         with pytest.raises(BadInput, match=f"log: is logged at {rate_hz:g} Hz, allowed: .* 20 to 1000 Hz"):
-            by_aircraft._rate_hz(samples)
+            by_aircraft._log_rate_hz(samples)
 
 
 def test_a_log_too_slow_or_uneven_is_refused(log):
@@ -193,26 +202,26 @@ def test_a_log_too_slow_or_uneven_is_refused(log):
     with pytest.raises(
         BadInput, match="is logged at 10 Hz, allowed: an aircraft's model takes 20 to 1000 Hz"
     ):
-        diagnose_as(only(recording, slice(0, None, 10)), vehicle, BEAVER)
+        diagnose_by_aircraft(only(recording, slice(0, None, 10)), vehicle, BEAVER)
     rng = np.random.default_rng(3)
     uneven = only(recording, np.flatnonzero(rng.uniform(size=900) < 0.7))
     with pytest.raises(BadInput, match="no 50 samples in turn, evenly spaced"):
-        diagnose_as(uneven, vehicle, BEAVER)
+        diagnose_by_aircraft(uneven, vehicle, BEAVER)
 
 
 def test_turbulence_wants_the_attitude(log, tmp_path):
     recording, vehicle = log
     (tmp_path / "rough.yaml").write_text("name: rough\nfdi: {bounds: {turbulence: light}}\n")
-    rough = known("beaver", str(tmp_path / "rough.yaml"))
+    rough = load_aircraft("beaver", str(tmp_path / "rough.yaml"))
     level = without(vehicle, attitude={"roll": "roll_rad", "pitch": "pitch_rad"})
     with pytest.raises(BadInput, match=r"attitude.yaw: is missing, allowed: its column, where fdi.bounds"):
-        diagnose_as(recording, level, rough)
+        diagnose_by_aircraft(recording, level, rough)
 
 
 def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch):
     elsewhere = bf.load("fault-free").model_copy(update={"aircraft": "./elsewhere"})
     monkeypatch.setattr("beaver_ftc.scenario.load_scenario", lambda given: elsewhere)
-    assert known("beaver", "any").aircraft.name == "beaver"
+    assert load_aircraft("beaver", "any").aircraft.name == "beaver"
 
 
 @pytest.mark.parametrize(
@@ -225,7 +234,7 @@ def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch)
 def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
     (tmp_path / "other.yaml").write_text(f"name: other\n{text}")
     with pytest.raises(BadInput, match=says):
-        known("beaver", str(tmp_path / "other.yaml"))
+        load_aircraft("beaver", str(tmp_path / "other.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -234,6 +243,9 @@ def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
         (["--aircraft", "beavr"], "--aircraft: 'beavr'"),
         (["--aircraft", "beaver", "--model", "m.json"], "--model and --aircraft: allowed: one of them"),
         (["--scenario", "fault-free"], "--scenario fault-free: allowed: only with --aircraft NAME"),
+        (["--score"], "--score: allowed: only with --model MODEL or --aircraft NAME"),
+        (["--detector", "x"], "--detector: allowed: only with --model MODEL"),
+        (["--reader", "ulog"], "--reader: allowed: only with --model MODEL"),
         (["--aircraft", "beaver", "--detector", "x"], "--aircraft with --detector x: allowed: none"),
         (["--aircraft", "beaver"], "no vehicle.yaml beside it, allowed: --vehicle FILE"),
     ],
@@ -274,23 +286,23 @@ def test_a_loss_explains_what_it_does_within_the_bound(theta, slopes, off):
     bound = np.abs(off)
     expected = np.array(slopes)[None, :, None]
     innovation = (theta * expected[0, :, 0] + 0.999 * np.array(off))[None, :, None]
-    least, greatest = stepped._explaining(innovation, bound[None, :, None], expected)
+    least, greatest = stepped._bounds_of_explaining_losses(innovation, bound[None, :, None], expected)
     assert least[0, 0] <= theta <= greatest[0, 0]
 
 
 def test_a_loss_that_explains_nothing_has_no_place():
     expected = np.array([1.0, 0.0, 0.0])[None, :, None]
     innovation = np.array([0.5, 0.0, 0.0])[None, :, None]
-    least, greatest = stepped._explaining(innovation, np.full((1, 3, 1), 0.1), expected)
+    least, greatest = stepped._bounds_of_explaining_losses(innovation, np.full((1, 3, 1), 0.1), expected)
     assert least[0, 0] > greatest[0, 0]  # a loss cannot add to what is commanded
     unmoved = np.array([-0.5, 0.3, 0.0])[None, :, None]
-    least, greatest = stepped._explaining(unmoved, np.full((1, 3, 1), 0.1), expected)
+    least, greatest = stepped._bounds_of_explaining_losses(unmoved, np.full((1, 3, 1), 0.1), expected)
     assert least[0, 0] > greatest[0, 0]  # nor move another axis
 
 
 @given(st.lists(st.floats(-1, 1), min_size=1, max_size=30), st.integers(1, 12))
 def test_the_latest_greatest_looks_back_only(values, reach):
-    found = stepped._latest(np.array(values)[:, None], reach)[:, 0]
+    found = stepped._sliding_maximum(np.array(values)[:, None], reach)[:, 0]
     assert found.tolist() == [max(values[max(0, k - reach + 1) : k + 1]) for k in range(len(values))]
 
 
@@ -310,14 +322,14 @@ def test_a_stretch_has_fifty_even_samples_that_are_all_known():
     steps = np.full(150, 0.05)
     steps[[100, 120]] *= 1.2, 1.05
     unknown = np.arange(150) == 50
-    found = by_aircraft._stretches(SimpleNamespace(t_s=np.cumsum(steps)), unknown, 20.0)
+    found = by_aircraft._gap_free_stretches(SimpleNamespace(t_s=np.cumsum(steps)), unknown, 20.0)
     assert found == [(0, 50), (100, 150)]
 
 
 def test_what_is_at_a_limit_of_the_envelope_is_inside():
     airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
     signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
-    found = by_aircraft._outside(signals, PLANE, np.arange(6) == 5, [(1, 5)])
+    found = by_aircraft._rows_outside_envelope(signals, PLANE, np.arange(6) == 5, [(1, 5)])
     assert {says: true(mask) for says, mask in found.items()} == {
         "a number is missing": [5], "samples are not evenly spaced": [0],
         "airspeed is outside 20 to 50 m/s": [0, 3],
@@ -332,7 +344,9 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
         verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
     verdicts[5] = by_aircraft.Verdict(True)
     given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._misled(np.arange(10) * 0.5, [(1, 5), (5, 10)], given).items()
+    ((says, mask),) = by_aircraft._rows_unexplained_from_start(
+        np.arange(10) * 0.5, [(1, 5), (5, 10)], given
+    ).items()
     assert (says.partition(":")[0], true(mask)) == (
         "no fault explains it from the first second on", [5, 6, 7, 8, 9],
     )  # fmt: skip
@@ -341,20 +355,22 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
 def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
     rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
     reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
-    found = by_aircraft._since([(0, 4), (4, 8)], rows, reasons)
+    found = by_aircraft._add_doubtful_alarm_reason([(0, 4), (4, 8)], rows, reasons)
     says = "the alarm was raised where nothing can be said"
     assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
 
 
 def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credible():
     low = np.array([[0.9, 0.0], [0.8, 0.5], [0.6, 0.0], [0.1, 0.9], [0.1, 0.9]])
-    rows = SimpleNamespace(faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), low=low)
-    assert by_aircraft._separable(rows, ["right", "left"]) == [
+    rows = SimpleNamespace(
+        faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), effectiveness_low=low
+    )
+    assert by_aircraft._excluded_loss_lines(rows, ["right", "left"]) == [
         "right: a loss of more than 20 % shows within a second in half of the flight.",
         "left: in half of the flight not even a complete loss would show within a second.",
     ]
     rows.credible = np.array([0, 0, 0, 1, 0])
-    assert by_aircraft._separable(rows, ["right", "left"]) == []
+    assert by_aircraft._excluded_loss_lines(rows, ["right", "left"]) == []
 
 
 @pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [
@@ -372,19 +388,28 @@ def test_flow_and_commands_in_another_unit_are_refused(alpha, beta, density, com
     )
     commands = np.array([[0.0], [np.nan], [command], [0.0], [0.0], [0.0]])
     if says is None:
-        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+        by_aircraft._check_units_plausible("log", [np.empty(0), signals, commands], PLANE)
         return
     with pytest.raises(BadInput, match=f"^log: .*{says}"):
-        by_aircraft._plausible("log", [np.empty(0), signals, commands], PLANE)
+        by_aircraft._check_units_plausible("log", [np.empty(0), signals, commands], PLANE)
+
+
+def test_a_column_without_a_number_is_no_warning_of_numpy():
+    """Without an angle nothing is said of its unit; a density of no number is none that is allowed."""
+    signals = np.column_stack([np.full((4, 2), np.nan), np.full(4, 40.0), np.full(4, 0.5 * 1.2 * 40.0**2)])
+    by_aircraft._check_units_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
+    signals[:, 3] = np.nan
+    with pytest.raises(BadInput, match=r"^log: .*a density of nan kg/m3"):
+        by_aircraft._check_units_plausible("log", [np.empty(0), signals, np.zeros((4, 1))], PLANE)
 
 
 def test_stretches_make_one_flight():
-    one = stepped.Stepped([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
-    other = stepped.Stepped([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
-    found = by_aircraft._whole(5, 2, [(1, 3), (4, 5)], [one, other])
+    one = stepped.ReplayedVerdicts([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
+    other = stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
+    found = by_aircraft._join_stretch_diagnoses(5, 2, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
-    assert (found.low[:, 1].tolist(), found.high[:, 0].tolist()) == (
+    assert (found.effectiveness_low[:, 1].tolist(), found.effectiveness_high[:, 0].tolist()) == (
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
-    assert found.gains.tolist() == [0.5, 0.4]
+    assert found.max_command_gains.tolist() == [0.5, 0.4]

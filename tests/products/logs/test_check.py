@@ -1,7 +1,6 @@
 """`identify --check`, tables as people write them, and mis-scaled logs, through the command."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -10,9 +9,9 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import check, physics
-from beaver_ftc_logs.check import _angle_unit
+from beaver_ftc_logs.check import _guess_angle_unit
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.recording import Column, Recording
+from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.units import nearest_unit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import limited, synthetic
@@ -59,7 +58,7 @@ def test_a_strangers_log_is_told_and_gets_a_vehicle_file(tmp_path):
     vehicle = load_vehicle(out)
     assert (vehicle.time.column, vehicle.time.unit) == ("TimeUS", "us")
     assert vehicle.rates.p.unit == "deg/s"
-    assert vehicle.command_names == ["roll_cmd", "pitch_cmd"]
+    assert vehicle.command_columns == ["roll_cmd", "pitch_cmd"]
     again = json.loads(run("identify", "--check", path, "--vehicle", out, "--format", "json").stdout)
     assert again["logs"][0]["usable"]
     assert again["vehicle"] is None
@@ -123,24 +122,6 @@ def test_a_log_without_rates_names_what_it_has(tmp_path):
     done = run("identify", "--check", path)
     assert done.exit_code == 2
     assert "no column looks like the rate p" in done.stdout
-
-
-@pytest.mark.parametrize(("names", "factor", "says"), [
-    (("p_rad_s", "q_rad_s", "r_rad_s"), 57.29578, r"p_rad_s is in deg/s, a factor of 0\.01745 fits"),
-    (("roll_rad",), -1.0, "one of them has the other sign"), ((), 1.0, None),
-])  # fmt: skip
-def test_a_short_log_in_another_unit_is_said(tmp_path, names, factor, says):
-    """15 s. The factor is that of the file."""
-    path = logged(tmp_path / "short.csv", factors=dict.fromkeys(names, factor))
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join(lines[:302]) + "\n")
-    (tmp_path / "v.yaml").write_text(
-        "name: k\nrates: {p: p_rad_s, q: q_rad_s, r: r_rad_s}\ncommands: [roll_cmd]\n"
-        "surfaces: {a: {roll_cmd: 1}}\nattitude: {roll: roll_rad, pitch: pitch_rad}\n"
-    )
-    done = run("identify", "--check", path, "--vehicle", tmp_path / "v.yaml")
-    assert done.exit_code == (2 if says else 0)
-    assert re.search(says or "they agree", done.stdout.replace("\n", " "))
 
 
 def test_identify_without_check_wants_vehicle_and_out(tmp_path):
@@ -224,14 +205,14 @@ def test_columns_of_a_vehicle_have_units_scale_and_offset(tmp_path):
         "commands: [{column: pwm, scale: 0.0025, offset: -3.75}, {column: share, unit: '%'}]\n"
         "surfaces: {a: {pwm: 1}, e: {share: 1}}\n"
     )
-    from beaver_ftc_logs.samples import load_flights
+    from beaver_ftc_logs.samples import load_flights_for_fit
 
     n = 200
     rng = np.random.default_rng(1)
     spread = {"gx": 30.0, "gy": 1.0, "gz": 1.0, "pwm": 50.0, "share": 20.0}
     columns = {name: rng.normal(0.0, sd, n) for name, sd in spread.items()}
     columns = {"ms": np.arange(n) * 100.0, **columns, "pwm": 1500.0 + columns["pwm"]}
-    (samples,) = load_flights(
+    (samples,) = load_flights_for_fit(
         [synthetic.write_csv(tmp_path / "a.csv", columns)], load_vehicle(tmp_path / "v.yaml")
     )
     assert samples.dt_s == pytest.approx(0.1)
@@ -301,7 +282,7 @@ def test_a_path_that_cannot_be_checked_is_a_line(tmp_path):
     ("roll", "table", 3.0, "rad"),
 ])  # fmt: skip
 def test_the_unit_of_a_small_roll_angle_is_told_by_its_log_or_name(name, kind, size, unit):
-    assert _angle_unit(name, Column(T_S, size * np.sin(T_S)), kind) == unit
+    assert _guess_angle_unit(name, Column(T_S, size * np.sin(T_S)), kind) == unit
 
 
 def test_angles_and_rates_scaled_alike_are_found_by_the_pitch_angle():
@@ -309,10 +290,10 @@ def test_angles_and_rates_scaled_alike_are_found_by_the_pitch_angle():
     t_s = np.arange(200) * 0.05
     for factor, unit in ((180.0 / np.pi, "deg"), (18000.0 / np.pi, "cdeg")):
         pitch = Column(t_s, factor * 0.2 * np.sin(t_s))
-        says = physics.pitch_remark(pitch, "theta")
+        says = physics.pitch_angle_unit_remark(pitch, "theta")
         assert says is not None
         assert f"it is in {unit}, a factor of {1.0 / factor:.4g} fits" in says
-    assert physics.pitch_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None
+    assert physics.pitch_angle_unit_remark(Column(t_s, 1.6 * np.sin(t_s)), "theta") is None
 
 
 def held(value, n=60):
@@ -325,7 +306,7 @@ def held(value, n=60):
 ])  # fmt: skip
 def test_the_unit_of_rates_is_told_by_the_first_name_or_the_largest_of_all(name, size, unit):
     columns = {name: held(0.1), "wy": held(size), "wz": held(0.2)}
-    assert check._rate_unit(Recording("log", columns), list(columns), held(0.3), 1.0) == unit
+    assert check._guess_rate_unit(RecordedFlight("log", columns), list(columns), held(0.3), 1.0) == unit
 
 
 @pytest.mark.parametrize(("values", "found"), [
@@ -334,7 +315,7 @@ def test_the_unit_of_rates_is_told_by_the_first_name_or_the_largest_of_all(name,
     ([-10.1, 3.0], {"column": "u", "unit": "%"}), ([105.0], {"column": "u", "unit": "%"}), ([105.1], "u"),
 ])  # fmt: skip
 def test_commands_are_pulses_per_cent_or_shares(values, found):
-    assert check._command("u", np.array(values, dtype=float)) == found
+    assert check._vehicle_file_command("u", np.array(values, dtype=float)) == found
 
 
 def test_names_as_the_patterns_have_them():
@@ -342,25 +323,28 @@ def test_names_as_the_patterns_have_them():
         " Roll Rate [deg/s] ": "roll_rate_deg_s", "gyro_rad[0]": "gyro_rad[0]", "Time (ms)": "time_ms",
         "a / b": "a_b",
     }  # fmt: skip
-    assert {name: check._spelled(name) for name in spelled} == spelled
+    assert {name: check._normalized_name(name) for name in spelled} == spelled
     plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
-    assert {name: check._plain(name) for name in plain} == plain
+    assert {name: check._as_vehicle_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
-    assert check._first(check._NAMES["p"], rates) == "GyrX"
-    assert check._first(check._NAMES["p"], ["zyro_x", "xgyro_x", "agyro_x"]) == "agyro_x"
-    assert check._first(check._NAMES["r"], rates) is None
+    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], rates) == "GyrX"
+    assert (
+        check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"])
+        == "agyro_x"
+    )
+    assert check._matching_column(check._COLUMN_NAME_PATTERNS["r"], rates) is None
     commands = ["Aileron", "rudder_position", "da", "servo1", "elevator_truth", "elevon_error", "roll"]
-    assert check._commands(commands, {"p": "da"}) == ["Aileron", "servo1"]
-    assert len(check._commands([f"servo{k}" for k in range(9)], {})) == 8
+    assert check._command_columns(commands, {"p": "da"}) == ["Aileron", "servo1"]
+    assert len(check._command_columns([f"servo{k}" for k in range(9)], {})) == 8
     wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
-    assert check._candidates(wide) == ["p", *(f"servo{k}" for k in range(59))]
+    assert check._candidate_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]
 
 
 @pytest.mark.parametrize(("correlation", "says"), [
     (0.7, "tell nothing of one another"), (0.71, "agree"), (-0.71, "agree"), (-0.7, "tell nothing"),
 ])  # fmt: skip
 def test_rate_and_angle_agree_from_seven_tenths_on(correlation, says):
-    said = check._agreement(physics.Followed(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
+    said = check._angle_rate_line(physics.AngleRateFit(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
     told = f"the change of roll is 1.250 times the integral of p (correlation {correlation:.2f}): they {says}"
     assert said.startswith(told)
 
@@ -378,9 +362,9 @@ def test_time_is_the_column_whose_steps_fit_a_log(tmp_path, text, found, lines):
     path.write_text(text)
     if found is None:
         with pytest.raises(BadInput, match=r"no column of time, allowed: a table with t_s in seconds"):
-            check._time(path, said)
+            check._find_time_column(path, said)
         return
-    assert (check._time(path, said), said) == (found, lines)
+    assert (check._find_time_column(path, said), said) == (found, lines)
 
 
 @pytest.mark.parametrize(("down", "acceleration"), [
@@ -391,7 +375,7 @@ def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
     of = {
         "wx": 0.1, "wy": 20.0, "wz": 0.3, "roll_deg": 3.0, "pitch": 2.0, "az": down, "V": 20.0, "u 1": 0.4,
     }  # fmt: skip
-    log = Recording("log", {name: held(value) for name, value in of.items()})
+    log = RecordedFlight("log", {name: held(value) for name, value in of.items()})
     found = {
         "p": "wx",
         "q": "wy",
@@ -402,7 +386,7 @@ def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
         "airspeed": "V",
     }
     known = {} if acceleration is None else {"acceleration": acceleration}
-    assert check._proposed("my log", log, "table", ("time_ms", "ms"), found, ["u 1"]) == {
+    assert check._propose_vehicle("my log", log, "table", ("time_ms", "ms"), found, ["u 1"]) == {
         "name": "my_log", "reader": "table", "time": {"column": "time_ms", "unit": "ms"},
         "rates": {axis: {"column": found[axis], "unit": "deg/s"} for axis in "pqr"},
         "commands": ["u 1"], "surfaces": {"u_1": {"u 1": 1.0}},
@@ -410,7 +394,7 @@ def test_a_vehicle_file_is_proposed_of_what_was_found(down, acceleration):
         **known, "airspeed": "V",
     }  # fmt: skip
     bare = found | {"roll": None, "az": None, "airspeed": None}
-    assert set(check._proposed("log", log, "table", ("t_s", "s"), bare, ["u 1"])) == {
+    assert set(check._propose_vehicle("log", log, "table", ("t_s", "s"), bare, ["u 1"])) == {
         "name", "reader", "rates", "commands", "surfaces",
     }  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import bank_of
+from beaver_ftc_logs.bank import build_hypothesis_bank
 from kept import in_short
 from products.logs import small
 
@@ -22,7 +22,7 @@ MODEL = small.model(
 def test_commands_that_act_sooner_or_later(delay_s, share, later):
     """So much of the command of the sample before, or of the one after; the ends repeated."""
     samples = small.flight(MODEL, 12)
-    found = filtering._with_delay(samples, delay_s).commands
+    found = filtering._with_command_delay(samples, delay_s).commands
     at = np.clip(np.arange(12) + (-1 if later else 1), 0, 11)
     np.testing.assert_allclose(
         found, (1 - share) * samples.commands + share * samples.commands[at], atol=1e-15
@@ -31,28 +31,31 @@ def test_commands_that_act_sooner_or_later(delay_s, share, later):
 
 def test_no_delay_changes_nothing():
     samples = small.flight(MODEL, 12)
-    assert filtering._with_delay(samples, 0.0) is samples
+    assert filtering._with_command_delay(samples, 0.0) is samples
 
 
 def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
     """What was 600 s ago counts 1/e."""
     rng = np.random.default_rng(1)
     evidence = [0.1 * rng.standard_normal(2000) for _ in range(3)]
-    found = filtering._weights(evidence, 2.0)
+    found = filtering._delay_probabilities(evidence, 2.0)
     for k in (0, 10, 1999):
         age_s = 0.5 * np.arange(k, -1, -1)
         total = np.array([(np.exp(-age_s / 600.0) * one[: k + 1]).sum() for one in evidence])
         np.testing.assert_allclose(found[:, k], np.exp(total) / np.exp(total).sum(), rtol=1e-9)
-    huge = filtering._weights([1000.0 * np.ones(3), np.ones(3)], 2.0)
+    huge = filtering._delay_probabilities([1000.0 * np.ones(3), np.ones(3)], 2.0)
     np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)
 
 
 def test_what_all_delays_say_together(changed):
     """The mean of what each alone does, by its weight, sample by sample."""
-    samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), bank_of(MODEL)
-    together = filtering.posterior_of(samples, MODEL, bank)
-    runs = [filtering._filtered(filtering._with_delay(samples, delay_s), MODEL, bank) for delay_s in DELAYS_S]
-    weights = filtering._weights([run[3] for run in runs], 10.0)
+    samples, bank = small.flight(MODEL, 150, lost=((1, 50, 150, 0.4),)), build_hypothesis_bank(MODEL)
+    together = filtering.hypothesis_posterior(samples, MODEL, bank)
+    runs = [
+        filtering._run_bank_on_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
+        for delay_s in DELAYS_S
+    ]
+    weights = filtering._delay_probabilities([run[3] for run in runs], 10.0)
     for part, found in enumerate(together):
         each = np.stack([run[part] for run in runs])
         weight = weights.reshape(*weights.shape, *[1] * (each.ndim - 2))
@@ -67,5 +70,5 @@ def test_what_cannot_be_predicted_changes_no_number_to_none():
     samples = small.flight(MODEL, 60)
     rates = samples.rates.copy()
     rates[30] = np.nan
-    found = filtering.posterior_of(replace(samples, rates=rates), MODEL, bank_of(MODEL))
+    found = filtering.hypothesis_posterior(replace(samples, rates=rates), MODEL, build_hypothesis_bank(MODEL))
     assert all(np.isfinite(part).all() for part in found)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import energy
 from beaver_ftc_logs.readers import alfa
-from beaver_ftc_logs.recording import Column, Recording
-from beaver_ftc_logs.samples import sample
-from beaver_ftc_logs.scoring import _right_group
+from beaver_ftc_logs.recording import Column, RecordedFlight
+from beaver_ftc_logs.samples import resample
+from beaver_ftc_logs.scoring import _is_right_group
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 T_S = np.arange(0.0, 20.0, 0.1)
@@ -36,21 +36,23 @@ WING = {
     ],
 )
 def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected):
-    climb = energy.climb_of(T_S, altitude, airspeed, ONE)
+    climb = energy.energy_climb_mps(T_S, altitude, airspeed, ONE)
     assert np.isnan(climb[T_S < 4.9]).all()
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
 def test_a_gap_ends_what_is_known():
     run = (T_S >= 10.0).astype(int)
-    climb = energy.climb_of(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
+    climb = energy.energy_climb_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
     assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
     np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
 
 
 def named_of(faulty, falls, since_s=0.0):
     names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.renamed(T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s)
+    return energy.without_surfaces_after_engine_failure(
+        T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s
+    )
 
 
 def test_an_alarm_while_energy_falls_names_no_surface():
@@ -75,10 +77,12 @@ def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_
     falls = (T_S >= 8.0) & (T_S < 10.0)
     climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
     names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.renamed(T_S, faulty, names, climb, -1.0, T_S - 6.0)
+    named = energy.without_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S - 6.0)
     assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
     assert set(named[T_S > 16.05]) == {"left"}
-    assert set(energy.renamed(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]) == {"left"}
+    assert set(
+        energy.without_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]
+    ) == {"left"}
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=2, max_size=60), st.data())
@@ -88,8 +92,10 @@ def test_a_name_uses_nothing_later(rows, data):
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
     cut = data.draw(st.integers(1, len(rows)))
     since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.renamed(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.renamed(t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut])
+    whole = energy.without_surfaces_after_engine_failure(t_s, faulty, names, climb, -1.0, since_s)
+    short = energy.without_surfaces_after_engine_failure(
+        t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut]
+    )
     assert whole[:cut].tolist() == short.tolist()
     assert all((name == "") == (flag == 0) for name, flag in zip(whole, faulty, strict=True))
 
@@ -97,15 +103,15 @@ def test_a_name_uses_nothing_later(rows, data):
 def recording(**columns):
     rng = np.random.default_rng(1)
     known = {name: rng.normal(0.0, 0.1, len(T_S)) for name in ("p", "q", "r", "roll")}
-    return Recording("one", {name: Column(T_S, values) for name, values in (known | columns).items()})
+    return RecordedFlight("one", {name: Column(T_S, values) for name, values in (known | columns).items()})
 
 
 def test_samples_have_it_in_si_where_it_is_logged():
     vehicle = Vehicle.model_validate(WING)
     logged = {"alt": (100.0 - 2.0 * T_S) / 0.3048, "tas": np.full(len(T_S), 72.0)}
-    climb = sample(recording(**logged), vehicle).energy_climb
+    climb = resample(recording(**logged), vehicle).energy_climb_mps
     np.testing.assert_allclose(climb[T_S > 5.05], -2.0, atol=1e-9)
-    assert sample(recording(alt=logged["alt"]), vehicle).energy_climb is None
+    assert resample(recording(alt=logged["alt"]), vehicle).energy_climb_mps is None
 
 
 def test_a_unit_of_another_kind_is_refused(tmp_path):
@@ -124,15 +130,15 @@ def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():
         "wind_north_m_s": Column(wind, np.array([0.0, 4.0])),
         "wind_east_m_s": Column(wind, np.array([0.0, 12.0])),
     }
-    alfa._add_airspeed(columns)
+    alfa._add_airspeed_from_wind(columns)
     assert columns["airspeed_by_wind_m_s"].values.tolist() == [5.0, 10.0, 5.0]
     still = {name: one for name, one in columns.items() if name.startswith("ground")}
-    alfa._add_airspeed(still)
+    alfa._add_airspeed_from_wind(still)
     assert "airspeed_by_wind_m_s" not in still
 
 
 def test_an_engine_is_no_surface_that_was_named():
     groups = [["left"], ["right"]]
-    assert _right_group({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
-    assert _right_group({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
-    assert _right_group({"engine": 1.0}, ["engine"], groups) is None
+    assert _is_right_group({"engine": 0.9, "left": 0.1}, ["left"], groups) is False
+    assert _is_right_group({"engine": 0.1, "left": 0.9}, ["left"], groups) is True
+    assert _is_right_group({"engine": 1.0}, ["engine"], groups) is None

@@ -16,6 +16,7 @@ from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_csv, write_
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Expectation, Judged
 from beaver_ftc_logs.readers import read_flight
 from results.synthetic import Flight
 
@@ -132,13 +133,12 @@ def test_every_field_of_a_recording(path, columns, tmp_path, kind):
 
 def test_every_attribute_of_the_junit_file(tmp_path):
     """Three runs: two expectations of which one is missed, nothing expected, and one that did not fly."""
-    met = {"name": "no_false_alarm", "passed": True, "expected": True, "actual": True}
-    missed = {"name": "detected_within_s", "passed": False, "expected": 0.5, "actual": 0.75}
+    met = Expectation("no_false_alarm", True, True, True)
+    missed = Expectation("detected_within_s", False, 0.5, 0.75)
     runs = [
-        {"scenario": "one", "expectations": [met, missed], "took_s": 3.0},
-        {"scenario": "two", "expectations": [], "took_s": 1.5},
-        {"scenario": "three", "error": "cannot be trimmed"},
-    ]
+        Judged("one", expectations=(met, missed), took_s=3.0), Judged("two", took_s=1.5),
+        Judged("three", error="cannot be trimmed"),
+    ]  # fmt: skip
     write_junit(runs, tmp_path / "junit.xml")
     root = ElementTree.parse(tmp_path / "junit.xml").getroot()
     assert root.tag == "testsuites"

@@ -5,9 +5,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes, fitting
-from beaver_ftc_logs.bank import bank_of
-from beaver_ftc_logs.filtering import accumulated, evidence
-from beaver_ftc_logs.vehicle import asking
+from beaver_ftc_logs.bank import build_hypothesis_bank
+from beaver_ftc_logs.filtering import fault_evidence_gains, page_sum
+from beaver_ftc_logs.vehicle import with_false_alarm_rate
 from products.logs import small
 
 PER_HOUR = 300.0
@@ -30,9 +30,9 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
     quantile, survival = TAILS[tail]
     rng, held, rates = np.random.default_rng(7), 0, []
     for _ in range(20):
-        found = extremes.tail_of(parts_of(quantile, rng, hours))
-        threshold = extremes.threshold_for(found, asked)
-        rate = extremes.expected(found, threshold)
+        found = extremes.fit_peak_tail(parts_of(quantile, rng, hours))
+        threshold = extremes.threshold_for_false_alarms(found, asked)
+        rate = extremes.expected_false_alarms(found, threshold)
         true = PER_HOUR * survival(threshold)
         held += rate.low <= true <= rate.high
         rates.append(true)
@@ -42,8 +42,8 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
 
 
 def test_more_flight_gives_the_threshold_of_the_closed_form():
-    found = extremes.tail_of(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 100.0))
-    assert extremes.threshold_for(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
+    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 100.0))
+    assert extremes.threshold_for_false_alarms(found, 1.0) == pytest.approx(2.0 * np.log(PER_HOUR), rel=0.05)
 
 
 def test_flights_that_differ_count_for_less():
@@ -51,41 +51,46 @@ def test_flights_that_differ_count_for_less():
     rng = np.random.default_rng(1)
     alike = parts_of(TAILS["exponential"][0], rng, 1.0)
     apart = [(3.0 * alike[0][0], alike[0][1]), *((0.3 * one, hours) for one, hours in alike[1:])]
-    calm, wild = extremes.tail_of(alike), extremes.tail_of(apart)
+    calm, wild = extremes.fit_peak_tail(alike), extremes.fit_peak_tail(apart)
     assert calm.dispersion < 2.0 < wild.dispersion
     rates = [
-        extremes.expected(wild.model_copy(update={"dispersion": d}), 20.0) for d in (1.0, wild.dispersion)
+        extremes.expected_false_alarms(wild.model_copy(update={"dispersion": d}), 20.0)
+        for d in (1.0, wild.dispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
 
 
 def test_too_little_flight_says_what_is_missing():
-    found = extremes.tail_of(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 0.5))
-    assert extremes.minutes_missing(found, 1.0) == pytest.approx(180.0 - 30.0)
-    assert extremes.minutes_missing(found, 10.0) == 0.0
-    assert extremes.tail_of([(np.ones(5), 0.1)]) is None
-    assert extremes.tail_of([]) is None
+    found = extremes.fit_peak_tail(parts_of(TAILS["exponential"][0], np.random.default_rng(3), 0.5))
+    assert extremes.missing_healthy_minutes(found, 1.0) == pytest.approx(180.0 - 30.0)
+    assert extremes.missing_healthy_minutes(found, 10.0) == 0.0
+    assert extremes.fit_peak_tail([(np.ones(5), 0.1)]) is None
+    assert extremes.fit_peak_tail([]) is None
 
 
 def test_peaks_are_of_stretches_above_zero():
     values = np.array([0.0, 1.0, 3.0, 0.0, 0.0, 2.0, 0.0, 4.0, 5.0])
-    assert extremes.peaks_of(values).tolist() == [3.0, 2.0, 5.0]
-    assert accumulated(np.array([1.0, 2.0, -4.0, -1.0, 2.0, 9.0]), 6.0).tolist() == [1, 3, 0, 0, 2, 6]
+    assert extremes.peaks_between_zeros(values).tolist() == [3.0, 2.0, 5.0]
+    assert page_sum(np.array([1.0, 2.0, -4.0, -1.0, 2.0, 9.0]), 6.0).tolist() == [1, 3, 0, 0, 2, 6]
 
 
 def test_the_evidence_is_what_changes_alone_do_not_bring():
     """Where the probability of a fault is what the changes of a sample make of the last, there is none; where
     its odds are tenfold that, log 10."""
-    bank = bank_of(small.model(small.TAIL))
-    first = float(bank.start[bank.faults].sum())
-    change = bank.change * float(bank.weight[bank.faults].sum() / bank.weight.sum())
-    second = (1.0 - bank.change) * first + change
-    odds = 10.0 * ((1.0 - bank.change) * second + change) / (1.0 - ((1.0 - bank.change) * second + change))
-    posterior = np.zeros((3, len(bank.weight)))
-    place = int(np.flatnonzero(bank.faults)[0])
+    bank = build_hypothesis_bank(small.model(small.TAIL))
+    first = float(bank.prior_probability[bank.is_fault].sum())
+    change = bank.change_probability * float(bank.change_share[bank.is_fault].sum() / bank.change_share.sum())
+    second = (1.0 - bank.change_probability) * first + change
+    odds = (
+        10.0
+        * ((1.0 - bank.change_probability) * second + change)
+        / (1.0 - ((1.0 - bank.change_probability) * second + change))
+    )
+    posterior = np.zeros((3, len(bank.change_share)))
+    place = int(np.flatnonzero(bank.is_fault)[0])
     posterior[:, place] = first, second, odds / (1.0 + odds)
     posterior[:, 0] = 1.0 - posterior[:, place]
-    np.testing.assert_allclose(evidence(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12)
+    np.testing.assert_allclose(fault_evidence_gains(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12)
 
 
 def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
@@ -96,10 +101,10 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     walk = np.cumsum(rng.standard_normal((n, 3)), axis=0)
     series = np.column_stack([white[:, 0], coloured[:, 1], white[:, 2] + 0.05 * walk[:, 2]])
     series = series * np.sqrt(np.diag(np.array(model.noise)))
-    monkeypatch.setattr(fitting, "fit_like", lambda fitted, like: like)
+    monkeypatch.setattr(fitting, "fit_with_order_of", lambda fitted, like: like)
     monkeypatch.setattr(fitting, "whitened_residual", lambda like, kept: (np.arange(n), series, None))
-    stretches = fitting.stretches_of([small.flight(model, 60)])
-    found = fitting._drift(stretches, model)
+    stretches = fitting.usable_stretches([small.flight(model, 60)])
+    found = fitting._trim_drift(stretches, model)
     assert max(found[:2]) < 0.01
     assert found[2] == pytest.approx(0.05, rel=0.15)
 
@@ -107,7 +112,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
 @pytest.mark.parametrize("rate", [0.0, -1.0, 1001.0, float("nan")])
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(BadInput, match="allowed: more than 0, up to 1000 an hour"):
-        asking(small.vehicle(), rate)
+        with_false_alarm_rate(small.vehicle(), rate)
 
 
 @pytest.mark.parametrize("threshold", [2.0, 3.0])
@@ -123,18 +128,26 @@ def test_a_true_likelihood_ratio_alarms_once_in_exp_h_samples_or_less_often(thre
     assert waited.mean() > np.exp(threshold)
     rate_hz = 20.0
     per_hour = 3600.0 * rate_hz / np.exp(threshold)
-    assert extremes.sure_threshold(rate_hz, per_hour) == pytest.approx(threshold)
-    assert extremes.sure_threshold(rate_hz, 1e9) == 0.0
+    assert extremes.guaranteed_threshold(rate_hz, per_hour) == pytest.approx(threshold)
+    assert extremes.guaranteed_threshold(rate_hz, 1e9) == 0.0
 
 
 def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
-    tail = extremes.Tail(level=0.1, excess=[0.1] * 20, minutes=30.0)
+    tail = extremes.PeakTail(level=0.1, excess=[0.1] * 20, minutes=30.0)
     same = small.model(rate_hz=20.0)
     other = same.model_copy(update={"vehicle": same.vehicle.model_copy(update={"other_laws": True})})
-    assert fitting._threshold(tail, 1.0, same) == extremes.threshold_for(tail, 1.0) < 3.0
-    assert fitting._threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
+    assert (
+        fitting._choose_alarm_threshold(tail, 1.0, same)
+        == extremes.threshold_for_false_alarms(tail, 1.0)
+        < 3.0
+    )
+    assert fitting._choose_alarm_threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
     high = tail.model_copy(update={"level": 50.0})
-    assert fitting._threshold(high, 1.0, other) == extremes.threshold_for(high, 1.0) > 50.0
+    assert (
+        fitting._choose_alarm_threshold(high, 1.0, other)
+        == extremes.threshold_for_false_alarms(high, 1.0)
+        > 50.0
+    )
 
 
 @pytest.mark.parametrize("n", [100, 400])
@@ -142,7 +155,7 @@ def test_the_interval_holds_nine_tenths_of_a_posterior_that_is_known(n):
     """Exponential excess x over a scale of 2, at a level above by that: by the information of rate, shape and
     scale [Coles2001, section 4.3], a logarithm of the rate of variance (1 + 1/4 + 2 - 1) / n."""
     excess = TAILS["exponential"][0]((np.arange(n) + 0.5) / n)
-    tail = extremes.Tail(level=5.0, excess=excess.tolist(), minutes=30.0)
-    found = extremes.expected(tail, 7.0)
+    tail = extremes.PeakTail(level=5.0, excess=excess.tolist(), minutes=30.0)
+    found = extremes.expected_false_alarms(tail, 7.0)
     assert np.log(found.high / found.low) == pytest.approx(2.0 * 1.645 * 1.5 / np.sqrt(n), rel=0.05)
     assert np.sqrt(found.high * found.low) == pytest.approx(2.0 * n / np.e, rel=0.02)

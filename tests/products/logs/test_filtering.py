@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import Noise, adaptation_of, bank_of
-from beaver_ftc_logs.filtering import _update, _weights, _with_delay, posterior_of
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.bank import ResidualNoise, build_adaptation_limits, build_hypothesis_bank
+from beaver_ftc_logs.filtering import (
+    _delay_probabilities,
+    _update_gaussian,
+    _with_command_delay,
+    hypothesis_posterior,
+)
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 from telling import apart
 
@@ -17,21 +22,23 @@ from telling import apart
 @pytest.fixture(scope="module")
 def healthy(wing, wing_folder):
     columns = synthetic.fly(200.0, seed=31)
-    return load_flights([synthetic.write_csv(wing_folder / "healthy.csv", columns)], wing)[0]
+    return load_flights_for_fit([synthetic.write_csv(wing_folder / "healthy.csv", columns)], wing)[0]
 
 
 def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
-    bank = bank_of(model)
-    from beaver_ftc_logs.filtering import _filtered
+    bank = build_hypothesis_bank(model)
+    from beaver_ftc_logs.filtering import _run_bank_on_flight
 
-    evidence = [_filtered(_with_delay(samples, d), model, bank)[3] for d in model.settings.delays_s]
-    return _weights(evidence, model.rate_hz)
+    evidence = [
+        _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3] for d in model.settings.delays_s
+    ]
+    return _delay_probabilities(evidence, model.rate_hz)
 
 
-@pytest.mark.parametrize(("late_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
-def test_the_delay_of_a_flight_is_found(healthy, wing_model, late_s, which):
-    at = np.arange(len(healthy.t_s)) + late_s * wing_model.rate_hz
+@pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
+def test_the_delay_of_a_flight_is_found(healthy, wing_model, command_delay_s, which):
+    at = np.arange(len(healthy.t_s)) + command_delay_s * wing_model.rate_hz
     columns = [np.interp(at, np.arange(len(at)), column) for column in healthy.commands.T]
     weights = delays_of(replace(healthy, commands=np.column_stack(columns)), wing_model)
     assert weights[:, -1].argmax() == which
@@ -43,9 +50,9 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
     k = 700
     commands = healthy.commands.copy()
     commands[k + 1 :] += 0.3
-    bank = bank_of(wing_model)
-    one = posterior_of(healthy, wing_model, bank)[0]
-    other = posterior_of(replace(healthy, commands=commands), wing_model, bank)[0]
+    bank = build_hypothesis_bank(wing_model)
+    one = hypothesis_posterior(healthy, wing_model, bank)[0]
+    other = hypothesis_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
     assert np.array_equal(one[: k + 1], other[: k + 1])
     assert not np.array_equal(one[k + 2], other[k + 2])
 
@@ -53,20 +60,22 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
 def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
     settings = wing_model.settings
-    _, _, response, noise = wing_model.arrays()
+    _, _, response, noise = wing_model.coefficient_arrays()
     rng = np.random.default_rng(4)
     shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
-    np.testing.assert_allclose(adaptation_of(wing_model).covariance[:3, :3], drawn, atol=2e-2 * drawn.max())
+    np.testing.assert_allclose(
+        build_adaptation_limits(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
+    )
 
 
 def test_gains_return_in_their_time(wing_model):
     """After a long time the spread of each gain is that of the settings, whatever it was."""
-    own = adaptation_of(wing_model)
-    variance = np.zeros(len(own.mean))
+    own = build_adaptation_limits(wing_model)
+    variance = np.zeros(len(own.initial_mean))
     for _ in range(200_000):
-        variance = own.keep**2 * variance + own.walk
+        variance = own.deviation_retention**2 * variance + own.walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
     assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_sd, rel=1e-3)
 
@@ -76,11 +85,11 @@ def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model
     from beaver_ftc_logs.diagnose import diagnose
 
     columns = synthetic.fly(300.0, parts=((0, 300, 1.0, 0.5),), seed=33)
-    samples = load_flights([synthetic.write_csv(wing_folder / "weak.csv", columns)], wing)[0]
+    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "weak.csv", columns)], wing)[0]
     rows = diagnose(samples, wing_model)
     late = rows.t_s > 60.0
     assert rows.faulty[late].mean() > 0.95
-    assert np.median(rows.estimate[late, 1]) == pytest.approx(0.5, abs=0.101)
+    assert np.median(rows.effectiveness[late, 1]) == pytest.approx(0.5, abs=0.101)
 
 
 def with_settings(model, **changes):
@@ -90,10 +99,10 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = adaptation_of(with_settings(wing_model, trim_walk=walk))
+    own = build_adaptation_limits(with_settings(wing_model, trim_walk=walk))
     noise_sd = np.sqrt(np.diag(np.array(wing_model.noise)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
-    np.testing.assert_allclose(np.sqrt(900 * own.walk[:3]), drawn.std(axis=0), rtol=0.05)
+    np.testing.assert_allclose(np.sqrt(900 * own.walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
 
 
 def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
@@ -108,7 +117,10 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     found = {}
     for walk in (1e-6, 2e-2):
         model = with_settings(wing_model, trim_walk=[walk] * 3, trim_bound=40.0, delays_s=[0.0])
-        one, other = (posterior_of(flight, model, bank_of(model))[1][-1, 1] for flight in (drifting, healthy))
+        one, other = (
+            hypothesis_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
+            for flight in (drifting, healthy)
+        )
         found[walk] = one - other
     assert found[2e-2] == pytest.approx(moment[-1], rel=0.15)
     assert found[1e-6] < 0.8 * moment[-1]
@@ -122,10 +134,10 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     rates = healthy.rates.copy()
     rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
     model = with_settings(wing_model, noise_memory_s=memory_s, delays_s=[0.0])
-    bank = bank_of(model)
-    posterior, _, scale = posterior_of(replace(healthy, rates=rates), model, bank)
+    bank = build_hypothesis_bank(model)
+    posterior, _, scale = hypothesis_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
-    answering = 1.0 - posterior[begin + 1 : end + 1, bank.idle].mean()
+    answering = 1.0 - posterior[begin + 1 : end + 1, bank.no_response_index].mean()
     grown = np.log(scale[end] / scale[begin])
     assert scale[end] < 6.0
     assert grown == pytest.approx(0.4 * (3.0 - 0.93) * answering, rel=0.02)
@@ -137,8 +149,8 @@ def test_a_covariance_stays_symmetric_to_the_bit():
     root, seen, noise = rng.standard_normal((5, 5)), rng.standard_normal((5, 3)), np.diag([0.2, 0.3, 0.1])
     p = root @ root.T + 0.1 * np.eye(5)
     expected = np.linalg.inv(np.linalg.inv(p) + seen @ np.linalg.inv(noise) @ seen.T)
-    normal = Noise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf, 1.0)
-    _update(np.zeros(5), p, np.zeros(3), seen, noise, normal)
+    normal = ResidualNoise(np.zeros(3), noise, 1.0, 1e9, 1.0, 1.0, 1.0, np.inf, 1.0)
+    _update_gaussian(np.zeros(5), p, np.zeros(3), seen, noise, normal)
     assert (p == p.T).all()
     assert p == pytest.approx(expected, rel=1e-9)
 
@@ -153,14 +165,16 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
     constant, known = np.array([0.3, -0.2, 0.1]), np.arange(40) != 7
     apart(noise=noise[np.triu_indices(3)], constant=constant, average=average)
     settings = SimpleNamespace(tail=7.0, power=0.4)
-    model = SimpleNamespace(settings=settings, constant=lambda average: sum(average) * constant)
+    model = SimpleNamespace(settings=settings, whitened_intercept=lambda average: sum(average) * constant)
     found = []
     for of, size in ((average, gain), ((1.0,), 1.0)):
         answers = rng.normal(size=(40, 2, 3))
         unexplained = size * (white + constant) + answers.sum(axis=1)
-        monkeypatch.setattr(filtering, "in_white", lambda *_, made=(known, unexplained, answers): made)
+        monkeypatch.setattr(
+            filtering, "split_whitened_response", lambda *_, made=(known, unexplained, answers): made
+        )
         colour = SimpleNamespace(average=of, noise=(size**2 * noise).tolist())
-        found.append(filtering._likelihood(None, model, colour))
+        found.append(filtering._noise_model_log_likelihood(None, model, colour))
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
     square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)
     student = -0.5 * ((7.0 + 3.0) * np.log1p(square / 7.0) + np.log(np.linalg.det(noise)))
@@ -170,12 +184,14 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
 def test_evidence_is_the_log_of_a_likelihood_ratio():
     """Two of three levels are faults; what a change at random brings is no evidence."""
     bank = SimpleNamespace(
-        faults=np.array([False, True, True]), change=0.1, start=np.array([0.8, 0.15, 0.05]),
-        weight=np.array([3.0, 1.0, 2.0]),
+        is_fault=np.array([False, True, True]), change_probability=0.1,
+        prior_probability=np.array([0.8, 0.15, 0.05]), change_share=np.array([3.0, 1.0, 2.0]),
     )  # fmt: skip
     fault = np.array([0.3, 0.6, 0.45])
     posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
     before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
-    assert filtering.evidence(posterior, bank) == pytest.approx(expected)
-    assert np.isfinite(filtering.evidence(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)).all()
+    assert filtering.fault_evidence_gains(posterior, bank) == pytest.approx(expected)
+    assert np.isfinite(
+        filtering.fault_evidence_gains(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
+    ).all()

@@ -9,14 +9,14 @@ import pytest
 from beaver_ftc_logs import findings
 from beaver_ftc_logs.findings import (
     as_text,
-    events_of,
-    lasting,
-    looked_at,
-    sentences,
-    statement,
-    verdict_of,
+    duration_in_words,
+    fault_events,
+    lasting_events,
+    separability_sentences,
+    separability_statement,
+    verdict_document,
 )
-from beaver_ftc_logs.regression import predicted
+from beaver_ftc_logs.regression import split_response
 from products.logs import small
 
 NAMES = ["right", "left"]
@@ -37,12 +37,12 @@ PARTS = {
 
 @pytest.mark.parametrize("name", PARTS)
 def test_rows_become_events(changed, name):
-    assert not changed(events_of(small.rows(PARTS[name]), NAMES))
+    assert not changed(fault_events(small.rows(PARTS[name]), NAMES))
 
 
 def test_an_event_says_what_stood_for_most_of_it():
     """The brief level within another is part of it: name and level are those of the longer."""
-    (event,) = events_of(small.rows(PARTS["a brief level within"]), NAMES)
+    (event,) = fault_events(small.rows(PARTS["a brief level within"]), NAMES)
     assert (event["from_s"], event["to_s"], event["named"], event["brief"]) == (10.0, 21.0, "left", False)
     assert event["effectiveness"] == {"left": {"estimate": 0.5, "low": 0.4, "high": 0.75}}
     assert event["probability"] == pytest.approx(0.9 + 0.022)
@@ -50,15 +50,15 @@ def test_an_event_says_what_stood_for_most_of_it():
 
 @pytest.mark.parametrize(("count", "brief"), [(6, True), (7, False)])
 def test_three_seconds_are_not_brief(count, brief):
-    events = events_of(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
+    events = fault_events(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
     assert [event["brief"] for event in events] == [brief]
-    assert lasting(events) == events  # where every one is brief they are all there is to say
+    assert lasting_events(events) == events  # where every one is brief they are all there is to say
 
 
 def test_what_is_estimated_in_health_parts_no_event():
     """Four seconds between two events, in which estimates change: long enough to part the events."""
     still, changing = (
-        events_of(small.rows([(10, *HALF), (4, "", one), (4, "", other), (10, *HALF)]), NAMES)
+        fault_events(small.rows([(10, *HALF), (4, "", one), (4, "", other), (10, *HALF)]), NAMES)
         for one, other in (([1.0, 1.0], [1.0, 1.0]), ([0.97, 0.9], [0.99, 0.95]))
     )
     assert still == changing
@@ -69,7 +69,7 @@ WORLD = {
     "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
     "tail": (
         small.model(small.TAIL, settings={"alarm": 0.9}),
-        {"gap": 150, "notes": ("a remark",), "age_s": {"roll": 0.123456}},
+        {"gap": 150, "notes": ("a remark",), "held_column_age_s": {"roll": 0.123456}},
     ),
 }
 
@@ -85,11 +85,11 @@ def test_the_document_of_a_verdict(changed, flown):
     surfaces = list(model.vehicle.surfaces)
     left = [1.0, 0.5, 0.7][: len(surfaces)]
     rows = small.rows([(8, "", [1.0] * len(left)), (9, "+".join(surfaces[1:]), left)], len(left))
-    assert not changed(verdict_of(samples, model, rows))
+    assert not changed(verdict_document(samples, model, rows))
 
 
 def events(*parts):
-    return events_of(small.rows(parts), NAMES)
+    return fault_events(small.rows(parts), NAMES)
 
 
 VERDICT = {
@@ -114,7 +114,7 @@ def test_the_text_of_a_verdict(changed):
         VERDICT | {"credible": {"share": 0.0, "reasons": [{"says": "a rate is clipped", "share": 1.0}]}},
     ]
     assert not changed([as_text(case).splitlines() for case in cases])
-    assert [looked_at(case) for case in cases[:3]] == [
+    assert [duration_in_words(case) for case in cases[:3]] == [
         "61 s", "42 s, 1 gap in the log left out", "42 s, 2 gaps in the log left out",
     ]  # fmt: skip
 
@@ -131,7 +131,7 @@ def test_what_a_flight_can_separate_in_words():
         {"surfaces": [["right"], ["rudder"]], "cosine": 0.1, "separable": True},
     ]
     together = [{"surfaces": ["left", "flap"], "says": "They move together."}]
-    assert sentences({"together": together, "groups": groups, "alike": pairs}) == [
+    assert separability_sentences({"together": together, "groups": groups, "alike": pairs}) == [
         "They move together.",
         "right: the smallest loss that shows on average is 50% within 20 s, 12% within 60 s.",
         "left, flap: not even a complete loss would show within 60 s by the mean of this flight's commands.",
@@ -148,13 +148,13 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
     design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
     flat = design.reshape(-1, groups + 3)
     covariance = np.linalg.inv(flat.T @ flat)
-    for group, entry in enumerate(statement(samples, model)["groups"]):
+    for group, entry in enumerate(separability_statement(samples, model)["groups"]):
         left = 1.0 / covariance[group, group] / n / samples.dt_s
         assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
 
 
 def _whitened_answers(samples, model):
-    ok, _, answers = predicted(samples, model)
+    ok, _, answers = split_response(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
     return answers[ok] @ root.T
 
@@ -162,7 +162,7 @@ def _whitened_answers(samples, model):
 def test_where_nothing_can_be_predicted_nothing_shows():
     model = WORLD["wing"][0]
     samples = small.flight(model, 40)
-    found = statement(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
+    found = separability_statement(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
     nothing = {"5": None, "20": None, "60": None}
     assert [entry["information_per_s"] for entry in found["groups"]] == [0.0, 0.0]
     assert all(entry["smallest_loss"] == nothing for entry in found["groups"])
@@ -176,7 +176,7 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
     response = [[[1.0, 0.0, 0.0]], [[share, float(np.sqrt(1.0 - share**2)), 0.0]]]
     model = small.model(lags=1, response=response, response_sd=response, noise=noise)
     samples = small.flight(small.model(), 60)
-    (pair,) = statement(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
+    (pair,) = separability_statement(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
     assert pair["cosine"] == pytest.approx(share)
     assert pair["separable"] is separable
 
@@ -190,21 +190,23 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
 )  # fmt: skip
 def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
     """Of all of them without a word more; of hardly any there is no verdict."""
-    assert findings._nothing({"credible": {"share": share}}) == says
-    little = findings._LITTLE
-    assert findings._nothing({"credible": {"share": 0.99 * little}}) == "no verdict"
-    assert findings._nothing({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
+    assert findings._no_event_line({"credible": {"share": share}}) == says
+    little = findings._MIN_CREDIBLE_ROW_SHARE
+    assert findings._no_event_line({"credible": {"share": 0.99 * little}}) == "no verdict"
+    assert findings._no_event_line({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
 
 
 def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
     """Half of the square of the loss times the information; a complete loss is one."""
-    assert findings._smallest(0.5, 5.0) == {"5": None, "20": 1.0, "60": pytest.approx(3.0**-0.5)}
-    assert findings._smallest(0.0, 5.0) == {"5": None, "20": None, "60": None}
+    assert findings._smallest_losses(0.5, 5.0) == {"5": None, "20": 1.0, "60": pytest.approx(3.0**-0.5)}
+    assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
 
 
 def test_odds_against_a_change_are_those_of_its_median_share():
     weight = np.array([0.5, 0.2, 0.1, 0.3])
-    bank = SimpleNamespace(weight=weight, faulty=lambda group: np.arange(4) % 2 == (1 if group else 5))
+    bank = SimpleNamespace(
+        change_share=weight, is_fault_of=lambda group: np.arange(4) % 2 == (1 if group else 5)
+    )
     model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._odds_against(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
-    assert findings._odds_against(model, bank, 0, 0.1) == np.inf
+    assert findings._alarm_log_odds(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
+    assert findings._alarm_log_odds(model, bank, 0, 0.1) == np.inf

@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, regression
 from beaver_ftc_logs.fitting import Stretch
-from beaver_ftc_logs.recording import Event
+from beaver_ftc_logs.recording import LoggedFailure
 from beaver_ftc_logs.samples import Samples
 from kept import in_short
 from products.logs import small
@@ -26,7 +26,12 @@ def labelled(parts, dt_s=0.5, **changes):
     """Samples whose labels are these: (count, right, left)."""
     labels = np.array([left for count, *left in parts for _ in range(count)], dtype=float)
     n = len(labels)
-    given = {"labels": labels, "dt_s": dt_s, "t_s": dt_s * np.arange(n), "run": np.zeros(n, dtype=int)}
+    given = {
+        "labels": labels,
+        "dt_s": dt_s,
+        "t_s": dt_s * np.arange(n),
+        "stretch_number": np.zeros(n, dtype=int),
+    }
     return changed(small.flight(MODEL, n), **given, **changes)
 
 
@@ -44,23 +49,25 @@ USED = {  # at 2 Hz: three samples at either edge of a label, all of what lasts 
 @pytest.mark.parametrize("name", USED)
 def test_which_samples_are_known(name):
     parts, used = USED[name]
-    assert np.flatnonzero(fitting.usable(labelled(parts))).tolist() == used
+    assert np.flatnonzero(fitting.is_usable_for_fit(labelled(parts))).tolist() == used
 
 
 def test_what_follows_a_failure_is_not_fitted():
     """From a second before the first failure on."""
-    samples = labelled([(20, NAN, NAN)], events=(Event(6.0, "rudder"), Event(5.0, "elevator")))
-    assert np.flatnonzero(fitting.usable(samples)).tolist() == list(range(8))
+    samples = labelled(
+        [(20, NAN, NAN)], logged_failures=(LoggedFailure(6.0, "rudder"), LoggedFailure(5.0, "elevator"))
+    )
+    assert np.flatnonzero(fitting.is_usable_for_fit(samples)).tolist() == list(range(8))
 
 
 def by_hand(samples, vehicle, history, lags):
     """Regressors and rates of one flight, row by row, where there is past enough for the largest order."""
-    groups = regression.groups_of(vehicle)
+    groups = regression.group_surfaces(vehicle)
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     rows, rates = [], []
-    for k in np.flatnonzero(fitting.usable(samples)):
+    for k in np.flatnonzero(fitting.is_usable_for_fit(samples)):
         reach = max(history, lags)
-        if k < 6 or samples.run[k - reach] != samples.run[k]:
+        if k < 6 or samples.stretch_number[k - reach] != samples.stretch_number[k]:
             continue
         past = [samples.rates[k - j] for j in range(1, history + 1)]
         moved = [
@@ -79,7 +86,7 @@ def test_regressors_of_several_flights_stand_in_a_row(model, history, lags):
         small.flight(model, 180, gap=110, lost=((0, 50, 90, 0.3),)),
         small.flight(model, 120, seed=2, lost=((1, 40, 80, 0.6),)),
     ]
-    x, y, run = fitting.stacked(fitting.stretches_of(flights), model.vehicle, history, lags)
+    x, y, run = fitting.stacked_regression(fitting.usable_stretches(flights), model.vehicle, history, lags)
     parts = [by_hand(flight, model.vehicle, history, lags) for flight in flights]
     np.testing.assert_allclose(x, np.vstack([part[0] for part in parts]), atol=1e-14)
     np.testing.assert_allclose(y, np.vstack([part[1] for part in parts]), atol=0)
@@ -91,14 +98,14 @@ def test_a_stretch_ends_where_a_sample_is_left_out():
     samples = small.flight(MODEL, 60)
     use = np.ones(60, dtype=bool)
     use[[20, 40, 41]] = False
-    _, y, run = fitting.stacked([Stretch(samples, use)], MODEL.vehicle, 2, 3)
+    _, y, run = fitting.stacked_regression([Stretch(samples, use)], MODEL.vehicle, 2, 3)
     assert np.unique(run, return_counts=True)[1].tolist() == [14, 19, 18]
     assert len(y) == 51
 
 
 def score(stretches, vehicle, order):
     """The Bayesian information criterion of an order, of its own fit."""
-    x, y, _ = fitting.stacked(stretches, vehicle, *order)
+    x, y, _ = fitting.stacked_regression(stretches, vehicle, *order)
     rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
     return len(y) * np.linalg.slogdet(rest.T @ rest / len(y))[1] + 3 * x.shape[1] * np.log(len(y))
 
@@ -110,7 +117,7 @@ ORDERS = [(history, lags) for history in (1, 2, 3, 4) for lags in (2, 3, 4, 6)]
 @pytest.mark.parametrize("of", [small.WING, small.TAIL], ids=["wing", "tail"])
 def test_the_order_is_the_one_of_the_least_criterion(of, true):
     model = small.model(of, history=true[0], lags=true[1])
-    stretches = fitting.stretches_of([small.flight(model, 400), small.flight(model, 300, seed=3)])
+    stretches = fitting.usable_stretches([small.flight(model, 400), small.flight(model, 300, seed=3)])
     found = fitting.choose_order(stretches, model.vehicle)
     assert found == min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
     if of is small.WING:
@@ -123,16 +130,16 @@ def test_the_order_of_a_flight_too_short_to_tell(seed):
     rng = np.random.default_rng(seed)
     response = (small.RESPONSE * [[[1.0]], [[1.0]]])[:, :1].repeat(3, axis=1) * rng.uniform(-1, 1, (2, 3, 3))
     model = small.model(response=(3.0 * response).tolist())
-    stretches = fitting.stretches_of([small.flight(model, 120 + 10 * seed, seed=seed)])
+    stretches = fitting.usable_stretches([small.flight(model, 120 + 10 * seed, seed=seed)])
     least = min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
     assert fitting.choose_order(stretches, model.vehicle) == least
 
 
 def test_columns_of_an_order():
     """One, the past, the signal, then the lags of each group, of 1 + 12 + 1 + 6 + 6."""
-    assert fitting._columns(TAIL.vehicle, 4, 6) == list(range(26))
-    assert fitting._columns(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
-    assert fitting._columns(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
+    assert fitting._columns_of_model_order(TAIL.vehicle, 4, 6) == list(range(26))
+    assert fitting._columns_of_model_order(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
+    assert fitting._columns_of_model_order(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
 
 
 def test_a_fit_wants_ten_samples_a_coefficient():
@@ -161,8 +168,8 @@ def test_a_rate_that_stands_still_is_refused(size, moves):
 
 
 def test_standard_errors_hold_for_colour_of_two_seconds():
-    stretches = fitting.stretches_of([small.flight(MODEL, 400)])
-    x, y, run = fitting.stacked(stretches, MODEL.vehicle, 2, 3)
+    stretches = fitting.usable_stretches([small.flight(MODEL, 400)])
+    x, y, run = fitting.stacked_regression(stretches, MODEL.vehicle, 2, 3)
     found = fitting.fit_order(stretches, MODEL.vehicle, 2, 3)
     expected = regression.least_squares(x, y, run, 20)
     np.testing.assert_array_equal(found.standard_errors, expected.standard_errors)
@@ -170,7 +177,7 @@ def test_standard_errors_hold_for_colour_of_two_seconds():
 
 @pytest.fixture(scope="module")
 def stretches():
-    return fitting.stretches_of([small.flight(MODEL, 1000, lost=LOST)])
+    return fitting.usable_stretches([small.flight(MODEL, 1000, lost=LOST)])
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +204,7 @@ def test_a_model_is_what_was_fitted(changed, fitted, stretches):
         for group in range(2):
             begin = past + group * fitted.lags
             assert getattr(fitted, field)[group] == values[begin : begin + fitted.lags].tolist()
-    assert fitted.noise == fit.covariance.tolist()
+    assert fitted.noise == fit.residual_covariance.tolist()
     assert fitted.rate_hz == pytest.approx(10.0)
     np.testing.assert_allclose(fitted.response, MODEL.response, atol=0.06)
 
@@ -208,43 +215,43 @@ def test_settings_are_what_the_flights_say(changed, fitted):
 
 def test_settings_by_hand(fitted):
     """Two changes to a fault, two repairs, over the time in use; three surfaces of which two move as one."""
-    use = sum(fitting.usable(small.flight(MODEL, 1000, lost=LOST)))
+    use = sum(fitting.is_usable_for_fit(small.flight(MODEL, 1000, lost=LOST)))
     settings = fitted.settings
     assert settings.levels == {"right": [0.4], "left": [0.5]}
     assert settings.changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
     assert settings.delays_s == pytest.approx([-0.04, 0.0, 0.04])
-    stuck = fitting.prior(fitting.stretches_of([small.flight(TAIL, 400)]), TAIL)
+    stuck = fitting.prior_settings(fitting.usable_stretches([small.flight(TAIL, 400)]), TAIL)
     assert (stuck.alarm, stuck.hold_s, stuck.levels) == (0.995, 0.3, {})
     assert 0.0 < stuck.power <= 0.9
     given = settings.model_copy(update={"alarm": 0.7})
-    stretches = fitting.stretches_of([small.flight(MODEL, 300)])
+    stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
     assert fitting.fit_model(stretches, MODEL.vehicle, given).settings == given
-    assert fitting.fit_like(stretches, fitted).settings == settings
+    assert fitting.fit_with_order_of(stretches, fitted).settings == settings
 
 
 def days(gains):
     """Flights of days on which the right surface acts so many times as the left one does."""
     flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
     told = [changed(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
-    return fitting.stretches_of(
+    return fitting.usable_stretches(
         [changed(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
     )
 
 
 def test_flights_that_are_alike_tell_all_that_their_noise_allows():
     """The squares of Gaussian gains are as many as these, on average: 12 of them, within three sd of that."""
-    alike = fitting.dispersion(days([1.0] * 6), MODEL)
+    alike = fitting.gain_dispersion(days([1.0] * 6), MODEL)
     assert alike == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 12.0))
 
 
 def test_days_that_differ_let_a_sample_tell_less():
     """Differences far above what the noise allows: the larger they are, the less."""
     none, some, more = (
-        fitting.dispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL) for size in (0.0, 0.15, 0.3)
+        fitting.gain_dispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL) for size in (0.0, 0.15, 0.3)
     )
     assert more > 1.5 * some > 5.0 * none
-    assert fitting.prior(days([0.7, 1.3] * 3), MODEL).power < 0.2
+    assert fitting.prior_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2
 
 
 def test_levels_of_a_label_in_their_order():
@@ -252,9 +259,9 @@ def test_levels_of_a_label_in_their_order():
     values = np.repeat([1.0, 0.4000001, 1.0, np.nan, 0.7, 0.7000004], 3)
     samples = changed(small.flight(MODEL, 18), labels=np.column_stack([values, values]))
     use = np.ones(18, dtype=bool)
-    assert fitting._levels(Stretch(samples, use), 1) == [1.0, 0.4, 1.0, 0.7, 0.7]
+    assert fitting._labelled_effectiveness_levels(Stretch(samples, use), 1) == [1.0, 0.4, 1.0, 0.7, 0.7]
     use[:3] = False
-    assert fitting._levels(Stretch(samples, use), 0) == [0.4, 1.0, 0.7, 0.7]
+    assert fitting._labelled_effectiveness_levels(Stretch(samples, use), 0) == [0.4, 1.0, 0.7, 0.7]
 
 
 def test_settings_of_flights_that_change_in_every_way():
@@ -263,19 +270,19 @@ def test_settings_of_flights_that_change_in_every_way():
     weak = changed(rate, labels=np.tile([1.0, 0.5], (400, 1)))
     labels = np.ones((400, 2))
     labels[100:200, 0], labels[200:300, 0], labels[200:, 1] = 0.6, 0.2, 0.8
-    stretches = fitting.stretches_of([rate, weak, changed(rate, labels=labels)])
-    settings = fitting.prior(stretches, MODEL)
+    stretches = fitting.usable_stretches([rate, weak, changed(rate, labels=labels)])
+    settings = fitting.prior_settings(stretches, MODEL)
     assert settings.levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
-    hours = sum(stretch.use.sum() for stretch in stretches) / 36000.0
+    hours = sum(stretch.usable.sum() for stretch in stretches) / 36000.0
     assert settings.changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
     assert settings.repair_share == pytest.approx((1 + 10) / (4 + 20))
 
 
 def test_several_flights_are_left_out_in_turn():
-    one, two, three = stretches = fitting.stretches_of(
+    one, two, three = stretches = fitting.usable_stretches(
         [small.flight(MODEL, 60, name=name) for name in ("a", "b", "c")]
     )
-    assert fitting.folds(stretches) == [
+    assert fitting.validation_folds(stretches) == [
         ([two, three], one, "a"),
         ([one, three], two, "b"),
         ([one, two], three, "c"),
@@ -285,17 +292,19 @@ def test_several_flights_are_left_out_in_turn():
 def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
     use = np.zeros(20, dtype=bool)
     use[[3, 4, 9, 15, 18]] = True
-    ((first,), second, late), ((other,), same, early) = fitting.folds([Stretch(small.flight(MODEL, 20), use)])
+    ((first,), second, late), ((other,), same, early) = fitting.validation_folds(
+        [Stretch(small.flight(MODEL, 20), use)]
+    )
     assert (late, early) == ("second half", "first half")
-    assert np.flatnonzero(first.use).tolist() == np.flatnonzero(same.use).tolist() == [3, 4]
-    assert np.flatnonzero(second.use).tolist() == np.flatnonzero(other.use).tolist() == [9, 15, 18]
-    nothing = fitting.folds([Stretch(small.flight(MODEL, 20), np.zeros(20, dtype=bool))])
-    assert [kept.use.any() for _, kept, _ in nothing] == [False, False]
+    assert np.flatnonzero(first.usable).tolist() == np.flatnonzero(same.usable).tolist() == [3, 4]
+    assert np.flatnonzero(second.usable).tolist() == np.flatnonzero(other.usable).tolist() == [9, 15, 18]
+    nothing = fitting.validation_folds([Stretch(small.flight(MODEL, 20), np.zeros(20, dtype=bool))])
+    assert [kept.usable.any() for _, kept, _ in nothing] == [False, False]
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
     quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
-    entries, bounds = fitting.run_tests(stretches, fitted.model_copy(update={"settings": quick}))
+    entries, bounds = fitting.score_folds(stretches, fitted.model_copy(update={"settings": quick}))
     assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
     assert all(0.8 < share < 1.0 for entry in entries for share in entry["explained"].values())
@@ -306,7 +315,7 @@ def test_without_labels_bounds_stay_as_they_are():
     flights = [small.flight(TAIL, 200, seed=seed) for seed in range(3)]
     settings = TAIL.settings.model_copy(update={"bounds": 0.77})
     model = TAIL.model_copy(update={"settings": settings})
-    entries, bounds = fitting.run_tests(fitting.stretches_of(flights), model)
+    entries, bounds = fitting.score_folds(fitting.usable_stretches(flights), model)
     assert bounds == 0.77
     assert [set(entry) for entry in entries] == [{"left_out", "samples", "explained", "residual_rad_s"}] * 3
 
@@ -319,17 +328,17 @@ def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatc
         ([0.5, 0.6, 0.7, 0.8, 0.85, 0.99], 0.95),
     ):
         by_mass = dict(zip((0.5, 0.6, 0.7, 0.8, 0.9, 0.95), told, strict=True))
-        monkeypatch.setattr(fitting, "_rows_by_mass", lambda *given, by_mass=by_mass: by_mass)
-        monkeypatch.setattr(fitting, "by_labels", lambda held, labels: {"held_by_bounds": held})
-        assert fitting.run_tests(stretches, fitted)[1] == chosen
+        monkeypatch.setattr(fitting, "_diagnosis_by_credible_mass", lambda *given, by_mass=by_mass: by_mass)
+        monkeypatch.setattr(fitting, "score_against_labels", lambda held, labels: {"held_by_bounds": held})
+        assert fitting.score_folds(stretches, fitted)[1] == chosen
 
 
 def test_what_one_step_prediction_explains(stretches):
     """By the residual of the model itself, written out from its file."""
     (stretch,) = stretches
-    samples, use = stretch.samples, stretch.use
+    samples, use = stretch.samples, stretch.usable
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    rows, residual = fitting.residuals(MODEL, stretch)
+    rows, residual = fitting.one_step_residuals(MODEL, stretch)
     expected = [k for k in np.flatnonzero(use) if k >= 3]
     assert rows.tolist() == expected
     for i in (0, 100, len(expected) - 1):
@@ -342,14 +351,14 @@ def test_what_one_step_prediction_explains(stretches):
         )
         said = samples.rates[k] - np.array(MODEL.intercept) - past - moved
         np.testing.assert_allclose(residual[i], said, atol=1e-14)
-    found = fitting.prediction(MODEL, stretch)
+    found = fitting.one_step_prediction_quality(MODEL, stretch)
     assert found["samples"] == len(expected)
     for axis, name in enumerate("pqr"):
         share = 1.0 - residual[:, axis].var() / samples.rates[expected, axis].var()
         assert found["explained"][name] == pytest.approx(share)
         assert found["residual_rad_s"][name] == pytest.approx(residual[:, axis].std())
     nothing = Stretch(samples, np.zeros(len(use), dtype=bool))
-    assert fitting.prediction(MODEL, nothing) == {"samples": 0}
+    assert fitting.one_step_prediction_quality(MODEL, nothing) == {"samples": 0}
 
 
 def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch):
@@ -357,44 +366,65 @@ def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch)
     parts = [
         (np.array(peaks), minutes) for peaks, minutes in (([1.0, 5.0], 3.0), ([2.0], 4.0), ([3.0, 9.0], 5.0))
     ]
-    monkeypatch.setattr(fitting.extremes, "tail_of", lambda of: [peaks.max() for peaks, _ in of])
-    monkeypatch.setattr(fitting, "_threshold", lambda tail, per_hour, model: sum(tail) / per_hour)
-    monkeypatch.setattr(fitting, "_minutes", lambda of: sum(minutes for _, minutes in of))
+    monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda of: [peaks.max() for peaks, _ in of])
+    monkeypatch.setattr(
+        fitting, "_choose_alarm_threshold", lambda tail, per_hour, model: sum(tail) / per_hour
+    )
+    monkeypatch.setattr(fitting, "_total_healthy_minutes", lambda of: sum(minutes for _, minutes in of))
     # at two an hour: 2 + 9, 5 + 9, 5 + 2 over two
-    found = fitting._alone(parts, 2.0, None)
+    found = fitting._test_left_out_alarms(parts, 2.0, None)
     assert found == {"parts": 3, "minutes": 12.0, "alarmed": 1, "alarms": 1}
     parts[0] = (np.array([5.5, 5.0]), 3.0)
-    assert fitting._alone(parts, 2.0, None)["alarmed"] == 2
-    assert fitting._alone(parts, None, None) == fitting._alone(parts[:1], 2.0, None) == {}
+    assert fitting._test_left_out_alarms(parts, 2.0, None)["alarmed"] == 2
+    assert (
+        fitting._test_left_out_alarms(parts, None, None)
+        == fitting._test_left_out_alarms(parts[:1], 2.0, None)
+        == {}
+    )
 
 
 def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     """The noisiest of all parts, and of the first four the one that is read wrongly most easily."""
     noise, misread = {1: 0.7, 2: 2.5, 3: 1.4, 4: 1.1, 5: 0.9}, {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
     left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
-    monkeypatch.setattr(fitting, "_left_out", lambda *of: left_out)
-    monkeypatch.setattr(fitting, "_in_health", lambda tested, one: (noise[one], (np.array([1.0]), one / 60)))
-    monkeypatch.setattr(fitting, "_misread", lambda tested, one: misread[one])
-    monkeypatch.setattr(fitting, "_minutes", lambda parts: 60 * sum(hours for _, hours in parts))
+    monkeypatch.setattr(fitting, "_fit_without_parts", lambda *of: left_out)
+    monkeypatch.setattr(
+        fitting, "_healthy_alarm_statistics", lambda tested, one: (noise[one], (np.array([1.0]), one / 60))
+    )
+    monkeypatch.setattr(fitting, "_misread_log_likelihood", lambda tested, one: misread[one])
+    monkeypatch.setattr(
+        fitting, "_total_healthy_minutes", lambda parts: 60 * sum(hours for _, hours in parts)
+    )
     monkeypatch.setattr(fitting, "fit_order", lambda *of: "fit")
-    monkeypatch.setattr(fitting, "gain_sd", lambda fit, model: 0.25)
-    monkeypatch.setattr(fitting.trust, "tied", lambda used, model: np.zeros(2))
+    monkeypatch.setattr(fitting, "group_gain_sd", lambda fit, model: 0.25)
+    monkeypatch.setattr(fitting.trust, "explained_effect_share", lambda used, model: np.zeros(2))
 
-    def fitted_on(used, model, sd, scale):
-        return SimpleNamespace(model_copy=lambda update: update | {"of": (sd, scale)})
+    monkeypatch.setattr(fitting, "column_gain_sd", lambda fit, model, between: {"p": between})
 
-    monkeypatch.setattr(fitting.trust, "fitted_on", fitted_on)
-    monkeypatch.setattr(fitting.extremes, "tail_of", lambda parts: None)
+    def copied(known):
+        return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))
+
+    def fitted_ranges(used, model, sd, scale):
+        return copied({"of": (sd.tolist(), scale)})
+
+    monkeypatch.setattr(fitting.trust, "fitted_ranges", fitted_ranges)
+    monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: None)
     vehicle = SimpleNamespace(false_alarms_per_hour=None, other_laws=False)
     settings = SimpleNamespace(levels={"left": [0.5]}, model_copy=lambda update: update)
     model = SimpleNamespace(
-        vehicle=vehicle, history=2, lags=3, settings=settings, model_copy=lambda update: update
+        vehicle=vehicle,
+        history=2,
+        lags=3,
+        settings=settings,
+        groups=[["rudder"]],
+        model_copy=lambda update: update,
     )
-    found = fitting.trusted([], model)
-    assert found["fitted"] == {"tail": None, "misread": 0.6, "of": (0.25, 2.5)}
+    found = fitting.add_validity_range([], model)
+    expected = {"tail": None, "misread": 0.6, "of": ([0.25], 2.5), "column_sd": {"p": 0.0}}
+    assert found["fitted"].known == expected
     assert found["settings"] == {"false_alarms_per_hour": None, "threshold": None}
     assert found["identified"] == {}
     vehicle.false_alarms_per_hour = 0.5
-    more = fitting.extremes.SHOWN * 120 - 15
+    more = fitting.extremes.EXPECTED_ALARMS_RULED_OUT * 120 - 15
     with pytest.raises(BadInput, match=f"_per_hour 0.5: 15.0 min .* allowed: {more:.0f} min more"):
-        fitting.trusted([], model)
+        fitting.add_validity_range([], model)

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
-from beaver_ftc_logs.recording import Column, Recording
-from beaver_ftc_logs.regression import predicted
+from beaver_ftc_logs.recording import Column, RecordedFlight
+from beaver_ftc_logs.regression import split_response
 from kept import in_short
 from products.logs import small
 
@@ -22,7 +22,7 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
-    ok, unexplained, answers = predicted(samples, model)
+    ok, unexplained, answers = split_response(samples, model)
     sd = np.sqrt(np.diag(model.noise))
     whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
@@ -51,13 +51,17 @@ def test_least_squares_by_one_batch(name):
             min(of, key=lambda level, v=v: abs(level - np.clip(v, 0, 1)))
             for v, of in zip(value, levels, strict=True)
         ]
-        assert rows.estimate[k].tolist() == nearest
+        assert rows.effectiveness[k].tolist() == nearest
         low, high = (np.clip(value + side * 1.645 * sd, 0.0, 1.0) for side in (-1, 1))
-        np.testing.assert_allclose(rows.low[k], np.minimum(low, nearest), atol=1e-9)
-        np.testing.assert_allclose(rows.high[k], np.maximum(high, nearest), atol=1e-9)
+        np.testing.assert_allclose(rows.effectiveness_low[k], np.minimum(low, nearest), atol=1e-9)
+        np.testing.assert_allclose(rows.effectiveness_high[k], np.maximum(high, nearest), atol=1e-9)
         named = "+".join(side for side, level in zip(("right", "left"), nearest, strict=True) if level < 1.0)
-        assert (rows.named[k], rows.faulty[k], rows.probability[k]) == (named, bool(named), bool(named))
-    assert rows.named[399] == "left"
+        assert (rows.named_surfaces[k], rows.faulty[k], rows.fault_probability[k]) == (
+            named,
+            bool(named),
+            bool(named),
+        )
+    assert rows.named_surfaces[399] == "left"
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -68,9 +72,9 @@ def test_without_labels_a_loss_is_sure_by_five_sd(name):
     sure = []
     for k in range(0, 400, 25):
         value, sd = batch(samples, model, k, name == "forgetting")
-        np.testing.assert_allclose(rows.estimate[k], np.clip(value, 0, 1), atol=1e-9)
+        np.testing.assert_allclose(rows.effectiveness[k], np.clip(value, 0, 1), atol=1e-9)
         lost = [side for side, v, s in zip(("right", "left"), value, sd, strict=True) if v + 5.0 * s < 1.0]
-        assert rows.named[k] == "+".join(lost)
+        assert rows.named_surfaces[k] == "+".join(lost)
         sure.append(bool(lost))
     assert 3 < sum(sure) < 14
 
@@ -80,14 +84,12 @@ def test_without_labels_a_loss_is_sure_by_five_sd(name):
 def test_rows_of_least_squares(changed, name, of):
     model = {"wing": WING, "tail": TAIL}[of]
     rows = detectors.diagnose_with(METHODS[name], small.flight(model, 300, lost=LOST), model)
-    said = {
-        what: in_short(getattr(rows, what)) for what in ("estimate", "low", "high", "probability", "faulty")
-    }
-    assert not changed(said | {"named": rows.named[::25]})
+    said = {name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()}
+    assert not changed(said | {"faulty": in_short(rows.faulty), "named": rows.named_surfaces[::25]})
 
 
 def logged(*columns):
-    return Recording("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
+    return RecordedFlight("one", {name: Column(np.array(t), np.array(v)) for name, t, v in columns})
 
 
 def test_an_output_that_stands_still_for_six_seconds_is_frozen():
@@ -96,24 +98,26 @@ def test_an_output_that_stands_still_for_six_seconds_is_frozen():
     values = np.where((t_s > 2.0) & (t_s < 20.0), 5.0, t_s)
     moving = ("elevator_output", np.arange(0.0, 30.0, 3.0), np.arange(10.0))
     samples = small.flight(TAIL, 60, dt_s=0.5, t_s=0.5 * np.arange(60))
-    rows = detectors.freeze(logged(("left_output", t_s, values), moving), samples, TAIL)
+    rows = detectors.diagnose_by_freeze_rule(logged(("left_output", t_s, values), moving), samples, TAIL)
     frozen = [3.0 + 6.0 < t < 21.0 for t in samples.t_s]
     assert rows.faulty.tolist() == frozen
-    assert set(rows.named[np.array(frozen)]) == {"left_aileron"}
-    np.testing.assert_array_equal(rows.estimate, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))]))
-    np.testing.assert_array_equal(rows.probability, np.array(frozen, dtype=float))
-    np.testing.assert_array_equal(rows.low, rows.estimate)
-    np.testing.assert_array_equal(rows.high, rows.estimate)
+    assert set(rows.named_surfaces[np.array(frozen)]) == {"left_aileron"}
+    np.testing.assert_array_equal(
+        rows.effectiveness, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))])
+    )
+    np.testing.assert_array_equal(rows.fault_probability, np.array(frozen, dtype=float))
+    np.testing.assert_array_equal(rows.effectiveness_low, rows.effectiveness)
+    np.testing.assert_array_equal(rows.effectiveness_high, rows.effectiveness)
 
 
 def test_before_its_first_stamp_an_output_is_not_frozen():
     samples = small.flight(TAIL, 40, dt_s=1.0, t_s=np.arange(40.0))
     late = logged(("elevator_output", [20.0, 21.0], [1.0, 1.0]))
-    rows = detectors.freeze(late, samples, TAIL)
+    rows = detectors.diagnose_by_freeze_rule(late, samples, TAIL)
     assert np.flatnonzero(rows.faulty).tolist() == list(range(27, 40))
-    assert set(rows.named) == {"", "elevator"}
-    assert detectors.freeze(logged(), samples, TAIL) is None
-    assert detectors.freeze(late, samples, BARE) is None
+    assert set(rows.named_surfaces) == {"", "elevator"}
+    assert detectors.diagnose_by_freeze_rule(logged(), samples, TAIL) is None
+    assert detectors.diagnose_by_freeze_rule(late, samples, BARE) is None
 
 
 @pytest.mark.parametrize("model", [WING, TAIL], ids=["wing", "tail"])
@@ -121,8 +125,8 @@ def test_what_a_detector_of_the_loop_is_given(model):
     """The innovation is the one-step residual, nothing where the model is silent; commands of each group."""
     samples = small.flight(model, 60, gap=30)
     samples.rates[45, 2] = samples.commands[50, 0] = np.nan
-    stream = detectors.stream_of(samples, model)
-    ok, unexplained, answers = predicted(samples, model)
+    stream = detectors.loop_detector_inputs(samples, model)
+    ok, unexplained, answers = split_response(samples, model)
     intercept, x = np.array(model.intercept), np.nan_to_num(samples.rates)
     members = [[0], [1]] if model is WING else [[0, 2], [1]]
     for k, (now, command) in enumerate(stream):
@@ -144,18 +148,18 @@ def test_what_a_detector_of_the_loop_is_given(model):
 def test_a_detector_of_the_loop_knows_three_groups():
     table = {"a": {"roll": 1.0}, "b": {"pitch": 1.0}, "c": {"roll": 1.0, "pitch": 1.0}}
     three = small.model(small.WING | {"surfaces": table, "labels": {}})
-    assert len(detectors.stream_of(small.flight(three, 20), three)) == 20
+    assert len(detectors.loop_detector_inputs(small.flight(three, 20), three)) == 20
     four = small.WING | {"surfaces": table | {"d": {"roll": 1.0, "pitch": -1.0}}, "labels": {}}
     model = small.model(four)
     with pytest.raises(
         BadInput, match="wing: 4 groups of surfaces, allowed for a detector of the loop: at most 3"
     ):
-        detectors.stream_of(small.flight(model, 20), model)
+        detectors.loop_detector_inputs(small.flight(model, 20), model)
 
 
 def test_what_a_detector_is_told_before_the_flight(changed):
-    told = detectors.context_of(WING)
-    assert isinstance(told.model, detectors.Linear)
+    told = detectors.loop_detector_context(WING)
+    assert isinstance(told.model, detectors.LinearRateModel)
     fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
     assert not changed(fields | {"declared": vars(told.declared)})
     x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
@@ -197,20 +201,20 @@ VERDICTS = {
 def test_a_verdict_of_the_loop_becomes_a_row(name):
     verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
     samples = small.flight(BARE, 3)
-    rows = detectors.rows_of([Verdict(), verdict, Verdict()], samples, BARE)
-    assert (rows.named.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
-    np.testing.assert_allclose(rows.estimate, [[1, 1], estimate, [1, 1]])
-    np.testing.assert_allclose(rows.low, [[1, 1], low, [1, 1]])
-    np.testing.assert_allclose(rows.high, np.ones((3, 2)))
-    np.testing.assert_allclose(rows.probability, [0.0, probability, 0.0])
+    rows = detectors.rows_of_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
+    assert (rows.named_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
+    np.testing.assert_allclose(rows.effectiveness, [[1, 1], estimate, [1, 1]])
+    np.testing.assert_allclose(rows.effectiveness_low, [[1, 1], low, [1, 1]])
+    np.testing.assert_allclose(rows.effectiveness_high, np.ones((3, 2)))
+    np.testing.assert_allclose(rows.fault_probability, [0.0, probability, 0.0])
 
 
 def test_surfaces_that_move_together_share_a_verdict():
     both = LOSS._replace(isolated="aileron")
-    rows = detectors.rows_of([both], small.flight(TAIL, 1), TAIL)
-    assert rows.named.tolist() == ["left_aileron+right_aileron"]
-    assert rows.estimate.tolist() == [[0.6, 1.0, 0.6]]
-    assert rows.low.tolist() == [[0.0, 1.0, 0.0]]
+    rows = detectors.rows_of_verdicts([both], small.flight(TAIL, 1), TAIL)
+    assert rows.named_surfaces.tolist() == ["left_aileron+right_aileron"]
+    assert rows.effectiveness.tolist() == [[0.6, 1.0, 0.6]]
+    assert rows.effectiveness_low.tolist() == [[0.0, 1.0, 0.0]]
 
 
 def test_a_detector_is_stepped_through_the_whole_flight():
@@ -220,7 +224,7 @@ def test_a_detector_is_stepped_through_the_whole_flight():
         step=lambda measured, command: told.append(measured.t_s) or Verdict(statistic=measured.t_s),
     )
     samples = small.flight(BARE, 30)
-    rows = detectors.run_detector(detector, samples, BARE)
+    rows = detectors.run_loop_detector(detector, samples, BARE)
     assert told == [0.1, *samples.t_s]
     assert np.flatnonzero(rows.faulty)[0] == 11
 

@@ -7,19 +7,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beaver_ftc.documents import BadInput
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc_logs import fitting, identification
 from beaver_ftc_logs.fitting import Stretch
 from beaver_ftc_logs.identification import (
-    by_pressure,
+    fit_output_error,
+    identification_text,
     identify,
-    output_error,
     regressor_names,
     residual_spectrum,
-    summary,
+    scale_commands_by_pressure,
 )
-from beaver_ftc_logs.pages import template
-from beaver_ftc_logs.samples import Samples, with_pressure
+from beaver_ftc_logs.pages import load_template
+from beaver_ftc_logs.samples import Samples, scale_by_dynamic_pressure
 from products.logs import small
 
 MODEL = small.model()
@@ -42,15 +43,15 @@ def pressed(flight, seed=3):
 
 def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    (anew,), described = by_pressure([pressed(flight)], its)
+    (anew,), described = scale_commands_by_pressure([pressed(flight)], its)
     assert described.reference_airspeed_mps == pytest.approx(20.0, rel=0.02)
     ratio = (20.0 / described.reference_airspeed_mps) ** 2
     assert anew.commands == pytest.approx(ratio * flight.commands)
     wind = replace(flight, airspeed=pressed(flight).airspeed)
     for plain in ([wind], [flight]):
-        assert by_pressure(plain, its) == (plain, its)
+        assert scale_commands_by_pressure(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
-    assert by_pressure([pressed(flight)], told)[1] == told
+    assert scale_commands_by_pressure([pressed(flight)], told)[1] == told
 
 
 def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
@@ -59,13 +60,13 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
     by_speed = (flown.airspeed / 20.0)[:, None] ** np.array([[1.0, 2.0]])
     mixed = replace(flown, commands=flight.commands / by_speed)
     told = its.model_copy(update={"other_laws": True})
-    (anew,), described = by_pressure([mixed], told)
+    (anew,), described = scale_commands_by_pressure([mixed], told)
     assert described.airspeed_powers == {"right": 1.0}
     ratio = 20.0 / described.reference_airspeed_mps
     assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
-    assert by_pressure([flown], told)[1].airspeed_powers == {}
-    assert by_pressure([mixed], its)[1].airspeed_powers == {}
-    said = summary(MODEL.model_copy(update={"vehicle": described, "identified": SAYS_LITTLE}))
+    assert scale_commands_by_pressure([flown], told)[1].airspeed_powers == {}
+    assert scale_commands_by_pressure([mixed], its)[1].airspeed_powers == {}
+    said = identification_text(MODEL.model_copy(update={"vehicle": described, "identified": SAYS_LITTLE}))
     assert "right with airspeed^1\n" in said
     with pytest.raises(ValueError, match="contradictory"):
         small.vehicle(airspeed_powers={"fin": 1})
@@ -77,19 +78,21 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
         for speeds in ([np.nan, 10.0, 12.0, 90.0], [11.0, np.nan, 13.0, 30.0])
     ]
     asked = []
-    monkeypatch.setattr(identification, "with_pressure", lambda one, mps, powers: asked.append(mps) or one)
-    monkeypatch.setattr(identification, "_criterion", lambda flown, of: 0.0)
+    monkeypatch.setattr(
+        identification, "scale_by_dynamic_pressure", lambda one, mps, powers: asked.append(mps) or one
+    )
+    monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
     its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    assert by_pressure(flights, its) == (flights, its)
+    assert scale_commands_by_pressure(flights, its) == (flights, its)
     assert asked == [12.5, 12.5]
 
 
 def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
     flight = replace(small.flight(MODEL, 100), airspeed=np.where(np.arange(100) < 50, np.nan, 10.0))
-    found = with_pressure(flight, 20.0)
+    found = scale_by_dynamic_pressure(flight, 20.0)
     assert found.commands[:50] == pytest.approx(flight.commands[:50])
     assert found.commands[50:] == pytest.approx(flight.commands[50:] / 4.0)
-    stopped = with_pressure(replace(flight, airspeed=np.zeros(100)), 20.0)
+    stopped = scale_by_dynamic_pressure(replace(flight, airspeed=np.zeros(100)), 20.0)
     assert stopped.commands == pytest.approx(0.1 * flight.commands)
     assert (found.signals[:50] == 0.0).all()
     assert found.signals[50:] == pytest.approx(-0.5 * flight.rates[50:])
@@ -100,7 +103,7 @@ def test_the_account_of_an_identification(changed, identified):
         {what: told for what, told in identified.identified.items() if what != "output_error"}, part="found"
     )
     assert not changed(identified.settings.model_dump(), part="settings")
-    assert not changed(summary(identified).splitlines(), part="summary")
+    assert not changed(identification_text(identified).splitlines(), part="summary")
 
 
 DAY = {
@@ -155,7 +158,10 @@ def test_an_account_in_lines(changed):
         "one": (small.WING, FOUND | {"collinear": FOUND["collinear"][1:], "tests": []}),
     }
     assert not changed(
-        {name: summary(small.model(of, identified=found)).splitlines() for name, (of, found) in cases.items()}
+        {
+            name: identification_text(small.model(of, identified=found)).splitlines()
+            for name, (of, found) in cases.items()
+        }
     )
 
 
@@ -169,8 +175,8 @@ def test_names_of_the_regressors():
 
 def test_collinear_is_more_than_tenfold_worst_first(monkeypatch):
     factors = np.array([10.0, 10.1, 1.0, 40.0, np.inf, *[2.0] * 7])
-    monkeypatch.setattr(identification, "variance_inflation", lambda x: factors)
-    found = identification.collinear(fitting.stretches_of([small.flight(MODEL, 200)]), MODEL)
+    monkeypatch.setattr(identification, "variance_inflation_factors", lambda x: factors)
+    found = identification.collinear_regressors(fitting.usable_stretches([small.flight(MODEL, 200)]), MODEL)
     assert [(one["regressor"], one["inflation"]) for one in found] == [
         ("q[-2]", None), ("p[-2]", 40.0), ("q[-1]", 10.1),
     ]  # fmt: skip
@@ -181,22 +187,24 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
     model = small.model(small.TAIL)
     samples = small.flight(model, 300)
     samples.signals[:] = 20.0
-    stretches = fitting.stretches_of([samples])
-    found = identification.collinear(stretches, model)
+    stretches = fitting.usable_stretches([samples])
+    found = identification.collinear_regressors(stretches, model)
     assert found[0] == {"regressor": "airspeed_m_s[-1]", "inflation": None}
     assert json.loads(as_json(found)) == found
     told = model.model_copy(update={"identified": FOUND | {"collinear": found}})
-    assert "most airspeed_m_s[-1] (made up by the others)" in summary(told)
-    page = template("model.html.j2")
+    assert "most airspeed_m_s[-1] (made up by the others)" in identification_text(told)
+    page = load_template("model.html.j2")
     said = {"mark": "", "used": 1, "coefficients": [], "fits": "", "spectrum": "", "correlation": ""}
     whole = FOUND | {"collinear": found, "spectrum": [], "tests": []}
     assert ">made up by the others</td>" in page.render(model=model, found=whole, **said)
 
 
 def test_inflation_is_of_the_regressors_without_the_constant():
-    stretches = fitting.stretches_of([small.flight(MODEL, 200)])
-    x = fitting.stacked(stretches, MODEL.vehicle, MODEL.history, MODEL.lags)[0]
-    found = {one["regressor"]: one["inflation"] for one in identification.collinear(stretches, MODEL)}
+    stretches = fitting.usable_stretches([small.flight(MODEL, 200)])
+    x = fitting.stacked_regression(stretches, MODEL.vehicle, MODEL.history, MODEL.lags)[0]
+    found = {
+        one["regressor"]: one["inflation"] for one in identification.collinear_regressors(stretches, MODEL)
+    }
     for i, name in enumerate(regressor_names(MODEL), 1):
         others = np.delete(x, i, axis=1)
         rest = x[:, i] - others @ np.linalg.lstsq(others, x[:, i], rcond=None)[0]
@@ -207,10 +215,10 @@ def test_inflation_is_of_the_regressors_without_the_constant():
 
 
 def test_colour_is_the_median_over_the_responses():
-    stretches = fitting.stretches_of([small.flight(MODEL, 300)])
+    stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
     fit = fitting.fit_order(stretches, MODEL.vehicle, 2, 3)
-    found = identification.colour(stretches, MODEL)
-    assert found == dict(zip("pqr", np.median(fit.colour[7:], axis=0), strict=True))
+    found = identification.standard_error_inflation(stretches, MODEL)
+    assert found == dict(zip("pqr", np.median(fit.standard_error_inflation[7:], axis=0), strict=True))
 
 
 def test_a_spectrum_by_bands():
@@ -219,13 +227,13 @@ def test_a_spectrum_by_bands():
     model = small.model(rate_hz=20.0)
     samples = small.flight(model, 600)
     samples.rates[:, 1] += 0.5 * np.sin(2 * np.pi * 3.0 * samples.t_s)
-    stretches = fitting.stretches_of([samples])
+    stretches = fitting.usable_stretches([samples])
     bands = residual_spectrum(stretches, model)
     ends = [(band["from_hz"], band["to_hz"]) for band in bands]
     assert ends == [(0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0)]
     from scipy import signal
 
-    residual = fitting.residuals(model, stretches[0])[1]
+    residual = fitting.one_step_residuals(model, stretches[0])[1]
     frequency, density = signal.welch(residual, fs=20.0, nperseg=256, axis=0)
     for (low, high), band in zip(ends, bands, strict=True):
         inside = (frequency > low) & (frequency <= high)
@@ -233,7 +241,7 @@ def test_a_spectrum_by_bands():
             white = residual[:, axis].var() / 10.0
             assert band[name] == pytest.approx(density[inside, axis].mean() / white)
     assert max(bands, key=lambda band: band["q"])["from_hz"] == 2.0
-    low = residual_spectrum(fitting.stretches_of([small.flight(MODEL, 300)]), MODEL)
+    low = residual_spectrum(fitting.usable_stretches([small.flight(MODEL, 300)]), MODEL)
     assert [band["to_hz"] for band in low] == [0.1, 0.5, 1.0, 2.0, 5.0]
 
 
@@ -254,7 +262,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
 
 
 def test_servo_lag_and_delay_are_found(changed):
-    found = output_error(fitting.stretches_of([lagged()]), [[0], [1]])
+    found = fit_output_error(fitting.usable_stretches([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
     assert min(found["explained_of_windows_not_fitted"].values()) > 0.98
@@ -271,7 +279,7 @@ def _short(value):
 
 
 def test_a_servo_faster_than_the_rate_tells_is_said():
-    found = output_error(fitting.stretches_of([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]])
+    found = fit_output_error(fitting.usable_stretches([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]])
     assert found["shorter_than_can_be_told"] is True
 
 
@@ -288,14 +296,14 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         return SimpleNamespace(x=x, jac=jac, fun=fun)
 
     monkeypatch.setattr("scipy.optimize.least_squares", fitted)
-    stretches = fitting.stretches_of([lagged(600)])
-    found = output_error(stretches, [[0], [1]])
+    stretches = fitting.usable_stretches([lagged(600)])
+    found = fit_output_error(stretches, [[0], [1]])
     assert found["shorter_than_can_be_told"] is short
     errors = np.sqrt(np.diag(np.linalg.inv(jac.T @ jac)) * (fun @ fun) / 1000)
     assert [found["servo_lag_sd_s"], found["delay_sd_s"]] == pytest.approx(errors[:2])
     assert (found["servo_lag_s"], found["delay_s"]) == (lag_s, 0.13)
-    commands, rates = identification._windows(stretches, [[0], [1]], 20, 7)
-    run = identification._run(x, commands, rates, 0.1)
+    commands, rates = identification._cut_free_run_windows(stretches, [[0], [1]], 20, 7)
+    run = identification._simulate_free_runs(x, commands, rates, 0.1)
     np.testing.assert_allclose(
         given["first"], ((run - rates) / rates.std(axis=(0, 1)))[::2].ravel(), rtol=1e-6
     )
@@ -304,7 +312,7 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         share = 1.0 - left.var() / of.var()
         assert found["explained_of_windows_not_fitted"][name] == pytest.approx(share)
     assert (given["loss"], given["max_nfev"]) == ("soft_l1", 40)
-    start, low, high = identification._start(2, 0.1)
+    start, low, high = identification._initial_output_error_parameters(2, 0.1)
     np.testing.assert_array_equal(given["start"], start)
     np.testing.assert_array_equal(given["bounds"], (low, high))
 
@@ -313,12 +321,12 @@ def test_too_few_windows_are_said():
     """Of 2 s, after 0.7 s of the past: 20 want 407 samples; windows that end with the log are not taken."""
     says = "too few gap-free windows in which every rate moves"
     samples = lagged(407, noise=0.01)
-    found = output_error([Stretch(samples, np.ones(407, dtype=bool))], [[0], [1]])
+    found = fit_output_error([Stretch(samples, np.ones(407, dtype=bool))], [[0], [1]])
     assert found == {"windows": 19, "says": says}
     samples = lagged(408, noise=0.01)
-    assert "delay_s" in output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
+    assert "delay_s" in fit_output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
     samples.rates[:, 1] = 0.01
-    still = output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
+    still = fit_output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
     assert still == {"windows": 20, "says": says}
 
 
@@ -331,13 +339,13 @@ def test_windows_with_their_past():
     labels = np.full((n, 2), np.nan)
     labels[:, 1] = 0.5
     run = np.where(np.arange(n) < 14, 0, 1)
-    given = {"commands": commands, "rates": rates, "labels": labels, "run": run}
+    given = {"commands": commands, "rates": rates, "labels": labels, "stretch_number": run}
     samples = Samples(**(vars(small.flight(MODEL, n)) | given))
     use = np.ones(n, dtype=bool)
     use[22] = False
     rates[29, 1] = np.nan
     commands[35, 0] = np.nan
-    found, measured = identification._windows([Stretch(samples, use)], [[0], [1]], 3, 2)
+    found, measured = identification._cut_free_run_windows([Stretch(samples, use)], [[0], [1]], 3, 2)
     scaled = commands * [1.0, 0.5]
     lost = {
         *range(14, 18),
@@ -348,21 +356,23 @@ def test_windows_with_their_past():
     ends = [end for end in range(5, n, 3) if end - 1 not in lost]
     np.testing.assert_array_equal(found, [scaled[end - 5 : end] for end in ends])
     np.testing.assert_array_equal(measured, [rates[end - 3 : end] for end in ends])
-    together, _ = identification._windows([Stretch(samples, use)], [[0, 1]], 3, 2)
+    together, _ = identification._cut_free_run_windows([Stretch(samples, use)], [[0, 1]], 3, 2)
     np.testing.assert_array_equal(together[:, :, 0], found.sum(axis=2))
 
 
 @pytest.mark.parametrize(("n", "kept_of"), [(1601, 1), (1603, 2), (2404, 3)])
 def test_of_many_windows_every_so_many_is_kept(n, kept_of):
     samples = small.flight(MODEL, n)
-    commands, rates = identification._windows([Stretch(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1)
+    commands, rates = identification._cut_free_run_windows(
+        [Stretch(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1
+    )
     every = range(3, n, 2)
     np.testing.assert_array_equal(rates, [samples.rates[end - 2 : end] for end in every][::kept_of])
     assert len(commands) == len(rates)
 
 
 def test_where_the_fit_begins_and_what_it_may_say():
-    start, low, high = identification._start(2, 0.05)
+    start, low, high = identification._initial_output_error_parameters(2, 0.05)
     assert start.tolist() == [
         0.1, 0.05, 0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7, *[0.01] * 6, 0, 0, 0,
     ]  # fmt: skip
@@ -379,7 +389,7 @@ def test_a_free_run_is_the_equation_sample_by_sample(delay_s):
     commands, rates = rng.standard_normal((3, 9, 2)), rng.standard_normal((3, 5, 3))
     a, b, c = 0.4 * rng.standard_normal((3, 3)), rng.standard_normal((2, 3)), rng.standard_normal(3)
     parameters = np.concatenate([[0.08, delay_s], a.ravel(), b.ravel(), c])
-    found = identification._run(parameters, commands, rates, 0.1)
+    found = identification._simulate_free_runs(parameters, commands, rates, 0.1)
     keep = np.exp(-0.1 / 0.08)
     for w in range(3):
         servo, x, expected = commands[w, 0], rates[w, 0], []
@@ -391,3 +401,12 @@ def test_a_free_run_is_the_equation_sample_by_sample(delay_s):
             command = [np.interp(at, np.arange(9), commands[w, :, g]) for g in (0, 1)]
             servo = keep * servo + (1 - keep) * np.array(command)
         np.testing.assert_allclose(found[w], expected, atol=1e-12)
+
+
+def test_a_flight_without_a_healthy_sample_is_refused_by_its_name():
+    model = small.model()
+    lost = small.flight(model, 100, name="lost", rates=np.full((100, 3), np.nan))
+    with pytest.raises(
+        BadInput, match=r"^identify: lost: 0 samples known to be healthy, allowed: at least 2$"
+    ):
+        identification._choose_noise_average(lost, model.vehicle, (4, 4))

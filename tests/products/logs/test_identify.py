@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.fitting import usable
+from beaver_ftc_logs.fitting import is_usable_for_fit
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import constant_parts, load_flights
+from beaver_ftc_logs.samples import constant_stretches, load_flights_for_fit
 from products.logs import synthetic
 
 
@@ -39,8 +39,8 @@ def test_what_the_labels_say_becomes_the_prior(wing_model):
 def test_edges_of_labels_are_not_fitted(wing, wing_folder):
     flown = synthetic.fly(60.0, parts=((30, 40, 1.0, 0.5),))
     flown["left_effectiveness"][:50] = np.nan
-    samples = load_flights([synthetic.write_csv(wing_folder / "edges.csv", flown)], wing)[0]
-    use, t_s = usable(samples), samples.t_s
+    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "edges.csv", flown)], wing)[0]
+    use, t_s = is_usable_for_fit(samples), samples.t_s
     assert not use[t_s < 5.0].any()
     assert not use[np.abs(t_s - 30.0) < 1.4].any()
     assert use[(t_s > 32) & (t_s < 38)].all()
@@ -48,10 +48,10 @@ def test_edges_of_labels_are_not_fitted(wing, wing_folder):
 
 def test_constant_parts_cover_everything_once():
     labels = np.array([[1.0], [1.0], [0.5], [np.nan], [np.nan], [1.0]])
-    assert constant_parts(labels) == [(0, 2), (2, 3), (3, 5), (5, 6)]
+    assert constant_stretches(labels) == [(0, 2), (2, 3), (3, 5), (5, 6)]
 
 
 def test_too_short_a_flight_is_refused(wing, wing_folder):
     path = synthetic.write_csv(wing_folder / "short.csv", synthetic.fly(8.0))
     with pytest.raises(BadInput, match="samples known to be healthy, allowed: at least"):
-        identify(load_flights([path], wing), wing)
+        identify(load_flights_for_fit([path], wing), wing)

@@ -72,22 +72,6 @@ def test_a_doubled_column_is_one_line(tmp_path, suffix):
         read_flight(path)
 
 
-def test_a_log_with_more_rows_at_once_than_a_run_writes_is_one_line(tmp_path):
-    from beaver_ftc.results.log import StoredLog
-
-    path = tmp_path / "log.parquet"
-    parquet.write_table(pa.table({"t_s": np.zeros(1_000_001, dtype=np.int8)}), path, row_group_size=2_000_000)
-    with pytest.raises(BadInput, match="has 1,000,001 rows in a row group, allowed: up to 1,000,000"):
-        list(StoredLog(path).read_chunks())
-
-
-def test_used_up_memory_is_said_in_plain_words():
-    from beaver_ftc.cli.shared import failure_of
-
-    assert str(failure_of(MemoryError("4 GiB wanted"))) == "there is not enough memory for this: 4 GiB wanted"
-    assert str(failure_of(MemoryError())) == "there is not enough memory for this"
-
-
 @pytest.mark.parametrize("text", ["uint64_t timestamp;wide[60000] a;", "uint64_t timestamp;bomb a;"])
 def test_a_ulog_whose_messages_hold_too_much_is_one_line(tmp_path, text):
     """60,000 times 60,000 fields, and a message in itself: pyulog writes each field out."""

@@ -12,7 +12,7 @@ from pyarrow import csv, parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import readers, samples
-from beaver_ftc_logs.check import check
+from beaver_ftc_logs.check import check_log
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.readers import read_flight, read_parts, table
 from products.logs import synthetic
@@ -33,8 +33,8 @@ print("PEAK", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 def parted(monkeypatch):
     """Parts of 500 rows, fits of 600 samples in stretches of 100."""
     monkeypatch.setattr(readers, "PART_ROWS", 500)
-    monkeypatch.setattr(samples, "MOST_SAMPLES", 600)
-    monkeypatch.setattr(samples, "_STRETCH", 100)
+    monkeypatch.setattr(samples, "MAX_FIT_SAMPLES", 600)
+    monkeypatch.setattr(samples, "_STRETCH_SAMPLES", 100)
 
 
 def write(path, columns):
@@ -94,7 +94,7 @@ def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypa
         lines.insert(k, "1,2,3")
     path = tmp_path / "long.csv"
     path.write_text("\n".join(lines) + "\n")
-    _, parts = table._parts(path, None, 100)
+    _, parts = table._table_parts(path, None, 100)
     counted = [[int(text.rpartition(" ")[2]) for _, text in said] for _, said, _ in parts]
     assert len(counted) == 3
     assert sum(map(sum, counted)) == 4
@@ -102,11 +102,11 @@ def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypa
 
 def test_a_fit_looks_at_stretches_that_are_spread_evenly(tmp_path, parted, wing):
     path = write(tmp_path / "long.csv", synthetic.fly(400.0))
-    (found,) = samples.load_flights([path], wing)
-    assert found.parts > 1
+    (found,) = samples.load_flights_for_fit([path], wing)
+    assert found.n_parts > 1
     assert len(found.t_s) <= 600
-    assert found.notes[0].startswith(f"a long log, read in {found.parts} parts: {len(found.t_s)} samples")
-    edges = found.t_s[np.flatnonzero(np.diff(found.run, prepend=-1))]
+    assert found.notes[0].startswith(f"a long log, read in {found.n_parts} parts: {len(found.t_s)} samples")
+    edges = found.t_s[np.flatnonzero(np.diff(found.stretch_number, prepend=-1))]
     assert np.diff(edges) == pytest.approx(80.0, abs=20.0)
     whole = read_flight(path).columns["q_rad_s"]
     np.testing.assert_array_equal(found.rates[:, 1], whole.values[np.searchsorted(whole.t_s, found.t_s)])
@@ -115,23 +115,23 @@ def test_a_fit_looks_at_stretches_that_are_spread_evenly(tmp_path, parted, wing)
 def test_parts_say_what_the_whole_says(tmp_path, parted, wing, wing_model):
     columns = synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5)
     path = write(tmp_path / "long.csv", columns)
-    whole = diagnose(samples.sample(read_flight(path), wing), wing_model)
-    for part in samples.flights_of([path], wing):
+    whole = diagnose(samples.resample(read_flight(path), wing), wing_model)
+    for part in samples.stream_flights([path], wing):
         rows = diagnose(part, wing_model)
         settled = rows.t_s > rows.t_s[0] + 25.0
         known = np.searchsorted(whole.t_s, rows.t_s[settled])
-        assert (rows.named[settled] == whole.named[known]).mean() > 0.97
-        assert np.abs(rows.estimate[settled] - whole.estimate[known]).mean() < 0.1
+        assert (rows.named_surfaces[settled] == whole.named_surfaces[known]).mean() > 0.97
+        assert np.abs(rows.effectiveness[settled] - whole.effectiveness[known]).mean() < 0.1
 
 
 def test_check_looks_at_every_part(tmp_path, parted, wing):
     columns = synthetic.fly(240.0)
     columns["r_rad_s"][1700:1800] = columns["r_rad_s"][1700]
-    found = check(write(tmp_path / "long.csv", columns), wing, None)
+    found = check_log(write(tmp_path / "long.csv", columns), wing, None)
     frozen = [line for line in found["lines"] if "frozen" in line]
     assert frozen == ["part 4 of 5: r_rad_s: frozen, the same to the last bit for 9.9 s"]
     columns["q_rad_s"][2200:] *= 1e4
-    found = check(write(tmp_path / "far.csv", columns), wing, None)
+    found = check_log(write(tmp_path / "far.csv", columns), wing, None)
     assert not found["usable"]
     assert "column q_rad_s reaches" in found["lines"][-1]
 

@@ -7,11 +7,11 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
-from beaver_ftc_logs.bank import bank_of, noise_of
-from beaver_ftc_logs.filtering import _update, posterior_of
-from beaver_ftc_logs.model import Colour, Fitted, as_text, load_model
-from beaver_ftc_logs.regression import in_white, predicted
-from beaver_ftc_logs.samples import whitened
+from beaver_ftc_logs.bank import build_hypothesis_bank, build_residual_noise
+from beaver_ftc_logs.filtering import _update_gaussian, hypothesis_posterior
+from beaver_ftc_logs.model import FittedRanges, NoiseModel, as_text, load_model
+from beaver_ftc_logs.regression import split_response, split_whitened_response
+from beaver_ftc_logs.samples import whiten_samples
 from products.logs import small
 
 AVERAGE = (1.0, -1.4, 0.49)
@@ -21,7 +21,7 @@ def test_a_whitened_flight_averages_to_what_it_was():
     """C(z) of the filtered is C(1) times what was measured, sample by sample; a gap begins anew."""
     flight = small.flight(small.model(), 80)
     flight.rates[50] = np.nan
-    found = whitened(replace(flight, run=(np.arange(80) >= 30).astype(np.int64)), AVERAGE)
+    found = whiten_samples(replace(flight, stretch_number=(np.arange(80) >= 30).astype(np.int64)), AVERAGE)
     for now, was in ((found.rates, flight.rates), (found.commands, flight.commands)):
         again = now[2:] + AVERAGE[1] * now[1:-1] + AVERAGE[2] * now[:-2]
         inside = np.setdiff1d(np.arange(2, 80), [30, 31, 50, 51, 52])
@@ -54,15 +54,15 @@ VEHICLE = small.vehicle(
 
 def first_response(flights):
     """Of the roll rate to its own command, by the order that the criterion takes."""
-    model = fitting.fit_model(fitting.stretches_of(flights), VEHICLE)
+    model = fitting.fit_model(fitting.usable_stretches(flights), VEHICLE)
     return model.response[0][0][0]
 
 
 def test_a_fit_finds_the_colours_that_a_law_answers():
     """The response is 0.5. A fit that takes coloured noise for white is farther off."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.1 * i, 4000, i) for i in range(4)]
-    white = identification.coloured(flights, VEHICLE)
-    colours = [one.colour for one in white]
+    white = identification.whiten_flights(flights, VEHICLE)
+    colours = [one.noise_average for one in white]
     assert colours == colours[:2] * 2
     assert len(set(colours)) == 2
     assert abs(first_response(white) - 0.5) < 0.5 * abs(first_response(flights) - 0.5)
@@ -70,34 +70,41 @@ def test_a_fit_finds_the_colours_that_a_law_answers():
 
 def test_air_that_stands_still_is_left_alone():
     flights = [flown((1.0,), 0.5, 200, 1)]
-    assert identification.coloured(flights, VEHICLE.model_copy(update={"moving_air": False})) == flights
+    assert identification.whiten_flights(flights, VEHICLE.model_copy(update={"moving_air": False})) == flights
 
 
 def test_a_model_of_two_colours_takes_the_likelier():
     """Each flight through the noise it has, picked at once, is as if the other had never been seen."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5, 3000, i) for i in range(4)]
-    white = identification.coloured(flights, VEHICLE)
-    model = fitting.fit_model(fitting.stretches_of(white), VEHICLE)
+    white = identification.whiten_flights(flights, VEHICLE)
+    model = fitting.fit_model(fitting.usable_stretches(white), VEHICLE)
     assert len(model.colours) == 2
     assert all(one.wider >= 1.0 for one in model.colours)
     for i in (0, 1):
         new = flown(AVERAGE if i else (1.0,), 0.5, 1500, 9 + i)
-        own = [one for one in model.colours if tuple(one.average) == white[i].colour]
+        own = [one for one in model.colours if tuple(one.average) == white[i].noise_average]
         alone = model.model_copy(update={"colours": own})
-        both = posterior_of(new, model, bank_of(model))[0][300:]
-        np.testing.assert_allclose(both, posterior_of(new, alone, bank_of(model))[0][300:], atol=1e-6)
+        both = hypothesis_posterior(new, model, build_hypothesis_bank(model))[0][300:]
+        np.testing.assert_allclose(
+            both, hypothesis_posterior(new, alone, build_hypothesis_bank(model))[0][300:], atol=1e-6
+        )
 
 
 def test_bounds_lean_on_no_prior_where_laws_differ():
     """With nothing known but how rare faults are, each of eleven levels is as likely: 90 % are ten."""
     model = small.model(small.WING | {"other_laws": True})
-    bank, samples = bank_of(model), small.flight(model, 50)
-    nothing = np.tile(bank.start, (50, 1))
-    rows = diagnose.rows_of(samples, model, bank, nothing)
-    assert (rows.high - rows.low >= 0.9).all()
+    bank, samples = build_hypothesis_bank(model), small.flight(model, 50)
+    nothing = np.tile(bank.prior_probability, (50, 1))
+    rows = diagnose.rows_of_posterior(samples, model, bank, nothing)
+    assert (rows.effectiveness_high - rows.effectiveness_low >= 0.9).all()
     plain = small.model()
-    rows = diagnose.rows_of(samples, plain, bank_of(plain), np.tile(bank_of(plain).start, (50, 1)))
-    assert (rows.low > 0.9).all()
+    rows = diagnose.rows_of_posterior(
+        samples,
+        plain,
+        build_hypothesis_bank(plain),
+        np.tile(build_hypothesis_bank(plain).prior_probability, (50, 1)),
+    )
+    assert (rows.effectiveness_low > 0.9).all()
 
 
 def test_the_predictor_of_a_residual_is_found():
@@ -108,12 +115,12 @@ def test_the_predictor_of_a_residual_is_found():
     for k in range(1, len(e)):
         e[k] = 0.8 * e[k - 1] + w[k]
     rows = np.concatenate([np.arange(9_000), np.arange(9_500, 20_500)])
-    found = fitting._with_predictor([1.0], [(rows, e)])
+    found = fitting._fit_noise_model([1.0], [(rows, e)])
     before = np.reshape(found.before, (-1, 3, 3))
     np.testing.assert_allclose(before[0], 0.8 * np.eye(3), atol=0.1)
     np.testing.assert_allclose(np.diag(found.noise), size**2, rtol=0.05)
     np.testing.assert_allclose(before[1:].sum(axis=0), 0.0, atol=0.15)
-    few = fitting._with_predictor([1.0], [(np.arange(100), e[:100])])
+    few = fitting._fit_noise_model([1.0], [(np.arange(100), e[:100])])
     assert few.before == []
     np.testing.assert_allclose(few.noise, np.cov(e[:100].T))
 
@@ -121,34 +128,34 @@ def test_the_predictor_of_a_residual_is_found():
 def in_colour(before):
     """A model that has heard one colour, and a flight of it."""
     plain = small.model()
-    colour = Colour(average=[1.0], noise=plain.noise, before=np.reshape(before, (-1, 3)).tolist())
+    colour = NoiseModel(average=[1.0], noise=plain.noise, before=np.reshape(before, (-1, 3)).tolist())
     model = plain.model_copy(update={"colours": [colour]})
-    return model, replace(small.flight(model, 60), colour=(1.0,))
+    return model, replace(small.flight(model, 60), noise_average=(1.0,))
 
 
 def test_answers_and_constant_are_whitened_as_the_residual_is():
     """Of a steady flight by hand: what is foretold of a constant is its share; without a past nothing is."""
     by = np.diag([0.5, 0.2, 0.0])
     model, flight = in_colour([by, 0.1 * np.eye(3)])
-    ok, left, answers = in_white(flight, model)
-    known, plain, heard = predicted(flight, model)
+    ok, left, answers = split_whitened_response(flight, model)
+    known, plain, heard = split_response(flight, model)
     np.testing.assert_allclose(left[7], plain[7] - plain[6] @ by - 0.1 * plain[5])
     np.testing.assert_allclose(answers[7], heard[7] - heard[6] @ by - 0.1 * heard[5])
     assert ok.sum() == known.sum() - 2
-    np.testing.assert_allclose(model.constant((1.0,)), np.array(model.intercept) * [0.4, 0.7, 0.9])
-    np.testing.assert_array_equal(model.constant(()), model.intercept)
+    np.testing.assert_allclose(model.whitened_intercept((1.0,)), np.array(model.intercept) * [0.4, 0.7, 0.9])
+    np.testing.assert_array_equal(model.whitened_intercept(()), model.intercept)
 
 
 @pytest.mark.parametrize(("size", "learns"), [(3.0, True), (50.0, False)])
 def test_a_sample_that_nothing_explains_teaches_nothing(size, learns):
     """As just after a fault, which is whitened as if it had been there before."""
     model, _ = in_colour([0.5 * np.eye(3)])
-    noise = noise_of(model, (1.0,))
+    noise = build_residual_noise(model, (1.0,))
     m, p = np.zeros(3), 0.01 * noise.covariance
     y = size * np.sqrt(np.diag(noise.covariance)) * [1.0, 0.0, 0.0]
-    _update(m, p, y, np.eye(3), noise.covariance, noise)
+    _update_gaussian(m, p, y, np.eye(3), noise.covariance, noise)
     assert (m[0] > 0.0) == learns
-    assert noise_of(model).farthest == np.inf
+    assert build_residual_noise(model).max_squared_residual == np.inf
 
 
 @pytest.mark.parametrize("wider", [1.0, 4.0])
@@ -156,10 +163,10 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
     """Five memories long: else the scale takes back what was taken wider."""
     model, _ = in_colour(np.zeros((1, 3, 3)))
     model = model.model_copy(update={"colours": [model.colours[0].model_copy(update={"wider": wider})]})
-    flight = replace(small.flight(model, 3000, seed=3), colour=(1.0,))
-    scale = posterior_of(flight, model, bank_of(model))[2]
+    flight = replace(small.flight(model, 3000, seed=3), noise_average=(1.0,))
+    scale = hypothesis_posterior(flight, model, build_hypothesis_bank(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
-    assert noise_of(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
+    assert build_residual_noise(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
         wider * np.array(model.noise)
     )
 
@@ -168,27 +175,29 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
 def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
     """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
     plain = small.model(small.WING | {"moving_air": True})
-    colour = Colour(average=list(average), noise=plain.noise)
-    monkeypatch.setattr(fitting, "_left_out", lambda *_: [(model, stretches)])
+    colour = NoiseModel(average=list(average), noise=plain.noise)
+    monkeypatch.setattr(fitting, "_fit_without_parts", lambda *_: [(model, stretches)])
     found = []
     for laws in (False, True):
         vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
         model = plain.model_copy(update={"colours": [colour], "vehicle": vehicle})
-        flight = replace(small.flight(model, 400, seed=5), colour=average)
+        flight = replace(small.flight(model, 400, seed=5), noise_average=average)
         stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
-        found.append(fitting._widened(stretches, model).noise_factor(average))
+        found.append(fitting._with_inflated_noise(stretches, model).noise_inflation(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
-    monkeypatch.setattr(fitting, "_farther", lambda *_: (1e6, 1))
-    assert fitting._widened(stretches, model).noise_factor(average) == pytest.approx(200.0 * factor)
+    monkeypatch.setattr(fitting, "_squared_gain_error", lambda *_: (1e6, 1))
+    assert fitting._with_inflated_noise(stretches, model).noise_inflation(average) == pytest.approx(
+        200.0 * factor
+    )
 
 
 @pytest.fixture(scope="module")
 def moving():
     """A model of two colours, identified from flights of a law that answers rates."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
-    white = identification.coloured(flights, VEHICLE)
-    return fitting.fit_model(fitting.stretches_of(white), VEHICLE)
+    white = identification.whiten_flights(flights, VEHICLE)
+    return fitting.fit_model(fitting.usable_stretches(white), VEHICLE)
 
 
 @pytest.mark.parametrize("colour", [AVERAGE, (1.0,)])
@@ -196,19 +205,21 @@ def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
     trust.check_columns(flight, moving)
-    found = [trust._in_all_parts(whitened(flight, one.average), moving) for one in moving.colours]
-    likeliest = max(zip(found, moving.colours, strict=True), key=lambda pair: pair[0].likely.mean())
-    assert likeliest[0].noise == pytest.approx(1.0, abs=0.3)
-    assert all(1.0 < gain < 1.6 for gain in likeliest[0].gains)
-    plain = trust._in_all_parts(flight, moving.model_copy(update={"colours": []}))
-    assert colour == (1.0,) or min(plain.gains) > 1.9  # what coloured noise does to the fit
+    found = [trust._bound_part_gains(whiten_samples(flight, one.average), moving) for one in moving.colours]
+    likeliest = max(zip(found, moving.colours, strict=True), key=lambda pair: pair[0].log_likelihoods.mean())
+    assert likeliest[0].min_noise_scale == pytest.approx(1.0, abs=0.3)
+    assert all(1.0 < gain < 1.6 for gain in likeliest[0].max_group_gains)
+    plain = trust._bound_part_gains(flight, moving.model_copy(update={"colours": []}))
+    assert colour == (1.0,) or min(plain.max_group_gains) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.check_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 
 
 def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
     flight = flown((1.0,), 0.5, 4000, 22)
-    known = Fitted(commands=trust.span(flight.commands), rates=trust.span(flight.rates))
+    known = FittedRanges(
+        commands=trust.central_range(flight.commands), rates=trust.central_range(flight.rates)
+    )
     moving = moving.model_copy(update={"fitted": known})
     trust.check_columns(flight, moving)
     with pytest.raises(BadInput, match=r"likely with `scale: 0.01745` on p_rad_s"):
@@ -222,9 +233,9 @@ def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
 def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
     """In memory a key that was left out is known to be; a file has every key."""
     model = small.model(small.WING | keys)
-    assert model.vehicle.rate_hz == rate_hz
+    assert model.vehicle.max_sample_rate_hz == rate_hz
     (tmp_path / "model.json").write_text(as_text(model))
-    assert load_model(tmp_path / "model.json").vehicle.rate_hz == rate_hz
+    assert load_model(tmp_path / "model.json").vehicle.max_sample_rate_hz == rate_hz
 
 
 def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
@@ -232,19 +243,19 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     that of noisier gyros grows with them."""
     flights = [flown((1.0,), 0.5, 2000, 31)]
     model = moving.model_copy(update={"colours": moving.colours[:1]})
-    found = identification.with_unseen_noise(model, flights)
-    gyros, others = found.colours[-len(samples.UNSEEN_GYROS_RAD_S) :], found.colours[1:]
+    found = identification.add_unseen_noise_models(model, flights)
+    gyros, others = found.colours[-len(samples.UNSEEN_GYRO_NOISE_RAD_S) :], found.colours[1:]
     others = others[: -len(gyros)]
     assert found.colours[0] == model.colours[0]
-    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE} - {
+    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE_AVERAGES} - {
         tuple(model.colours[0].average)
     }
     for one in others:
-        white = fitting.stretches_of([whitened(flights[0], one.average)])[0]
-        assert np.allclose(one.noise, np.cov(fitting.residuals(model, white)[1].T))
+        white = fitting.usable_stretches([whiten_samples(flights[0], one.average)])[0]
+        assert np.allclose(one.noise, np.cov(fitting.one_step_residuals(model, white)[1].T))
     assert (np.diff([np.linalg.det(one.noise) for one in gyros]) > 0.0).all()
     assert {one.wider for one in gyros} == {model.colours[0].wider}
-    assert identification.with_unseen_noise(small.model(), flights).colours == []
+    assert identification.add_unseen_noise_models(small.model(), flights).colours == []
 
 
 @pytest.mark.parametrize("a", [0.9, 0.3])
@@ -253,7 +264,7 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     predictor of w[k] has the coefficients -(-g1 / S)^j."""
     model, gyro = small.model(history=1, past=(a * np.eye(3)).tolist()), 0.05
     process = np.diag([1.0, 4.0, 9.0]) * 1e-4
-    before, noise = gyro_noise.whitener(model, process, gyro, 40)
+    before, noise = gyro_noise.fit_residual_predictor(model, process, gyro, 40)
     g0, g1 = np.diag(process) + gyro**2 * (1.0 + a**2), -a * gyro**2
     innovation = 0.5 * (g0 + np.sqrt(g0**2 - 4.0 * g1**2))
     np.testing.assert_allclose(noise, np.diag(innovation), rtol=1e-6, atol=1e-12)
@@ -265,7 +276,7 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
 def test_no_row_depends_on_a_later_sample_by_which_noise_is_likely(moving):
     """A colour is filtered up to where it counts last: which that is, the whole flight says."""
     new = flown(AVERAGE, 0.5, 1500, 9)
-    whole = posterior_of(new, moving, bank_of(moving))
-    short = posterior_of(samples.first(new, 600), moving, bank_of(moving))
+    whole = hypothesis_posterior(new, moving, build_hypothesis_bank(moving))
+    short = hypothesis_posterior(samples.first_samples(new, 600), moving, build_hypothesis_bank(moving))
     for part, cut in zip(whole, short, strict=True):
         np.testing.assert_array_equal(part[:600], cut)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.diagnose import _along, diagnose, healthy_residual
-from beaver_ftc_logs.regression import predicted
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.diagnose import _without_contradicted_names, diagnose, standardized_healthy_residual
+from beaver_ftc_logs.regression import split_response
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 BIAS, FROM_S = 0.4, 60.0
@@ -22,30 +22,33 @@ def biased(wing, wing_folder):
     for k in range(3, len(more)):
         more[k] = more[k - 1] @ synthetic.PAST + offset[k - 3 : k] @ synthetic.LEFT[::-1]
     columns |= {name: columns[name] + of for name, of in zip(names, more.T, strict=True)}
-    return load_flights([synthetic.write_csv(wing_folder / "biased.csv", columns)], wing)[0]
+    return load_flights_for_fit([synthetic.write_csv(wing_folder / "biased.csv", columns)], wing)[0]
 
 
 def named(biased, wing_model, name):
     rows = diagnose(biased, wing_model)
-    given = replace(rows, named=np.full(len(rows.t_s), name, dtype=object))
-    return _along(biased, wing_model, given, 12.0)
+    given = replace(rows, named_surfaces=np.full(len(rows.t_s), name, dtype=object))
+    return _without_contradicted_names(biased, wing_model, given, 12.0)
 
 
 def test_the_other_surface_is_taken_back_and_its_bounds_with_it(biased, wing_model):
     found = named(biased, wing_model, "right")
     late = found.t_s > FROM_S + 1.0
-    assert (found.named[late] == "unknown").mean() > 0.99
-    assert (found.low[late & (found.named == "unknown")] == 0.0).all()
-    assert (found.named[found.t_s < FROM_S] == "right").mean() > 0.95
+    assert (found.named_surfaces[late] == "unknown").mean() > 0.99
+    assert (found.effectiveness_low[late & (found.named_surfaces == "unknown")] == 0.0).all()
+    assert (found.named_surfaces[found.t_s < FROM_S] == "right").mean() > 0.95
 
 
 def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
-    assert (named(biased, wing_model, "left").named == "left").all()
-    assert (named(biased, wing_model, "right+left").named == "right+left").mean() < 1.0
+    assert (named(biased, wing_model, "left").named_surfaces == "left").all()
+    assert (named(biased, wing_model, "right+left").named_surfaces == "right+left").mean() < 1.0
 
 
 def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):
-    rest, late = healthy_residual(wing_model, *predicted(biased, wing_model)), biased.t_s > FROM_S + 1.0
+    rest, late = (
+        standardized_healthy_residual(wing_model, *split_response(biased, wing_model)),
+        biased.t_s > FROM_S + 1.0,
+    )
     assert rest[~late][10:590].std(axis=0) == pytest.approx(1.0, abs=0.15)
     whiten = np.linalg.inv(np.linalg.cholesky(np.diag(synthetic.NOISE**2)))
     expected = whiten @ (BIAS * synthetic.LEFT.sum(axis=0))

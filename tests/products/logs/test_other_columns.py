@@ -7,16 +7,16 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.model import Fitted
-from beaver_ftc_logs.samples import load_flights
-from beaver_ftc_logs.trust import check_columns, span
+from beaver_ftc_logs.model import FittedRanges
+from beaver_ftc_logs.samples import load_flights_for_fit
+from beaver_ftc_logs.trust import central_range, check_columns
 from products.logs import small, synthetic
 
 
 @pytest.fixture(scope="module")
 def flown(wing, wing_folder):
     columns = synthetic.fly(120.0, seed=41)
-    return load_flights([synthetic.write_csv(wing_folder / "columns.csv", columns)], wing)[0]
+    return load_flights_for_fit([synthetic.write_csv(wing_folder / "columns.csv", columns)], wing)[0]
 
 
 def other_commands(samples, signs):
@@ -44,24 +44,24 @@ def test_one_rate_in_another_unit_is_refused(flown, wing_model):
 
 def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder, wing_model):
     columns = synthetic.fly(120.0, parts=((0, 120, 1.0, 0.0),), seed=42)
-    samples = load_flights([synthetic.write_csv(wing_folder / "lost.csv", columns)], wing)[0]
+    samples = load_flights_for_fit([synthetic.write_csv(wing_folder / "lost.csv", columns)], wing)[0]
     rows = diagnose(samples, wing_model)
     assert rows.faulty[rows.t_s > 30.0].mean() > 0.9
 
 
 @pytest.fixture(scope="module")
-def felt():
+def n_signal_lags():
     """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""
     past = [*small.model(small.TAIL).past[:-1], [0.3, 0.2, -0.1]]
     model = small.model(small.TAIL, past=past)
     flight = small.flight(model, n=1200, seed=7)
-    known = Fitted(commands=span(flight.commands), rates=span(flight.rates))
+    known = FittedRanges(commands=central_range(flight.commands), rates=central_range(flight.rates))
     return model.model_copy(update={"fitted": known}), flight
 
 
 @pytest.mark.parametrize("share", [-1.0, 0.0])
-def test_a_signal_that_does_not_do_what_it_did_is_refused(felt, share):
-    model, flight = felt
+def test_a_signal_that_does_not_do_what_it_did_is_refused(n_signal_lags, share):
+    model, flight = n_signal_lags
     assert check_columns(flight, model) is None
     noise = np.random.default_rng(2).standard_normal(flight.signals.shape)
     other = replace(flight, signals=share * flight.signals if share else 20.0 + 3.0 * noise)
@@ -69,9 +69,9 @@ def test_a_signal_that_does_not_do_what_it_did_is_refused(felt, share):
         check_columns(other, model)
 
 
-def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(felt):
+def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(n_signal_lags):
     """A lost surface changes nothing of it."""
-    model, _ = felt
+    model, _ = n_signal_lags
     lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
     assert check_columns(lost, model) is None
     past = np.array(model.past)
@@ -87,9 +87,11 @@ def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(felt)
 @pytest.mark.parametrize(("factor", "left", "refused"), [
     (10.0, 1.0, True), (10.0, 0.05, True), (2.0, 0.05, False), (4.0, 1.0, False),
 ])  # fmt: skip
-def test_a_command_that_moves_far_more_and_does_hardly_anything_is_refused(felt, factor, left, refused):
+def test_a_command_that_moves_far_more_and_does_hardly_anything_is_refused(
+    n_signal_lags, factor, left, refused
+):
     """Less than what the rates alone tell from another unit, where what it did is gone as well."""
-    model, _ = felt
+    model, _ = n_signal_lags
     flight = small.flight(model, n=1200, seed=10, lost=((1, 0, 1200, left),))
     more = replace(flight, commands=flight.commands * np.array([1.0, factor, 1.0]))
     if refused:

@@ -6,8 +6,8 @@ from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, pages
-from beaver_ftc_logs.findings import verdict_of
-from beaver_ftc_logs.fitting import Stretch, fit_order, stretches_of
+from beaver_ftc_logs.findings import verdict_document
+from beaver_ftc_logs.fitting import Stretch, fit_order, usable_stretches
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.samples import Samples
 from kept import page, picture
@@ -27,7 +27,7 @@ def flown():
 
 def test_a_flight_in_a_picture(changed, flown):
     samples, rows = flown
-    figure = pages.picture(samples, list(MODEL.vehicle.surfaces), rows)
+    figure = pages.flight_figure(samples, list(MODEL.vehicle.surfaces), rows)
     assert not changed(picture(figure))
     legends = [axis.get_legend() for axis in figure.axes[:3]]
     assert [legend._ncols for legend in legends] == [4, 4, 1]  # at most 4, one for one
@@ -39,7 +39,7 @@ def test_a_flight_in_a_picture(changed, flown):
 def test_an_alarm_from_the_first_row_is_shaded_from_there(changed, flown):
     samples, _ = flown
     rows = small.rows([(5, *HALF), (5, *SOUND)])
-    figure = pages.picture(samples, list(MODEL.vehicle.surfaces), rows)
+    figure = pages.flight_figure(samples, list(MODEL.vehicle.surfaces), rows)
     spans = [patch.get_extents().transformed(axis.transData.inverted())
              for axis in figure.axes for patch in axis.patches]  # fmt: skip
     assert [(span.x0, span.x1) for span in spans] == [pytest.approx((10.0, 12.5))] * 5
@@ -54,7 +54,7 @@ def test_a_spike_of_the_rates_does_not_flatten_the_flight(flown):
     commands = np.zeros((len(rates), 2))
     for size, limit in ((1.0, 13.0), (0.001, 1.0)):
         spiked = changed(samples, rates=rates * size, t_s=t_s, commands=commands)
-        figure = pages.picture(spiked, list(MODEL.vehicle.surfaces), flown[1])
+        figure = pages.flight_figure(spiked, list(MODEL.vehicle.surfaces), flown[1])
         assert figure.axes[0].get_ylim() == pytest.approx((-limit, limit))
 
 
@@ -68,7 +68,7 @@ def test_a_long_flight_is_drawn_by_every_so_many_points(flown, count, drawn):
     values = np.zeros((count, 3))
     long = changed(flown[0], t_s=t_s, rates=values, commands=values[:, :2])
     rows = small.rows([(count, *SOUND)])
-    figure = pages.picture(long, list(MODEL.vehicle.surfaces), rows)
+    figure = pages.flight_figure(long, list(MODEL.vehicle.surfaces), rows)
     assert {len(line.get_xdata()) for axis in figure.axes for line in axis.lines} == {drawn}
 
 
@@ -82,20 +82,22 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_page_of_a_flight(changed, monkeypatch, flown, name):
-    monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
+    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     samples, rows = flown[0], small.rows(CASES[name])
-    verdict = verdict_of(samples, MODEL, rows) | (
+    verdict = verdict_document(samples, MODEL, rows) | (
         {"score": {"classes": 0.98765, "rows": 4}} if name == "two" else {}
     )
-    assert not changed(page(pages.render(samples, MODEL, rows, verdict)))
+    assert not changed(page(pages.render_diagnosis(samples, MODEL, rows, verdict)))
 
 
 def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypatch):
-    monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
+    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     ages = {"roll": 0.126, "pitch": 0.05}
-    samples = small.flight(TAIL, gap=100, age_s=ages, notes=("a < remark",), name="a & b")
+    samples = small.flight(TAIL, gap=100, held_column_age_s=ages, notes=("a < remark",), name="a & b")
     rows = small.rows([(20, "", [1.0] * 3), (20, "left_aileron+right_aileron", [0.5, 1.0, 0.5])], 3)
-    assert not changed(page(pages.render(samples, TAIL, rows, verdict_of(samples, TAIL, rows))))
+    assert not changed(
+        page(pages.render_diagnosis(samples, TAIL, rows, verdict_document(samples, TAIL, rows)))
+    )
 
 
 def test_a_picture_is_in_the_page(flown):
@@ -104,7 +106,7 @@ def test_a_picture_is_in_the_page(flown):
     import matplotlib.image
 
     samples, rows = flown
-    text = pages.render(samples, MODEL, rows, verdict_of(samples, MODEL, rows))
+    text = pages.render_diagnosis(samples, MODEL, rows, verdict_document(samples, MODEL, rows))
     encoded = text.partition("data:image/png;base64,")[2].partition('"')[0]
     from io import BytesIO
 
@@ -112,15 +114,19 @@ def test_a_picture_is_in_the_page(flown):
 
 
 def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
-    monkeypatch.setattr(pages, "render", lambda *given: "<p>page</p>")
+    monkeypatch.setattr(pages, "render_diagnosis", lambda *given: "<p>page</p>")
     samples, rows = flown
     assert pages.write_diagnosis(tmp_path, samples, MODEL, rows, {"faulty": True}) == tmp_path / "small"
     table = parquet.read_table(tmp_path / "small" / "diagnosis.parquet").to_pydict()
-    expected = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named}
+    expected = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named_surfaces}
     for i, surface in enumerate(("right", "left")):
-        its = {"effectiveness": rows.estimate, "low": rows.low, "high": rows.high}
+        its = {
+            "effectiveness": rows.effectiveness,
+            "low": rows.effectiveness_low,
+            "high": rows.effectiveness_high,
+        }
         expected |= {f"{surface}_{what}": values[:, i] for what, values in its.items()}
-    expected["fault_probability"] = rows.probability
+    expected["fault_probability"] = rows.fault_probability
     expected["credible"] = [1] * len(rows.t_s)
     assert list(table) == list(expected)
     for name, values in expected.items():
@@ -133,17 +139,21 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):
     path = tmp_path / "page.html"
-    pages.check_page(path)  # there is none
+    pages.refuse_to_replace_foreign_file(path)  # there is none
     head = "<html>"
-    for before, ours in ((0, True), (2000 - len(pages.MARK), True), (2001 - len(pages.MARK), False)):
-        path.write_text((head + " " * before)[:before] + pages.MARK + " " * 5000)
+    for before, ours in (
+        (0, True),
+        (2000 - len(pages.IDENTIFICATION_PAGE_MARK), True),
+        (2001 - len(pages.IDENTIFICATION_PAGE_MARK), False),
+    ):
+        path.write_text((head + " " * before)[:before] + pages.IDENTIFICATION_PAGE_MARK + " " * 5000)
         if ours:
-            pages.check_page(path)
+            pages.refuse_to_replace_foreign_file(path)
         else:
             with pytest.raises(BadInput, match="it is no page of `identify`, allowed: another --out"):
-                pages.check_page(path)
+                pages.refuse_to_replace_foreign_file(path)
     with pytest.raises(BadInput, match="will not replace"):
-        pages.check_page(tmp_path)
+        pages.refuse_to_replace_foreign_file(tmp_path)
 
 
 IDENTIFIED = {
@@ -169,31 +179,33 @@ IDENTIFIED = {
 
 def test_the_page_of_an_identification(changed, monkeypatch):
     """Of one flight of a wing, with all that can be said; of two of a tail, with little."""
-    monkeypatch.setattr(pages, "_encoded", lambda figure: "QQ==")
+    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     wing = small.model(identified=IDENTIFIED)
-    assert not changed(page(pages.render_model([small.flight(wing, 500)], wing)), part="wing")
+    assert not changed(page(pages.render_identification([small.flight(wing, 500)], wing)), part="wing")
     short = IDENTIFIED["output_error"] | {"shorter_than_can_be_told": True}
     found = IDENTIFIED | {"flights": IDENTIFIED["flights"] * 2, "collinear": [], "output_error": {}}
     tail = small.model(small.TAIL, identified=found)
     flights = [small.flight(tail, 300, name=name, seed=seed) for seed, name in enumerate("ab")]
-    assert not changed(page(pages.render_model(flights, tail)), part="tail")
-    lagless = pages.render_model(flights, small.model(small.TAIL, identified=found | {"output_error": short}))
+    assert not changed(page(pages.render_identification(flights, tail)), part="tail")
+    lagless = pages.render_identification(
+        flights, small.model(small.TAIL, identified=found | {"output_error": short})
+    )
     assert "Servo lag shorter than this rate can tell" in lagless
 
 
 def test_the_pictures_of_an_identification(changed):
     model = small.model(identified=IDENTIFIED)
-    stretches = stretches_of([small.flight(model, 900, lost=((1, 300, 400, 0.5),))])
-    fits = pages._fits(stretches, model)
+    stretches = usable_stretches([small.flight(model, 900, lost=((1, 300, 400, 0.5),))])
+    fits = pages._prediction_figure(stretches, model)
     assert not changed(picture(fits), part="fits")
     assert [axis.get_legend()._ncols for axis in fits.axes if axis.get_legend()] == [3, 3]
     assert fits.get_size_inches().tolist() == pytest.approx([11, 9.2])
-    spectrum = pages._spectrum(stretches, model)
+    spectrum = pages._spectrum_figure(stretches, model)
     assert not changed(picture(spectrum), part="spectrum")
     assert spectrum.get_size_inches().tolist() == pytest.approx([7.5, 3.2])
     fit = fit_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
-    correlation = pages._correlation(fit, names)
+    correlation = pages._correlation_figure(fit, names)
     assert not changed(picture(correlation), part="correlation")
     assert correlation.get_size_inches().tolist() == pytest.approx([3.3 + 0.19 * 13, 2.5 + 0.19 * 13])
 
@@ -203,8 +215,8 @@ def test_parts_of_which_nothing_is_known_are_not_drawn():
     model = small.model()
     flights = [small.flight(model, 200, name=name, seed=seed) for seed, name in enumerate("abcde")]
     flights[1] = changed(flights[1], labels=np.full_like(flights[1].labels, np.nan),
-                         events=small.FAILURE[:1], t_s=flights[1].t_s + 100.0)  # fmt: skip
-    figure = pages._fits(stretches_of(flights), model)
+                         logged_failures=small.FAILURE[:1], t_s=flights[1].t_s + 100.0)  # fmt: skip
+    figure = pages._prediction_figure(usable_stretches(flights), model)
     titles = [axis.get_title(loc="left") for axis in figure.axes]
     assert [title for title in titles if title] == [f"{name}, not fitted: one sample ahead" for name in "acd"]
 
@@ -213,14 +225,16 @@ def test_parts_of_which_nothing_is_known_are_not_drawn():
 def test_a_picture_of_one_part_or_none(known, shown):
     model = small.model()
     flights = [small.flight(model, 200, name=str(seed), seed=seed) for seed in (1, 2)]
-    fitted, kept_part = stretches_of(flights)
-    part = Stretch(kept_part.samples, kept_part.use if known else np.zeros(200, dtype=bool))
+    fitted, kept_part = usable_stretches(flights)
+    part = Stretch(kept_part.samples, kept_part.usable if known else np.zeros(200, dtype=bool))
     nothing = Stretch(fitted.samples, np.zeros(200, dtype=bool))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            fitting, "folds", lambda stretches: [([fitted], part, "one"), ([fitted], nothing, "two")]
+            fitting,
+            "validation_folds",
+            lambda stretches: [([fitted], part, "one"), ([fitted], nothing, "two")],
         )
-        figure = pages._fits([fitted, part], model)
+        figure = pages._prediction_figure([fitted, part], model)
     assert figure.get_size_inches().tolist() == pytest.approx([11, 4.6])
     assert len(figure.axes) == 3 * shown
 
@@ -231,12 +245,12 @@ def test_the_liveliest_window():
     rates[[2, 3, 8, 9]] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
     rates[6] = np.nan
     known = np.array([0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11])
-    assert pages._liveliest(rates, known, 2) == 8
-    assert pages._liveliest(rates, known[:6], 2) == 2
-    assert pages._liveliest(rates, known, 3) == 7
-    assert pages._liveliest(rates, known, 11) == 0
-    assert pages._liveliest(rates, known, 12) == 0
-    assert pages._liveliest(rates[1:], known[:-1] - 0, 10) == 0
+    assert pages._start_of_liveliest_window(rates, known, 2) == 8
+    assert pages._start_of_liveliest_window(rates, known[:6], 2) == 2
+    assert pages._start_of_liveliest_window(rates, known, 3) == 7
+    assert pages._start_of_liveliest_window(rates, known, 11) == 0
+    assert pages._start_of_liveliest_window(rates, known, 12) == 0
+    assert pages._start_of_liveliest_window(rates[1:], known[:-1] - 0, 10) == 0
 
 
 def test_a_prediction_is_shown_over_forty_seconds():
@@ -244,7 +258,7 @@ def test_a_prediction_is_shown_over_forty_seconds():
     model = small.model()
     samples = small.flight(model, 1200, lost=())
     samples.rates[150:200] *= 5.0
-    figure = pages._fits(stretches_of([samples]), model)
+    figure = pages._prediction_figure(usable_stretches([samples]), model)
     axis = figure.axes[0]
     t_s = axis.lines[0].get_xdata()
     assert t_s[-1] - t_s[0] <= 40.0 + 1e-9
@@ -255,8 +269,8 @@ def test_no_line_is_drawn_over_what_is_not_known():
     """Around both edges of a label 1.5 s are not; before them and after are."""
     model = small.model()
     samples = small.flight(model, 900, lost=((1, 300, 400, 0.5),))
-    stretches = stretches_of([samples])
-    second = pages._fits(stretches, model).axes[3]
+    stretches = usable_stretches([samples])
+    second = pages._prediction_figure(stretches, model).axes[3]
     assert "first half" in second.get_title(loc="left")
     for line in second.lines:
         t_s, values = (np.asarray(data) for data in line.get_data())

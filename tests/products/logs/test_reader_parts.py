@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import alfa, ardupilot, read_flight, table, text
-from beaver_ftc_logs.recording import columns_of
+from beaver_ftc_logs.recording import columns_of_topics
 from products.logs import synthetic
 
 ORIGIN_NS = 1_538_768_543_780_097_959
@@ -28,7 +28,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (topic, field, _) in enumerate(alfa._known()["columns"].values()):
+    for i, (topic, field, _) in enumerate(alfa._load_topic_table()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])
@@ -63,7 +63,7 @@ def test_failures_of_alfa_in_their_order(folder):
     write(folder, "failure_status-rudder", (12.0, 1.0), (np.nan, 2.0), header=head)
     write(folder, "failure_status-elevator", header=head)
     write(folder, "failure_status-aileron", (9.0, 2.0), (9.5, 2.0), (10.0, 1.0), header=head)
-    events = [(round(event.t_s, 6), event.surface) for event in read_flight(folder).events]
+    events = [(round(event.t_s, 6), event.surface) for event in read_flight(folder).logged_failures]
     assert events == [(8.0, "engine"), (9.0, "left_aileron"), (10.0, "right_aileron"), (12.0, "rudder")]
 
 
@@ -127,7 +127,7 @@ def test_cells_that_hold_no_number(tmp_path):
 def test_why_the_system_does_not_open_a_table_is_said_without_its_numbers(tmp_path, name, says):
     (tmp_path / "a.csv").mkdir()
     with pytest.raises(BadInput) as caught:
-        table.names_of(tmp_path / name)
+        table.column_names(tmp_path / name)
     says = f"is no table that can be read ({says}), allowed: CSV or Parquet"
     assert str(caught.value) == f"{tmp_path / name}: {says}"
 
@@ -185,7 +185,7 @@ def test_what_counts_as_a_number():
         pa.bool_(): False,
         pa.list_(pa.int8()): False,
     }
-    assert {kind: table._is_number(kind) for kind in kinds} == kinds
+    assert {kind: table._is_number_type(kind) for kind in kinds} == kinds
 
 
 def test_columns_of_topics_count_from_the_first_stamp_of_all():
@@ -198,7 +198,7 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
         },
         "none": {"us": [np.nan, np.nan], "w": [1, 2]},
     }
-    columns, origin_s = columns_of(topics, "us")
+    columns, origin_s = columns_of_topics(topics, "us")
     assert origin_s == pytest.approx(2.0)
     np.testing.assert_allclose(columns["late.x"].t_s, [1.0, 1.5])
     np.testing.assert_allclose(columns["early.z"].t_s, [0.0, 0.25, 0.5])
@@ -206,7 +206,7 @@ def test_columns_of_topics_count_from_the_first_stamp_of_all():
     assert columns["early.y"].note.startswith("early: row 1: its stamp is out of order")
     assert columns["late.x"].note == ""
     assert set(columns) == {"late.x", "early.y", "early.z", "none.w"}
-    assert columns_of({"none": topics["none"]}, "us")[1] == 0.0
+    assert columns_of_topics({"none": topics["none"]}, "us")[1] == 0.0
 
 
 def test_a_ulog_says_from_when_its_time_counts(tmp_path):
@@ -223,23 +223,27 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["a,b,c", *rows]) + "\n")
     monkeypatch.setattr(text, "_BLOCK_BYTES", 600)
-    blocks = [*text.read_cells(path, text.layout_of(path), ("a", "b", "c"))]
+    blocks = [*text.read_cells(path, text.find_layout(path), ("a", "b", "c"))]
     assert len(blocks) > 5
-    assert [one.before for one in blocks] == [
-        sum(each.rows for each in blocks[:k]) for k in range(len(blocks))
+    assert [one.n_rows_before for one in blocks] == [
+        sum(each.n_rows for each in blocks[:k]) for k in range(len(blocks))
     ]
-    assert {name: found for one in reversed(blocks) for name, found in one.text.items()} == {
+    assert {name: found for one in reversed(blocks) for name, found in one.text_cells.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
-    whole = text.joined(blocks)
-    assert whole.text == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
-    assert (whole.rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (400, 2, 0)
+    whole = text.join_blocks(blocks)
+    assert whole.text_cells == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
+    assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
+        400,
+        2,
+        0,
+    )
 
 
 def test_what_is_said_after_a_dataflash_log_is_heard_again(capfd):
     """By file descriptor too: the library behind pymavlink writes past Python."""
     os.write(2, b"before, ")
-    with ardupilot._silence():
+    with ardupilot._silence_stderr():
         os.write(2, b"within, ")
     os.write(2, b"after")
     assert capfd.readouterr().err == "before, after"
@@ -251,5 +255,5 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     parquet.write_table(pa.table(columns), path)
     monkeypatch.setattr(table, "_check_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._stored(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._stored_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]

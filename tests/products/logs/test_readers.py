@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.samples import _held, load_flights
+from beaver_ftc_logs.samples import _held_values, load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 
@@ -33,13 +33,15 @@ def test_an_alfa_folder(tmp_path):
     assert columns["roll_error_rad"].t_s[0] == pytest.approx(0.02, abs=1e-6)
     flown = synthetic.fly(60.0, seed=3, trim=(0.0, 0.0))
     np.testing.assert_allclose(columns["roll_error_rad"].values, flown["roll_command"], atol=1e-12)
-    assert [(event.surface, round(event.t_s, 3)) for event in recording.events] == [("left_aileron", 40.0)]
+    assert [(event.surface, round(event.t_s, 3)) for event in recording.logged_failures] == [
+        ("left_aileron", 40.0)
+    ]
 
 
 def test_a_held_column_is_never_newer_than_its_row(tmp_path):
     folder = synthetic.write_alfa(tmp_path / "flight", duration_s=20.0)
     recording = read_flight(folder)
-    held, age_s = _held(recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s)
+    held, age_s = _held_values(recording.columns["roll_error_rad"], recording.columns["p_rad_s"].t_s)
     np.testing.assert_allclose(held[1:], recording.columns["roll_error_rad"].values[:-1])
     assert np.isnan(held[0])
     assert age_s == pytest.approx(0.08, abs=1e-6)
@@ -77,27 +79,27 @@ def test_a_log_without_a_named_column(tmp_path, wing):
     del columns["roll_command"]
     path = synthetic.write_csv(tmp_path / "flight.csv", columns)
     with pytest.raises(BadInput, match="no column roll_command, allowed: a log that has it"):
-        load_flights([path], wing)
+        load_flights_for_fit([path], wing)
 
 
 def test_every_unusable_log_is_named(tmp_path, wing):
     with pytest.raises(BadInput) as error:
-        load_flights([tmp_path / "a.csv", tmp_path / "b.csv"], wing)
+        load_flights_for_fit([tmp_path / "a.csv", tmp_path / "b.csv"], wing)
     assert len(str(error.value).splitlines()) == 2
 
 
 def test_rates_logged_too_slowly(tmp_path, wing):
     columns = {name: values[::5] for name, values in synthetic.fly(60.0).items()}
     with pytest.raises(BadInput, match="rates are logged at 2 Hz, allowed: at least 4 Hz"):
-        load_flights([synthetic.write_csv(tmp_path / "slow.csv", columns)], wing)
+        load_flights_for_fit([synthetic.write_csv(tmp_path / "slow.csv", columns)], wing)
 
 
 def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
     t_s = np.arange(0.0, 30.0, 0.01)
     columns = {name: np.sin(t_s) for name in synthetic.fly(5.0)} | {"t_s": t_s}
-    samples = load_flights([synthetic.write_csv(tmp_path / "fast.csv", columns)], wing)[0]
+    samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "fast.csv", columns)], wing)[0]
     assert samples.dt_s == pytest.approx(0.05)
-    assert samples.age_s["p_rad_s"] == pytest.approx(0.025)
+    assert samples.held_column_age_s["p_rad_s"] == pytest.approx(0.025)
     late = np.sin(samples.t_s - 0.02)  # five stamps, 0 to 0.04 s old
     np.testing.assert_allclose(samples.rates[5:, 0], late[5:], atol=2e-3)
 
@@ -144,8 +146,8 @@ def test_a_log_in_another_format_gives_the_same_samples(tmp_path, wing):
         )
     (tmp_path / "px4.yaml").write_text(text)
     path = synthetic.write_ulog(tmp_path / "flight.ulg", columns)
-    one = load_flights([path], load_vehicle(tmp_path / "px4.yaml"))[0]
-    other = load_flights([synthetic.write_csv(tmp_path / "flight.csv", columns)], wing)[0]
+    one = load_flights_for_fit([path], load_vehicle(tmp_path / "px4.yaml"))[0]
+    other = load_flights_for_fit([synthetic.write_csv(tmp_path / "flight.csv", columns)], wing)[0]
     np.testing.assert_array_equal(one.commands, other.commands)
     np.testing.assert_array_equal(one.rates, other.rates)
 

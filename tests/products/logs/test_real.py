@@ -10,9 +10,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.fitting import fit_model, folds, stretches_of
-from beaver_ftc_logs.samples import load_flights
-from beaver_ftc_logs.scoring import by_event, by_labels
+from beaver_ftc_logs.fitting import fit_model, usable_stretches, validation_folds
+from beaver_ftc_logs.samples import load_flights_for_fit
+from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
 from beaver_ftc_logs.vehicle import load_vehicle
 
 ALFA = "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure"
@@ -21,17 +21,17 @@ ALFA = "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure"
 @pytest.fixture(scope="module")
 def enac(real_flights):
     vehicle = load_vehicle(real_flights / "enac" / "vehicle.yaml")
-    return vehicle, load_flights([real_flights / "enac" / "flight-21.csv"], vehicle)[0]
+    return vehicle, load_flights_for_fit([real_flights / "enac" / "flight-21.csv"], vehicle)[0]
 
 
 def test_halves_of_a_flying_wing(enac):
     vehicle, samples = enac
-    stretches = stretches_of([samples])
+    stretches = usable_stretches([samples])
     whole = fit_model(stretches, vehicle)
-    for fitted, kept, _ in folds(stretches):
+    for fitted, kept, _ in validation_folds(stretches):
         model = fit_model(fitted, vehicle, whole.settings)
-        labels = np.where(kept.use[:, None], samples.labels, np.nan)
-        found = by_labels(diagnose(samples, model), labels)
+        labels = np.where(kept.usable[:, None], samples.labels, np.nan)
+        found = score_against_labels(diagnose(samples, model), labels)
         assert found["classes"] > 0.75
         assert found["healthy_or_faulty"] > 0.85
         assert found["side"] > 0.85
@@ -40,27 +40,27 @@ def test_halves_of_a_flying_wing(enac):
 
 def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     vehicle, samples = enac
-    model = fit_model(stretches_of([samples]), vehicle)
+    model = fit_model(usable_stretches([samples]), vehicle)
     whole = diagnose(samples, model)
     for n in (2873, 9071):
-        fields = ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
-        cut = {name: getattr(samples, name)[:n] for name in (*fields, "clipped")}
+        fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
+        cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
         still_s = {name: still[:n] for name, still in samples.still_s.items()}
         short = diagnose(replace(samples, still_s=still_s, **cut), model)
         assert np.array_equal(short.credible, whole.credible[:n])
-        assert np.array_equal(short.estimate, whole.estimate[:n])
-        assert np.array_equal(short.probability, whole.probability[:n])
+        assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
+        assert np.array_equal(short.fault_probability, whole.fault_probability[:n])
 
 
 def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     vehicle = load_vehicle("alfa")
     folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())
-    flights = load_flights(folders, vehicle)
+    flights = load_flights_for_fit(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
-    model = fit_model(stretches_of([one for one in flights if one is not kept]), vehicle)
-    read = {*model.vehicle.command_names, *model.vehicle.signal_names}
+    model = fit_model(usable_stretches([one for one in flights if one is not kept]), vehicle)
+    read = {*model.vehicle.command_columns, *model.vehicle.signal_columns}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
-    found = by_event(diagnose(kept, model), kept.events, model.groups)
+    found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)
     assert found["false_alarms"] == 0
     assert found["delay_s"] < 5.0
     assert found["right_group"] is True
@@ -69,11 +69,11 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
 def test_another_day_of_the_wing_is_read_whole_and_its_columns_are_not_doubted(enac, real_flights):
     """17 July: the wing is twisted, and the residual's variance is six times that of the model's day."""
     vehicle, trained = enac
-    model = fit_model(stretches_of([trained]), vehicle)
-    other = load_flights([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
+    model = fit_model(usable_stretches([trained]), vehicle)
+    other = load_flights_for_fit([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
     rows = diagnose(other, model)
-    assert all("nothing answers the commands" in reason for reason in rows.reasons)
-    assert by_labels(rows, other.labels)["classes"] > 0.93
+    assert all("nothing answers the commands" in reason for reason in rows.reasons_not_credible)
+    assert score_against_labels(rows, other.labels)["classes"] > 0.93
     mistakes = {
         "exchanged": replace(other, commands=other.commands[:, ::-1]),
         "on q_rad_s": replace(other, rates=other.rates * np.array([1.0, 1.0 / 57.3, 1.0])),

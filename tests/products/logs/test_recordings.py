@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.results.exports import RECORDINGS, write_recording
-from beaver_ftc_logs.recording import nearest_ten
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.recording import nearest_names
+from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 
 TRAVEL_RAD = {"aileron": 0.5, "elevator": 0.4, "rudder": 0.3, "flap": 1.0}
@@ -30,7 +30,7 @@ def samples(request, log_path, tmp_path):
     write_recording(log_path, TRAVEL_RAD, request.param, tmp_path)
     vehicle = tmp_path / "vehicle.yaml"
     vehicle.write_text(vehicle.read_text() + "max_rate_hz: 100\n")
-    return load_flights([tmp_path / RECORDINGS[request.param]], load_vehicle(vehicle))[0]
+    return load_flights_for_fit([tmp_path / RECORDINGS[request.param]], load_vehicle(vehicle))[0]
 
 
 def test_rates_and_commands_come_back(samples, log_path):
@@ -52,7 +52,7 @@ def test_run_writes_the_log_and_its_vehicle_file(tmp_path):
     assert done.exit_code == 0, done.output
     folder = tmp_path / "short"
     vehicle = load_vehicle(folder / "vehicle.yaml")
-    samples = load_flights([folder / "flight.csv"], vehicle)[0]
+    samples = load_flights_for_fit([folder / "flight.csv"], vehicle)[0]
     assert len(samples.t_s) > 50
     assert list(vehicle.surfaces) == ["aileron", "elevator", "rudder", "flap"]
 
@@ -66,7 +66,7 @@ def test_an_unknown_kind_of_recording_is_refused(tmp_path):
 @pytest.mark.parametrize(("count", "more"), [(9, ""), (10, ""), (11, ", and 1 more"), (0, None)])
 def test_ten_names_are_all_that_is_listed(count, more):
     names = [f"rate{i}" for i in range(count)]
-    said = nearest_ten("Rate3", names)
+    said = nearest_names("Rate3", names)
     assert said == "none" if more is None else said.endswith(more)
     if count:
         assert said.split(", ")[0] == "rate3"

@@ -21,7 +21,7 @@ def test_surfaces_whose_commands_are_proportional_are_one_group(off, together):
         "d": {"pitch": 0.1},
     }
     vehicle = small.vehicle(small.WING, surfaces=table, labels={})
-    assert regression.groups_of(vehicle) == ([[0, 2], [1, 3]] if together else [[0], [1, 3], [2]])
+    assert regression.group_surfaces(vehicle) == ([[0, 2], [1, 3]] if together else [[0], [1, 3], [2]])
 
 
 @pytest.mark.parametrize("history", [1, 2, 4])
@@ -29,10 +29,12 @@ def test_surfaces_whose_commands_are_proportional_are_one_group(off, together):
 def test_what_a_sample_is_predicted_from(history, lags):
     samples = small.flight(TAIL, 30, gap=12)
     samples.rates[20, 1] = samples.commands[25, 1] = samples.signals[5, 0] = np.nan
-    past, commands, known = regression.build(samples, [[0, 2], [1]], history, lags, scaled=False)
+    past, commands, known = regression.build_regressors(
+        samples, [[0, 2], [1]], history, lags, scales_by_labels=False
+    )
     reach = max(history, lags)
     for k in range(30):
-        whole = k >= reach and samples.run[k - reach] == samples.run[k]
+        whole = k >= reach and samples.stretch_number[k - reach] == samples.stretch_number[k]
         whole &= all(k - j != 20 for j in range(history + 1)) and all(k - j != 25 for j in range(1, lags + 1))
         whole &= k != 6
         assert known[k] == whole
@@ -48,24 +50,24 @@ def test_what_a_sample_is_predicted_from(history, lags):
 def test_commands_as_effective_as_the_labels_say():
     samples = small.flight(WING, 12)
     samples.labels[:] = [0.5, np.nan]
-    by_label = regression.build(samples, [[0], [1]], 1, 2, scaled=True)[1]
-    plain = regression.build(samples, [[0], [1]], 1, 2, scaled=False)[1]
+    by_label = regression.build_regressors(samples, [[0], [1]], 1, 2, scales_by_labels=True)[1]
+    plain = regression.build_regressors(samples, [[0], [1]], 1, 2, scales_by_labels=False)[1]
     np.testing.assert_array_equal(by_label[2:], plain[2:] * np.array([[0.5], [1.0]]))
 
 
 def test_a_flight_shorter_than_the_past():
-    known = regression.build(small.flight(WING, 2), [[0], [1]], 4, 3, scaled=False)[2]
+    known = regression.build_regressors(small.flight(WING, 2), [[0], [1]], 4, 3, scales_by_labels=False)[2]
     assert known.tolist() == [False, False]
-    assert regression._delayed(np.arange(3.0), 2, -1.0).tolist() == [-1.0, -1.0, 0.0]
-    assert regression._delayed(np.arange(3), 5, -1).tolist() == [-1, -1, -1]
+    assert regression._delay_rows(np.arange(3.0), 2, -1.0).tolist() == [-1.0, -1.0, 0.0]
+    assert regression._delay_rows(np.arange(3), 5, -1).tolist() == [-1, -1, -1]
 
 
 def test_columns_of_groups_become_those_of_surfaces():
     values = np.array([[0.2, 0.4], [0.6, 0.8]])
-    assert regression.group_indices(TAIL) == [[0, 2], [1]]
-    assert regression.by_surface(values, TAIL).tolist() == [[0.2, 0.4, 0.2], [0.6, 0.8, 0.6]]
+    assert regression.surface_indices_by_group(TAIL) == [[0, 2], [1]]
+    assert regression.columns_by_surface(values, TAIL).tolist() == [[0.2, 0.4, 0.2], [0.6, 0.8, 0.6]]
     apart = TAIL.model_copy(update={"groups": [["elevator"]]})
-    assert regression.by_surface(values[:, :1], apart).tolist() == [[1.0, 0.2, 1.0], [1.0, 0.6, 1.0]]
+    assert regression.columns_by_surface(values[:, :1], apart).tolist() == [[1.0, 0.2, 1.0], [1.0, 0.6, 1.0]]
 
 
 def drawn(n=40, m=4, seed=1):
@@ -80,12 +82,12 @@ def test_least_squares_and_its_covariance():
     fit = regression.least_squares(x, y, run, 3)
     np.testing.assert_allclose(fit.coefficients, np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)
     rest = y - x @ fit.coefficients
-    np.testing.assert_allclose(fit.covariance, rest.T @ rest / 36, rtol=1e-9)
+    np.testing.assert_allclose(fit.residual_covariance, rest.T @ rest / 36, rtol=1e-9)
     inverse = np.linalg.inv(x.T @ x)
     size = np.sqrt(np.diag(inverse))
-    np.testing.assert_allclose(fit.correlation, inverse / np.outer(size, size), rtol=1e-6)
-    white = np.outer(size, np.sqrt(np.diag(fit.covariance)))
-    np.testing.assert_allclose(fit.colour, fit.standard_errors / white, rtol=1e-6)
+    np.testing.assert_allclose(fit.error_correlation, inverse / np.outer(size, size), rtol=1e-6)
+    white = np.outer(size, np.sqrt(np.diag(fit.residual_covariance)))
+    np.testing.assert_allclose(fit.standard_error_inflation, fit.standard_errors / white, rtol=1e-6)
 
 
 @pytest.mark.parametrize("reach", [0, 1, 4, 100])
@@ -113,17 +115,17 @@ def test_what_is_not_excited_gets_no_coefficient():
     np.testing.assert_allclose(fit.coefficients[0], fit.coefficients[3], rtol=1e-6)
     np.testing.assert_allclose(fit.coefficients[0] * 2, alone.coefficients[0], rtol=1e-6)
     assert fit.coefficients[4].tolist() == [0.0] * 3
-    assert fit.colour[4].tolist() == [1.0] * 3
-    assert np.isfinite(fit.correlation).all()
+    assert fit.standard_error_inflation[4].tolist() == [1.0] * 3
+    assert np.isfinite(fit.error_correlation).all()
     few = regression.least_squares(x[:3], y[:3], run[:3], 5)
-    assert np.isfinite(few.covariance).all()
+    assert np.isfinite(few.residual_covariance).all()
 
 
 def test_variance_inflation_of_columns_that_stand_still_or_depend():
     rng = np.random.default_rng(2)
     a, b = rng.standard_normal((2, 200))
     x = np.column_stack([a, np.full(200, 3.0), b + 0.1 * a + 5.0, 1e-14 * b])
-    found = regression.variance_inflation(x)
+    found = regression.variance_inflation_factors(x)
     r2 = np.corrcoef(a, x[:, 2])[0, 1] ** 2
     assert found[[0, 2]] == pytest.approx([1.0 / (1.0 - r2)] * 2)
     assert np.isinf(found[[1, 3]]).all()
@@ -147,34 +149,39 @@ def test_columns_that_depend_on_one_another_are_inflated_without_end(share, depe
     centred = rng.standard_normal((200, 3))
     a, b, c = np.linalg.qr(centred - centred.mean(axis=0))[0].T
     off = 2.0 * np.sqrt(share)
-    found = regression.variance_inflation(np.column_stack([a, c, a + off * b]) + 3.0)
+    found = regression.variance_inflation_factors(np.column_stack([a, c, a + off * b]) + 3.0)
     assert found[1] == pytest.approx(1.0)
     if depends:
         assert np.isinf(found[[0, 2]]).all()
     else:
         assert found[[0, 2]] == pytest.approx([1.0 / (4.0 * share)] * 2, rel=1e-2)
-    assert np.isinf(regression.variance_inflation(np.column_stack([a, c, a]))).tolist() == [True, False, True]
-    assert np.isinf(regression.variance_inflation(np.ones((9, 2)))).all()
+    assert np.isinf(regression.variance_inflation_factors(np.column_stack([a, c, a]))).tolist() == [
+        True,
+        False,
+        True,
+    ]
+    assert np.isinf(regression.variance_inflation_factors(np.ones((9, 2)))).all()
 
 
 def test_a_spectrum_holds_the_variance():
     rng = np.random.default_rng(3)
     white = rng.standard_normal((4096, 3)) * [1.0, 2.0, 3.0]
-    frequency, density = regression.spectrum(white, 0.05)
+    frequency, density = regression.power_spectral_density(white, 0.05)
     assert len(frequency) == 129
     assert (frequency[0], frequency[-1]) == (0.0, pytest.approx(10.0))
     assert density.mean(axis=0) * 10.0 == pytest.approx([1.0, 4.0, 9.0], rel=0.05)
-    assert len(regression.spectrum(white[:100], 0.05)[0]) == 51
-    shifted = regression.spectrum(white + 7.0, 0.05)[1]
+    assert len(regression.power_spectral_density(white[:100], 0.05)[0]) == 51
+    shifted = regression.power_spectral_density(white + 7.0, 0.05)[1]
     np.testing.assert_allclose(shifted, density, rtol=1e-6)
 
 
 def test_what_a_model_predicts_does_not_depend_on_later_samples():
     samples = small.flight(WING, 60)
     short = replace(
-        samples, **{k: getattr(samples, k)[:40] for k in ("rates", "commands", "signals", "labels", "run")}
+        samples,
+        **{k: getattr(samples, k)[:40] for k in ("rates", "commands", "signals", "labels", "stretch_number")},
     )
-    whole, cut = (regression.predicted(one, WING) for one in (samples, short))
+    whole, cut = (regression.split_response(one, WING) for one in (samples, short))
     for one, other in zip(whole, cut, strict=True):
         np.testing.assert_array_equal(one[:40], other)
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.replay import replay
+from beaver_ftc_logs.replay import replay_run_log
 
 DECLARED = {"rate_hz": 50, "actuators": "servo", "fdi": {"sharpen": "none"}}
 WITHDRAWN = {"design_model": {"linearised": True}, "fdi": {"bounds": {"coefficients": 0.05}}}
@@ -25,7 +25,7 @@ def run(request, tmp_path_factory):
 
 def test_detection_and_isolation_are_those_of_the_flight(run):
     folder, flight = run
-    columns, verdict = replay(folder / "log.parquet")
+    columns, verdict = replay_run_log(folder / "log.parquet")
     assert verdict["as_flown"] is True
     assert verdict["rows_that_differ"] == 0
     assert verdict["left_out"] == []
@@ -42,7 +42,7 @@ def test_a_changed_log_is_not_as_flown(run, tmp_path):
     for name in ("scenario.yaml", "metrics.json"):
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     table.to_parquet(tmp_path / "log.parquet")
-    _, verdict = replay(tmp_path / "log.parquet")
+    _, verdict = replay_run_log(tmp_path / "log.parquet")
     assert verdict["as_flown"] is False
     assert verdict["detection_s"] == pytest.approx(5.0, abs=0.02)
     assert flight.detection.time_s > 5.1
@@ -61,7 +61,7 @@ def test_a_damaged_log_is_told(run, tmp_path, rows, stamp, says):
     (tmp_path / "scenario.yaml").write_bytes((folder / "scenario.yaml").read_bytes())
     table.to_parquet(tmp_path / "log.parquet")
     with pytest.raises(BadInput, match=says):
-        replay(tmp_path / "log.parquet")
+        replay_run_log(tmp_path / "log.parquet")
 
 
 def test_the_command_writes_rows_and_verdict(run, tmp_path):

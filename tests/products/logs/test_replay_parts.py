@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Sensors
 from beaver_ftc_logs import replay as of
@@ -31,8 +31,8 @@ ALONE = (np.tile([0.9, 0.5, 0.7, 0.0], (len(SAID), 1)), np.tile([1.0, 0.7, 0.8, 
 
 def test_verdicts_as_columns():
     fdi = SimpleNamespace(is_ours=True, pairs=False)
-    rows = stepped.rows_of(T_S, stepped.Stepped(SAID, *ALONE, np.ones(4)), SURFACES, fdi)
-    columns = of.columns(rows, SURFACES)
+    rows = stepped.rows_of_replay(T_S, stepped.ReplayedVerdicts(SAID, *ALONE, np.ones(4)), SURFACES, fdi)
+    columns = of.diagnosis_columns(rows, SURFACES)
     assert list(columns) == [
         "t_s", "faulty", "named",
         *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
@@ -70,7 +70,7 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
         document = {"detection": {"time_s": beside[0]}, "isolation": {"time_s": beside[1]}}
         (tmp_path / "metrics.json").write_text(json.dumps(document))
     log = {"t_s": T_S, "detected": np.array([1, 1, 0, 1, 1, 1, 1])}
-    assert of._verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {
+    assert of._replay_verdict(tmp_path / "log.parquet", scenario(), log, SAID) == {
         "flight": "one", "replay": True, "duration_s": 3.0, "faulty": True, "detection_s": 0.5,
         "isolation_s": 3.0, "isolated": "unanticipated", "rows_that_differ": 2, "left_out": [],
         "as_flown": as_flown, "credible": {"share": 1.0, "reasons": []},
@@ -79,15 +79,17 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
 
 def test_what_is_withdrawn_is_not_what_is_named():
     """The name that stands at the end, since it has stood there."""
-    assert of._named(T_S[:4], SAID[:4]) == (1.5, "rudder")
-    assert of._named(T_S[:5], SAID[:5]) == (1.5, "rudder")
-    assert of._named(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    assert of._isolation_time_s(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._isolation_time_s(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._isolation_time_s(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
     again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
-    assert of._named(T_S[:5], again) == (1.5, "elevator")
+    assert of._isolation_time_s(T_S[:5], again) == (1.5, "elevator")
 
 
 def test_a_replay_that_finds_nothing(tmp_path):
-    found = of._verdict(tmp_path / "log.parquet", scenario(), {"t_s": T_S[:2] + 1.0}, [Verdict(), Verdict()])
+    found = of._replay_verdict(
+        tmp_path / "log.parquet", scenario(), {"t_s": T_S[:2] + 1.0}, [Verdict(), Verdict()]
+    )
     assert (found["faulty"], found["detection_s"], found["isolation_s"], found["isolated"]) == (
         False,
         None,
@@ -100,7 +102,7 @@ def test_a_replay_that_finds_nothing(tmp_path):
 def test_errors_of_the_flow_sensors_are_left_out():
     """Those of the gyros are in the measured rates."""
     flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
-    assert of._left_out(flawed) == ["the declared errors of alpha: the log has the true value"]
+    assert of._unreplayed_inputs(flawed) == ["the declared errors of alpha: the log has the true value"]
 
 
 FOUND = {
@@ -121,24 +123,24 @@ def test_a_replay_in_words():
 
 def test_a_log_of_ours_stands_beside_its_scenario(tmp_path):
     path = tmp_path / "log.parquet"
-    assert not of.is_own_log(path)
+    assert not of.is_log_of_run(path)
     (tmp_path / "scenario.yaml").write_text("")
-    assert of.is_own_log(path)
-    assert not of.is_own_log(tmp_path / "other.parquet")
+    assert of.is_log_of_run(path)
+    assert not of.is_log_of_run(tmp_path / "other.parquet")
 
 
 def test_columns_that_a_log_must_have(tmp_path):
     path = synthetic.write_parquet(
         tmp_path / "log.parquet", {"t_s": [0.0, 1.0], "a": [1.0, 2.0], "b": [3.0, 4.0]}
     )
-    assert {name: values.tolist() for name, values in of._columns_of(path, ["t_s", "b"]).items()} == {
+    assert {name: values.tolist() for name, values in of._read_columns(path, ["t_s", "b"]).items()} == {
         "t_s": [0.0, 1.0],
         "b": [3.0, 4.0],
     }
     with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
-        of._columns_of(path, ["t_s", "c"])
+        of._read_columns(path, ["t_s", "c"])
     aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
-    assert stepped.inputs_of(aircraft) == (
+    assert stepped.log_input_columns(aircraft) == (
         ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
         ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
         [f"{name}_cmd_rad" for name in SURFACES],

@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
-from beaver_ftc_logs.bank import IDLE, UNKNOWN, bank_of
+from beaver_ftc_logs.bank import NO_RESPONSE, UNKNOWN_OFFSET, build_hypothesis_bank
 from kept import in_short
 from products.logs import small
 
@@ -23,10 +23,10 @@ TAIL = small.model(small.TAIL, settings=SETTINGS)
 def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
     samples, model = small.flight(WING, 20, dt_s=1.0 / at_hz), small.model(rate_hz=of_hz)
     if taken:
-        assert diagnose.check_rate(samples, model) is None
+        assert diagnose.check_log_fits_model(samples, model) is None
         return
     with pytest.raises(BadInput, match=r"allowed: within 25% of the 8 Hz the model was identified at"):
-        diagnose.check_rate(samples, model)
+        diagnose.check_log_fits_model(samples, model)
 
 
 @pytest.mark.parametrize(("hold_s", "stands"), [
@@ -36,8 +36,8 @@ def test_a_log_may_be_a_quarter_off_the_rate(at_hz, of_hz, taken):
 def test_a_condition_stands_once_it_has_held(hold_s, stands):
     model = small.model(settings={"hold_s": hold_s})
     raised = np.array([0, 1, 1, 1, 1, 0, 1, 0], dtype=bool)
-    assert diagnose._standing(raised, model).astype(int).tolist() == stands
-    assert diagnose._standing(raised[1:], model).astype(int).tolist() == stands[1:]
+    assert diagnose._has_held_long_enough(raised, model).astype(int).tolist() == stands
+    assert diagnose._has_held_long_enough(raised[1:], model).astype(int).tolist() == stands[1:]
 
 
 @pytest.mark.parametrize(("raised", "well", "alarm"), [
@@ -50,7 +50,7 @@ def test_a_condition_stands_once_it_has_held(hold_s, stands):
 ])  # fmt: skip
 def test_an_alarm_stands_until_health_is_the_likelier(raised, well, alarm):
     given = (np.array([flag == "1" for flag in flags]) for flags in (raised, well))
-    assert "".join(str(int(flag)) for flag in diagnose._latched(*given)) == alarm
+    assert "".join(str(int(flag)) for flag in diagnose._latch_until_healthy(*given)) == alarm
 
 
 LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
@@ -61,7 +61,7 @@ LEVELS = np.array([0.0, 0.25, 0.5, 1.0])
     ([0.6, 0.2, 0.1, 0.1], 0.0), ([0.1, 0.1, 0.1, 0.7], 1.0),
 ])  # fmt: skip
 def test_half_of_the_probability_is_on_either_side_of_the_median(mass, median):
-    assert diagnose._median(LEVELS, np.array([mass])).tolist() == [median]
+    assert diagnose._median_level(LEVELS, np.array([mass])).tolist() == [median]
 
 
 @pytest.mark.parametrize(("mass", "bounds"), [
@@ -74,15 +74,15 @@ def test_half_of_the_probability_is_on_either_side_of_the_median(mass, median):
     ([0.4, 0.0, 0.5, 0.1], (0.0, 0.75)),  # what lies between is inside
 ])  # fmt: skip
 def test_bounds_are_of_the_fewest_levels_that_hold_the_share(mass, bounds):
-    low, high = diagnose._bounds(LEVELS, np.array([mass]), 0.8)
+    low, high = diagnose._credible_bounds(LEVELS, np.array([mass]), 0.8)
     assert (low[0], high[0]) == bounds
 
 
 def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
-    bank = bank_of(WING)
-    posterior = np.arange(1.0, len(bank.kind) + 1)[None, :] / 1000.0
+    bank = build_hypothesis_bank(WING)
+    posterior = np.arange(1.0, len(bank.hypothesis_kind) + 1)[None, :] / 1000.0
     for group in (0, 1):
-        levels, mass = diagnose._marginal(bank, posterior[:, : bank.idle], group)
+        levels, mass = diagnose._marginal_distribution(bank, posterior[:, : bank.no_response_index], group)
         assert levels.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
         for level, found in zip(levels, mass[0], strict=True):
             its = (bank.effectiveness[:-1, group] == level).nonzero()[0]
@@ -91,13 +91,17 @@ def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
 
 def posterior(bank, *shares):
     """A row each: {what: probability}, what being `idle`, `unknown` or (level of each group)."""
-    rows = np.zeros((len(shares), len(bank.kind)))
+    rows = np.zeros((len(shares), len(bank.hypothesis_kind)))
     for row, said in zip(rows, shares, strict=True):
         for what, share in said.items():
             if isinstance(what, str):
-                row[(bank.kind == {"idle": IDLE, "unknown": UNKNOWN}[what]).argmax()] = share
+                row[
+                    (bank.hypothesis_kind == {"idle": NO_RESPONSE, "unknown": UNKNOWN_OFFSET}[what]).argmax()
+                ] = share
                 continue
-            row[((bank.effectiveness == what).all(axis=1) & (bank.kind != UNKNOWN)).argmax()] = share
+            row[
+                ((bank.effectiveness == what).all(axis=1) & (bank.hypothesis_kind != UNKNOWN_OFFSET)).argmax()
+            ] = share
     return rows
 
 
@@ -129,32 +133,37 @@ def held(rows):
 
 @pytest.mark.parametrize("name", SHARES)
 def test_rows_of_probabilities(changed, name):
-    bank = bank_of(WING)
+    bank = build_hypothesis_bank(WING)
     shares = posterior(bank, *SHARES[name])
     samples = small.flight(WING, len(shares))
-    found = diagnose.rows_of(samples, WING, bank, shares)
+    found = diagnose.rows_of_posterior(samples, WING, bank, shares)
     assert not changed(held(found))
     assert found.t_s is samples.t_s
 
 
 def test_rows_of_surfaces_together_that_may_be_stuck(changed):
-    bank = bank_of(TAIL)
+    bank = build_hypothesis_bank(TAIL)
     shares = posterior(bank, *STUCK)
-    assert not changed(held(diagnose.rows_of(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
+    assert not changed(held(diagnose.rows_of_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
 
 
 def test_names_by_hand():
     """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
-    bank = bank_of(TAIL)
-    found = diagnose.rows_of(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
+    bank = build_hypothesis_bank(TAIL)
+    found = diagnose.rows_of_posterior(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
     assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
     aileron = "left_aileron+right_aileron"
-    assert found.named.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
-    assert found.estimate[0].tolist() == [1.0, 0.25, 1.0]
-    assert (found.low[5].tolist(), found.high[5].tolist()) == ([0.0, 0.875, 0.0], [1.0, 1.0, 1.0])
-    first = diagnose._names(TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), ONE, ONE > 0)
+    assert found.named_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
+    assert found.effectiveness[0].tolist() == [1.0, 0.25, 1.0]
+    assert (found.effectiveness_low[5].tolist(), found.effectiveness_high[5].tolist()) == (
+        [0.0, 0.875, 0.0],
+        [1.0, 1.0, 1.0],
+    )
+    first = diagnose._surfaces_at_fault(
+        TAIL, bank, posterior(bank, {"unknown": 0.9, LEFT: 0.1}), ONE, ONE > 0
+    )
     assert first.tolist() == ["elevator"]
-    split = diagnose._names(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), ONE, ONE > 0)
+    split = diagnose._surfaces_at_fault(TAIL, bank, posterior(bank, {LEFT: 0.5, RIGHT: 0.5}), ONE, ONE > 0)
     assert split.tolist() == ["unknown"]
 
 
@@ -165,14 +174,14 @@ def test_names_under_other_laws(monkeypatch):
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "evidence", lambda posterior, bank: gained)
+    monkeypatch.setattr(diagnose, "fault_evidence_gains", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
-    bank = bank_of(model)
+    bank = build_hypothesis_bank(model)
 
     def named_by(of):
-        found = diagnose.rows_of(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
+        found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
         assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
-        return found.named.tolist()
+        return found.named_surfaces.tolist()
 
     assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
     same = model.model_copy(update={"settings": settings})
@@ -185,14 +194,16 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
 
     def renamed(*of):
         given.append(of[3:])
-        return np.array(["left", UNKNOWN, "right"], dtype=object)
+        return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
-    monkeypatch.setattr(diagnose.energy, "renamed", renamed)
+    monkeypatch.setattr(diagnose.energy, "without_surfaces_after_engine_failure", renamed)
     model = SimpleNamespace(fitted=SimpleNamespace(energy_climb=-1.5))
-    found = diagnose._without_power(SimpleNamespace(energy_climb="climb"), model, rows)
+    found = diagnose._without_names_after_engine_failure(
+        SimpleNamespace(energy_climb_mps="climb"), model, rows
+    )
     assert given[0][:2] == ("climb", -1.5)
-    assert found.named.tolist() == ["left", UNKNOWN, "right"]
-    for name, value in (("estimate", 1.0), ("low", 0.0), ("high", 1.0)):
+    assert found.named_surfaces.tolist() == ["left", UNKNOWN_OFFSET, "right"]
+    for name, value in (("effectiveness", 1.0), ("effectiveness_low", 0.0), ("effectiveness_high", 1.0)):
         values = getattr(rows, name).copy()
         values[1] = value
         np.testing.assert_array_equal(getattr(found, name), values)
@@ -201,8 +212,8 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         (SimpleNamespace(energy_climb=None), "climb"),
         (model.fitted, None),
     ):
-        alike = diagnose._without_power(
-            SimpleNamespace(energy_climb=climb), SimpleNamespace(fitted=fitted), rows
+        alike = diagnose._without_names_after_engine_failure(
+            SimpleNamespace(energy_climb_mps=climb), SimpleNamespace(fitted=fitted), rows
         )
         assert alike is rows
 
@@ -212,16 +223,23 @@ def test_rows_at_the_stamps_of_a_faster_log():
     rows = small.rows(
         [(1, "", [1.0, 1.0]), (1, "left", [1.0, 0.5]), (1, "right", [0.4, 1.0])]
     )  # at 10, 10.5, 11
-    samples = small.flight(WING, 3, stamps=np.array([9.0, 10.0, 10.4, 10.5, 10.9, 11.0, 20.0]))
-    found = diagnose._at_stamps(samples, rows)
+    samples = small.flight(WING, 3, log_stamps_s=np.array([9.0, 10.0, 10.4, 10.5, 10.9, 11.0, 20.0]))
+    found = diagnose._rows_at_log_stamps(samples, rows)
     last = [0, 0, 0, 1, 1, 2, 2]
-    np.testing.assert_array_equal(found.t_s, samples.stamps)
-    for name in ("faulty", "named", "estimate", "low", "high", "probability"):
+    np.testing.assert_array_equal(found.t_s, samples.log_stamps_s)
+    for name in (
+        "faulty",
+        "named_surfaces",
+        "effectiveness",
+        "effectiveness_low",
+        "effectiveness_high",
+        "fault_probability",
+    ):
         np.testing.assert_array_equal(getattr(found, name), getattr(rows, name)[last])
-    same = small.flight(WING, 3, stamps=rows.t_s)
-    assert diagnose._at_stamps(same, rows) is rows
-    late = replace(same, stamps=rows.t_s + 0.1)
-    np.testing.assert_array_equal(diagnose._at_stamps(late, rows).t_s, rows.t_s + 0.1)
+    same = small.flight(WING, 3, log_stamps_s=rows.t_s)
+    assert diagnose._rows_at_log_stamps(same, rows) is rows
+    late = replace(same, log_stamps_s=rows.t_s + 0.1)
+    np.testing.assert_array_equal(diagnose._rows_at_log_stamps(late, rows).t_s, rows.t_s + 0.1)
 
 
 @pytest.mark.parametrize(("of", "settings"), [
@@ -234,9 +252,10 @@ def test_a_short_flight_through_the_bank(changed, of, settings):
     samples = small.flight(model, 200, lost=((1, 70, 140, 0.4),), gap=100)
     rows = diagnose.diagnose(samples, model)
     assert not changed({
-        "named": rows.named[::10], "faulty": rows.faulty[::10], "of_a_fault": rows.probability[::10],
-        **{name: in_short(getattr(rows, name)) for name in ("estimate", "low", "high", "probability")},
+        "named": rows.named_surfaces[::10], "faulty": rows.faulty[::10],
+        "of_a_fault": rows.fault_probability[::10],
+        **{name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()},
     })  # fmt: skip
     late = slice(110, 140)
-    assert set(rows.named[late]) == {"left" if of is small.WING else "elevator"}
-    assert np.median(rows.estimate[late, 1]) == pytest.approx(0.4, abs=0.11)
+    assert set(rows.named_surfaces[late]) == {"left" if of is small.WING else "elevator"}
+    assert np.median(rows.effectiveness[late, 1]) == pytest.approx(0.4, abs=0.11)

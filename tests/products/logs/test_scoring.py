@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.diagnose import Rows
-from beaver_ftc_logs.recording import Event
+from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.recording import LoggedFailure
 from products.logs import small
 
 GROUPS = [["left_aileron", "right_aileron"], ["elevator"], ["rudder"]]
@@ -16,7 +16,9 @@ def rows(estimate, low, high, faulty=None):
     faulty = np.zeros(len(estimate), dtype=int) if faulty is None else np.array(faulty)
     n = len(estimate)
     named = np.full(n, "", dtype=object)
-    return Rows(np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n))
+    return DiagnosisRows(
+        np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n)
+    )
 
 
 def test_figures_by_labels():
@@ -25,7 +27,7 @@ def test_figures_by_labels():
     estimate = [[1, 1], [1, 0.6], [1, 0.9], [0.3, 1], [0, 0], [0.9, 1]]
     low = np.array([[1, 1], [1, 0.5], [1, 0.6], [0.2, 0.9], [0, 0], [0.8, 1]])
     high = np.array([[1, 1], [1, 0.7], [1, 1.0], [0.4, 0.95], [0, 0], [0.9, 1]])
-    assert scoring.by_labels(rows(estimate, low, high, [0, 1, 0, 1, 1, 1]), labels) == {
+    assert scoring.score_against_labels(rows(estimate, low, high, [0, 1, 0, 1, 1, 1]), labels) == {
         "rows": 5,
         "settings": [[0.2, 1.0], [1.0, 0.5], [1.0, 1.0]],
         "classes": pytest.approx(4 / 5),
@@ -40,7 +42,7 @@ def test_figures_by_labels():
 def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one):
     labels = np.ones((200 + 200 * (not count), 1))
     labels[5] = 0.5
-    found = scoring.by_labels(rows(labels, labels, labels), labels)
+    found = scoring.score_against_labels(rows(labels, labels, labels), labels)
     assert ([0.5] in found["settings"]) is is_one
     assert found["rows"] == len(labels)
 
@@ -48,10 +50,14 @@ def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one
 def test_the_nearest_setting_is_the_first_of_two():
     settings = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
     estimate = np.array([[0.9, 0.9], [0.4, 1.0], [0.5, 0.5], [0.6, 0.3]])
-    assert scoring.nearest(estimate, settings).tolist() == [0, 1, 0, 2]
+    assert scoring.nearest_setting(estimate, settings).tolist() == [0, 1, 0, 2]
 
 
-FAILURE = (Event(12.0, "right_aileron"), Event(13.99, "rudder"), Event(14.0, "elevator"))
+FAILURE = (
+    LoggedFailure(12.0, "right_aileron"),
+    LoggedFailure(13.99, "rudder"),
+    LoggedFailure(14.0, "elevator"),
+)
 
 
 def told(parts):
@@ -61,7 +67,7 @@ def told(parts):
 
 def test_an_alarm_before_and_after_the_failure():
     """False before 12 s, one more begun there; late by the first row with an alarm."""
-    found = scoring.by_event(
+    found = scoring.score_against_failures(
         told([(1, "rudder"), (1, ""), (2, "elevator"), (2, ""), (3, "left_aileron"), (1, "unknown")]),
         FAILURE,
         GROUPS,
@@ -79,19 +85,21 @@ def test_an_alarm_before_and_after_the_failure():
 
 
 def test_a_failure_that_is_not_found_and_a_flight_without_any():
-    missed = scoring.by_event(told([(9, "")]), FAILURE, GROUPS)
+    missed = scoring.score_against_failures(told([(9, "")]), FAILURE, GROUPS)
     assert (missed["detected"], missed["delay_s"], missed["named"], missed["right_group"]) == (
         False,
         None,
         {},
         None,
     )
-    quiet = scoring.by_event(told([(4, ""), (2, "rudder"), (3, "")]), (), GROUPS)
+    quiet = scoring.score_against_failures(told([(4, ""), (2, "rudder"), (3, "")]), (), GROUPS)
     assert quiet == {
         "failure": None, "failure_s": None, "healthy_s": 4.0, "false_alarms": 1, "detected": False,
         "delay_s": None, "named": {}, "right_group": None,
     }  # fmt: skip
-    from_the_start = scoring.by_event(told([(3, "rudder")]), (Event(10.0, "rudder"),), GROUPS)
+    from_the_start = scoring.score_against_failures(
+        told([(3, "rudder")]), (LoggedFailure(10.0, "rudder"),), GROUPS
+    )
     assert (from_the_start["healthy_s"], from_the_start["false_alarms"], from_the_start["delay_s"]) == (
         0.0,
         0,
@@ -116,22 +124,22 @@ RIGHT = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_whether_the_group_is_the_right_one(name):
     named, surfaces, right = RIGHT[name]
-    assert scoring._right_group(named, surfaces, GROUPS) is right
+    assert scoring._is_right_group(named, surfaces, GROUPS) is right
 
 
 def test_a_score_is_by_labels_where_there_are_any():
     model = small.model()
     samples = small.flight(model, 100, lost=((1, 40, 80, 0.5),))
     rows = small.rows([(100, "left", [1.0, 0.5])], step_s=0.1)
-    assert "classes" in scoring.score(samples, rows, model.groups)
+    assert "classes" in scoring.score_diagnosis(samples, rows, model.groups)
     tail = small.model(small.TAIL)
-    bare = small.flight(tail, 100, events=small.FAILURE)
-    assert scoring.score(bare, rows, tail.groups)["failure"] == "elevator+left_aileron"
+    bare = small.flight(tail, 100, logged_failures=small.FAILURE)
+    assert scoring.score_diagnosis(bare, rows, tail.groups)["failure"] == "elevator+left_aileron"
 
 
 def test_rows_before_the_first_sample_have_its_label():
     model = small.model()
     samples = small.flight(model, 4, lost=((1, 0, 1, 0.5),))
     given = small.rows([(3, "left", [1.0, 0.5])])  # at 10, 10.5, 11
-    early = Rows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
-    assert scoring.score(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)
+    early = DiagnosisRows(**(vars(given) | {"t_s": np.array([-1.0, 0.05, 0.1])}))
+    assert scoring.score_diagnosis(samples, early, model.groups)["mean_error"] == pytest.approx(0.5 / 6)

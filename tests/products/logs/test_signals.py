@@ -19,12 +19,12 @@ def noise(seed=1):
 def test_for_how_long_a_signal_stands_still():
     values = noise()
     values[200:261] = values[200]
-    still = signals.still_s(Column(T_S, values))
+    still = signals.still_time_s(Column(T_S, values))
     assert still[211] == 0.0
     assert still[212] == pytest.approx(0.6)
     assert still[260] == pytest.approx(3.0)
     assert not still[261:].any()
-    assert signals.remarks("p", Column(T_S, values), measured=True) == [
+    assert signals.column_mistakes("p", Column(T_S, values), measured=True) == [
         "p: frozen, the same to the last bit for 3.0 s"
     ]
 
@@ -32,42 +32,42 @@ def test_for_how_long_a_signal_stands_still():
 def test_a_clipped_rate_and_one_that_is_not():
     free = np.sin(T_S) * 3.0 + 0.01 * noise()
     for side in (1.0, -1.0):
-        rows = signals.clipped(side * np.clip(free, -9.0, 2.0))
+        rows = signals.is_clipped(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
-        said = signals.remarks("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), measured=True)
+        said = signals.column_mistakes("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), measured=True)
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
-    assert not signals.clipped(free).any()
-    assert not signals.clipped(np.zeros(500)).any()
+    assert not signals.is_clipped(free).any()
+    assert not signals.is_clipped(np.zeros(500)).any()
 
 
 @settings(max_examples=samples(20), deadline=None)
 @given(cut=st.integers(20, 1199), level=st.floats(0.5, 2.9))
 def test_what_is_clipped_shows_without_what_comes_later(cut, level):
     values = np.minimum(np.sin(T_S) * 3.0 + 0.01 * noise(), level)
-    np.testing.assert_array_equal(signals.clipped(values)[:cut], signals.clipped(values[:cut]))
+    np.testing.assert_array_equal(signals.is_clipped(values)[:cut], signals.is_clipped(values[:cut]))
 
 
 def test_jumps_are_single_rows_that_come_back():
     values = noise()
     values[[100, 700]] += 50.0
     values[900:] += 50.0
-    assert signals.jumps(values).tolist() == [100, 700]
-    assert not len(signals.jumps(noise()))
-    assert signals.jumps(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
+    assert signals.find_jump_rows(values).tolist() == [100, 700]
+    assert not len(signals.find_jump_rows(noise()))
+    assert signals.find_jump_rows(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
     held = np.repeat(noise(), 3)
     held[[400, 2200]] -= 50.0
-    assert signals.jumps(held).tolist() == [400, 2200]  # a log of more rows than readings
-    said = signals.remarks("p", Column(T_S, values), measured=True)
+    assert signals.find_jump_rows(held).tolist() == [400, 2200]  # a log of more rows than readings
+    said = signals.column_mistakes("p", Column(T_S, values), measured=True)
     assert said == ["p: 2 jumps, the first at 5.00 s"]
 
 
 def test_rows_without_a_number_are_counted():
     values = noise()
     values[3:10] = np.nan
-    (said,) = signals.remarks("p", Column(T_S, values, ""), measured=True)
+    (said,) = signals.column_mistakes("p", Column(T_S, values, ""), measured=True)
     assert said == "p: rows without a number: 7 of 1200"
-    assert signals.remarks("u", Column(T_S, np.full(1200, 0.1)), measured=False)[-1].startswith(
+    assert signals.column_mistakes("u", Column(T_S, np.full(1200, 0.1)), measured=False)[-1].startswith(
         "u: does not move"
     )
 
@@ -97,7 +97,7 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     phi, theta, rates = turning()
     columns = [Column(T_S, rate * one) for one in rates]
     pitch = Column(T_S, theta) if angle == 1.0 else None
-    found = physics.roll_of(columns, Column(T_S, angle * phi), pitch)
+    found = physics.fit_roll(columns, Column(T_S, angle * phi), pitch)
     if pitch is not None:
         assert found.slope == pytest.approx(1.0 / rate, rel=2e-3)
         assert abs(found.correlation) > 0.9999
@@ -115,13 +115,13 @@ def test_of_a_short_log_more_is_needed(seconds, rate, says):
     kept = T_S - T_S[0] <= seconds
     t_s = T_S[kept]
     columns = [Column(t_s, rate * one[kept]) for one in rates]
-    found = physics.roll_of(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
+    found = physics.fit_roll(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
     assert (found is not None and physics.angle_remark(found, "p", "roll") is not None) is says
 
 
 def test_nothing_is_said_of_a_roll_that_does_not_move():
     still = Column(T_S, np.zeros(len(T_S)))
-    assert physics.roll_of([still] * 3, still, None) is None
+    assert physics.fit_roll([still] * 3, still, None) is None
 
 
 @pytest.mark.parametrize(("mean", "says"), [
@@ -137,10 +137,10 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
     phi, theta, (p, q, r) = turning()
     swapped = {"gx": Column(T_S, q), "gy": Column(T_S, p), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), None]
-    said = physics.attitude_says(swapped, angles, {})
+    said = physics.find_attitude_mistake(swapped, angles, {})
     assert said.endswith("gy is the roll rate")
     right = {"gx": Column(T_S, p), "gy": Column(T_S, q), "gz": Column(T_S, r)}
-    assert physics.attitude_says(right, angles, {}) is None
+    assert physics.find_attitude_mistake(right, angles, {}) is None
 
 
 @pytest.mark.parametrize(("factor", "angle", "says"), [
@@ -152,11 +152,11 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
 ])  # fmt: skip
 def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
-    found = physics.pitch_of([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
+    found = physics.fit_pitch([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, angle * theta)), None]
-    said = physics.attitude_says(rates, angles, {})
+    said = physics.find_attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)
 
 
@@ -175,7 +175,7 @@ def yawed(seed=1):
 def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
     columns = [Column(T_S, one) for one in (p, q, r)]
-    found = physics.yaw_of(columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed()))
+    found = physics.fit_yaw(columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed()))
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": columns[0], "gy": columns[1], "gz": Column(T_S, factor * r)}
     angles = [
@@ -183,7 +183,7 @@ def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
         ("pitch", Column(T_S, theta)),
         ("yaw", Column(T_S, angle * yawed())),
     ]
-    said = physics.attitude_says(rates, angles, {})
+    said = physics.find_attitude_mistake(rates, angles, {})
     assert (said is None) if says is None else (says in said)
 
 
@@ -191,8 +191,10 @@ def test_another_column_in_the_place_of_a_rate_is_found_by_the_angle_that_follow
     phi, theta, (p, q, r) = turning()
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, theta)), ("yaw", Column(T_S, yawed()))]
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, np.sin(2.1 * T_S)), "gz": Column(T_S, r)}
-    assert physics.attitude_says(rates, angles, {}) is None
-    said = physics.attitude_says(rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)})
+    assert physics.find_attitude_mistake(rates, angles, {}) is None
+    said = physics.find_attitude_mistake(
+        rates, angles, {"alpha": Column(T_S, q), "beta": Column(T_S, 0.1 * p)}
+    )
     assert said is not None
     assert said.startswith("pitch does not follow gy")
     assert said.endswith("alpha is the pitch rate")
@@ -207,8 +209,8 @@ def test_nothing_is_said_where_the_nose_is_steep():
     still = Column(t_s, 1e-3 * np.sin(t_s))
     rates = {"gx": still, "gy": Column(t_s, np.full(len(t_s), 0.3)), "gz": still}
     angles = [("roll", Column(t_s, phi)), ("pitch", Column(t_s, theta)), ("yaw", Column(t_s, psi))]
-    assert physics.attitude_says(rates, angles, {}) is None
-    assert physics.roll_of(list(rates.values()), angles[0][1], angles[1][1]) is None
+    assert physics.find_attitude_mistake(rates, angles, {}) is None
+    assert physics.fit_roll(list(rates.values()), angles[0][1], angles[1][1]) is None
 
 
 def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
@@ -219,5 +221,5 @@ def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
     late = t_s >= 10.0
     t_s, roll = t_s + 5.0 * late, roll + 1.0 * late
     zero = Column(t_s, np.zeros(len(t_s)))
-    found = physics.roll_of([Column(t_s, p), zero, zero], Column(t_s, roll), None)
+    found = physics.fit_roll([Column(t_s, p), zero, zero], Column(t_s, roll), None)
     assert (found.slope, found.correlation) == (pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=1e-3))

@@ -7,10 +7,10 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.findings import as_text, verdict_of
+from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.recording import in_order
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.recording import rows_in_time_order
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import limited, synthetic
 
 JUMP_S = 1e6
@@ -81,17 +81,17 @@ def test_a_gap_is_a_gap_however_long(wing, wing_model, tmp_path):
     rows = []
     for number, jump_s in enumerate((10.0, 1e4)):
         path = synthetic.write_csv(tmp_path / f"{number}.csv", fast(jump_s))
-        samples = load_flights([path], wing)[0]
+        samples = load_flights_for_fit([path], wing)[0]
         model = wing_model.model_copy(update={"rate_hz": 20.0})
         rows.append((samples, diagnose(samples, model)))
-        text = as_text(verdict_of(samples, model, rows[-1][1]))
+        text = as_text(verdict_document(samples, model, rows[-1][1]))
         assert text.splitlines()[0].endswith(" in 30 s, 1 gap in the log left out")
     (one, said), (other, said_too) = rows
-    assert one.run[0] == 0
-    assert one.run[-1] == 1
-    np.testing.assert_array_equal(one.run, other.run)
+    assert one.stretch_number[0] == 0
+    assert one.stretch_number[-1] == 1
+    np.testing.assert_array_equal(one.stretch_number, other.stretch_number)
     np.testing.assert_allclose(one.rates, other.rates, atol=1e-12)
-    np.testing.assert_allclose(said.probability, said_too.probability, atol=1e-9)
+    np.testing.assert_allclose(said.fault_probability, said_too.fault_probability, atol=1e-9)
 
 
 def test_a_time_in_another_unit_is_told(wing, tmp_path):
@@ -99,20 +99,20 @@ def test_a_time_in_another_unit_is_told(wing, tmp_path):
     columns = fast(0.0)
     columns["t_s"] = columns["t_s"] * 1e-9
     with pytest.raises(BadInput, match=r"logged at 5e\+10 Hz, allowed: up to 100000 Hz, time in seconds"):
-        load_flights([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
+        load_flights_for_fit([synthetic.write_csv(tmp_path / "tiny.csv", columns)], wing)
 
 
 def test_each_side_of_a_gap_is_sampled_as_if_alone(wing, tmp_path):
     columns = fast(1e4)
-    whole = load_flights([synthetic.write_csv(tmp_path / "whole.csv", columns)], wing)[0]
+    whole = load_flights_for_fit([synthetic.write_csv(tmp_path / "whole.csv", columns)], wing)[0]
     halves = [slice(0, ROWS // 2), slice(ROWS // 2, None)]
     parts = [
-        load_flights([synthetic.write_csv(tmp_path / f"{i}.csv", columns, half)], wing)[0]
+        load_flights_for_fit([synthetic.write_csv(tmp_path / f"{i}.csv", columns, half)], wing)[0]
         for i, half in enumerate(halves)
     ]
     np.testing.assert_array_equal(whole.t_s, np.concatenate([part.t_s for part in parts]))
     np.testing.assert_allclose(whole.rates, np.vstack([part.rates for part in parts]), atol=1e-12)
-    np.testing.assert_array_equal(whole.run, np.repeat([0, 1], [len(part.t_s) for part in parts]))
+    np.testing.assert_array_equal(whole.stretch_number, np.repeat([0, 1], [len(part.t_s) for part in parts]))
     assert len(whole.t_s) < ROWS
 
 
@@ -123,7 +123,7 @@ DAMAGED = 51  # the row, counted from 1, whose stamp is off
 @pytest.mark.parametrize("suffix", ["ulg", "log", "bin"])
 def test_a_damaged_stamp_costs_its_row_and_is_said(tmp_path, suffix, off_s):
     pytest.importorskip("pyulog"), pytest.importorskip("pymavlink")
-    from beaver_ftc_logs.samples import sample
+    from beaver_ftc_logs.samples import resample
     from beaver_ftc_logs.vehicle import load_vehicle
 
     vehicle, write = WRITERS[suffix]
@@ -137,7 +137,7 @@ def test_a_damaged_stamp_costs_its_row_and_is_said(tmp_path, suffix, off_s):
         for field in ("t_s", "values"):
             of_all = getattr(whole.columns[name], field)
             np.testing.assert_array_equal(getattr(column, field), np.delete(of_all, DAMAGED - 1))
-    samples = sample(damaged, load_vehicle(tmp_path / "vehicle.yaml"))
+    samples = resample(damaged, load_vehicle(tmp_path / "vehicle.yaml"))
     said = f"{topic}: row {DAMAGED}: its stamp is out of order, the row is left out"
     assert [note for note in samples.notes if "out of order" in note] == [said]
 
@@ -199,7 +199,7 @@ def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
     ],
 )
 def test_which_rows_are_in_order(t_s, kept, says):
-    found, note = in_order("x", np.array(t_s, dtype=float))
+    found, note = rows_in_time_order("x", np.array(t_s, dtype=float))
     assert found.tolist() == kept
     assert note == says
 
@@ -209,7 +209,7 @@ def test_no_row_more_than_needed_is_left_out():
     rng = np.random.default_rng(2)
     for _ in range(200):
         t_s = rng.integers(0, 8, 8).astype(float)
-        kept, _ = in_order("x", t_s)
+        kept, _ = rows_in_time_order("x", t_s)
         assert (np.diff(t_s[kept]) > 0).all()
         masks = ((np.arange(256)[:, None] >> np.arange(8)) & 1).astype(bool)
         longest = max(mask.sum() for mask in masks if (np.diff(t_s[mask]) > 0).all())
@@ -217,7 +217,7 @@ def test_no_row_more_than_needed_is_left_out():
 
 
 def test_the_text_of_a_verdict_has_its_notes(wing, wing_model, tmp_path):
-    samples = load_flights([synthetic.write_csv(tmp_path / "one.csv", synthetic.fly(20.0))], wing)[0]
-    found = verdict_of(samples, wing_model, diagnose(samples, wing_model))
+    samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "one.csv", synthetic.fly(20.0))], wing)[0]
+    found = verdict_document(samples, wing_model, diagnose(samples, wing_model))
     assert found["notes"] == []
     assert "a remark" in as_text(found | {"notes": ["a remark"]})

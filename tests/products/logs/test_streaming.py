@@ -3,17 +3,23 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.detectors import context_of, detector_names, diagnose_with, rows_of, stream_of
-from beaver_ftc_logs.samples import load_flights
+from beaver_ftc_logs.detectors import (
+    detector_names,
+    diagnose_with,
+    loop_detector_context,
+    loop_detector_inputs,
+    rows_of_verdicts,
+)
+from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 
 @pytest.fixture(scope="module")
 def flown(wing, wing_folder):
     columns = synthetic.fly(120.0, parts=((60, 120, 1.0, 0.3),), seed=21)
-    return load_flights([synthetic.write_csv(wing_folder / "streamed.csv", columns)], wing)[0]
+    return load_flights_for_fit([synthetic.write_csv(wing_folder / "streamed.csv", columns)], wing)[0]
 
 
 def by_hand(samples, model, k):
@@ -32,7 +38,7 @@ def by_hand(samples, model, k):
 
 
 def test_the_innovation_is_the_residual_of_the_model(flown, wing_model):
-    stream = stream_of(flown, wing_model)
+    stream = loop_detector_inputs(flown, wing_model)
     dt_s = 1.0 / wing_model.rate_hz
     for k in (40, 333, 900):
         residual, answers = by_hand(flown, wing_model, k)
@@ -43,13 +49,13 @@ def test_the_innovation_is_the_residual_of_the_model(flown, wing_model):
 
 
 def test_where_the_model_is_silent_there_is_no_innovation(flown, wing_model):
-    now, before = stream_of(flown, wing_model)[2][0], stream_of(flown, wing_model)[1][0]
+    now, before = loop_detector_inputs(flown, wing_model)[2][0], loop_detector_inputs(flown, wing_model)[1][0]
     np.testing.assert_allclose(now.x - before.x, now.acceleration / wing_model.rate_hz, atol=1e-15)
 
 
 def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
     """A step of one rate changes the next sample by that column of the fit."""
-    context = context_of(wing_model)
+    context = loop_detector_context(wing_model)
     step = np.array([0.0, 0.3, 0.0])
     changed = step + context.dt_s * (context.model.f(step, None) - context.model.f(np.zeros(3), None))
     np.testing.assert_allclose(changed, 0.3 * np.array(wing_model.past)[1], atol=1e-12)
@@ -60,7 +66,7 @@ def test_a_rival_finds_a_large_loss(flown, wing_model, name):
     rows = diagnose_with(name, flown, wing_model)
     late = rows.t_s > 90.0
     assert rows.faulty[late].mean() > 0.8
-    assert np.mean(rows.named[late & (rows.faulty == 1)] == "left") > 0.8
+    assert np.mean(rows.named_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
     assert rows.faulty[(rows.t_s > 30) & (rows.t_s < 60)].mean() < 0.3
 
 
@@ -68,17 +74,21 @@ def test_every_detector_gives_rows(flown, wing_model):
     for name in detector_names():
         rows = diagnose_with(name, flown, wing_model)
         assert len(rows.t_s) == len(flown.t_s)
-        assert ((rows.low <= rows.estimate) & (rows.estimate <= rows.high)).all()
+        assert (
+            (rows.effectiveness_low <= rows.effectiveness) & (rows.effectiveness <= rows.effectiveness_high)
+        ).all()
 
 
 def test_verdicts_become_rows(flown, wing_model):
     said = Verdict(True, "q", "elevator", "loss_of_effectiveness", -0.4, None, 2.0)
     unknown = Verdict(True, None, "unanticipated", statistic=3.0)
-    rows = rows_of([Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model)
+    rows = rows_of_verdicts(
+        [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
+    )
     assert rows.faulty.tolist() == [0, 1, 1, 0]
-    assert rows.named.tolist() == ["", "left", "unknown", ""]
-    assert rows.estimate[1].tolist() == [1.0, pytest.approx(0.6)]
-    assert rows.low.tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
+    assert rows.named_surfaces.tolist() == ["", "left", "unknown", ""]
+    assert rows.effectiveness[1].tolist() == [1.0, pytest.approx(0.6)]
+    assert rows.effectiveness_low.tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 
 
 def test_an_unknown_detector(flown, wing_model):

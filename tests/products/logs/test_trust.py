@@ -8,11 +8,11 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
-from beaver_ftc_logs.bank import adaptation_of
-from beaver_ftc_logs.diagnose import diagnose, silenced
-from beaver_ftc_logs.findings import as_text, statement, verdict_of
-from beaver_ftc_logs.model import Fitted
-from beaver_ftc_logs.readings import Reading
+from beaver_ftc_logs.bank import build_adaptation_limits
+from beaver_ftc_logs.diagnose import diagnose, without_rows_not_credible
+from beaver_ftc_logs.findings import as_text, separability_statement, verdict_document
+from beaver_ftc_logs.model import FittedRanges
+from beaver_ftc_logs.readings import CorrectedReading
 from products.logs import small
 from telling import apart
 
@@ -22,8 +22,8 @@ HEALTHY = small.flight(small.model(), n=1200, seed=2)
 def trusted(flown=HEALTHY, **changes):
     """A model by hand that knows what it was fitted on."""
     model = small.model(**changes)
-    stretches = fitting.stretches_of([flown])
-    return fitting.trusted(stretches, model)
+    stretches = fitting.usable_stretches([flown])
+    return fitting.add_validity_range(stretches, model)
 
 
 @pytest.fixture(scope="module")
@@ -34,18 +34,18 @@ def model():
 def silent(rows):
     """Rows that say nothing at all."""
     return (
-        (rows.named == "")
+        (rows.named_surfaces == "")
         & (rows.faulty == 0)
-        & (rows.low == 0.0).all(axis=1)
-        & (rows.high == 1.0).all(axis=1)
+        & (rows.effectiveness_low == 0.0).all(axis=1)
+        & (rows.effectiveness_high == 1.0).all(axis=1)
     )
 
 
 def test_a_flight_like_those_fitted_is_credible(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
     assert rows.credible.mean() == 1.0
-    assert rows.reasons == {}
-    assert "left" in set(rows.named[450:])
+    assert rows.reasons_not_credible == {}
+    assert "left" in set(rows.named_surfaces[450:])
 
 
 @pytest.mark.parametrize(("change", "says"), [
@@ -61,8 +61,8 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
     out = rows.credible == 0
     assert out[-50:].all()
     assert silent(rows)[out].all()
-    assert any(says in reason for reason in rows.reasons)
-    verdict = verdict_of(flown, model, rows) | {"score": {}}
+    assert any(says in reason for reason in rows.reasons_not_credible)
+    verdict = verdict_document(flown, model, rows) | {"score": {}}
     assert verdict["credible"]["share"] == pytest.approx(1.0 - out.mean())
     assert says in as_text(verdict)
 
@@ -74,7 +74,7 @@ def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredibl
     flown = small.flight(noisy, n=1500, lost=((1, 600, 1500, 0.0),), seed=21)
     rows = diagnose(flown, model)
     assert rows.credible.mean() > 0.9
-    assert (rows.named[900:] == "left").mean() > 0.9
+    assert (rows.named_surfaces[900:] == "left").mean() > 0.9
     assert rows.faulty[:600].sum() == 0
 
 
@@ -84,7 +84,7 @@ def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
-    assert list(rows.reasons) == ["q_rad_s stands still, for longer than 1.5 s"]
+    assert list(rows.reasons_not_credible) == ["q_rad_s stands still, for longer than 1.5 s"]
 
 
 @pytest.mark.parametrize(("usual", "most"), [(0.0, 0.5), (0.25, 0.75)])
@@ -115,11 +115,11 @@ def test_rows_use_nothing_later(model):
     whole = diagnose(flown, model)
     part = {
         name: getattr(flown, name)[:350]
-        for name in ("t_s", "rates", "commands", "signals", "labels", "run", "stamps")
+        for name in ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
     }
     cut = diagnose(small.flight(model, n=600, seed=4, **part), model)
     np.testing.assert_array_equal(cut.credible, whole.credible[:350])
-    np.testing.assert_array_equal(cut.low, whole.low[:350])
+    np.testing.assert_array_equal(cut.effectiveness_low, whole.effectiveness_low[:350])
 
 
 @pytest.mark.parametrize(("factor", "says"), [
@@ -130,7 +130,7 @@ def test_rows_use_nothing_later(model):
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        trust.check_units(flown, model.fitted)
+        trust.check_rate_units(flown, model.fitted)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)
@@ -141,7 +141,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = trust.tied(
+    share = trust.explained_effect_share(
         [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
         small.model(history=4, lags=3),
     )
@@ -150,23 +150,25 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
-    assert trust.tied([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
+    assert (
+        trust.explained_effect_share([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
+    )
 
 
 def test_a_surface_that_never_moved_is_not_claimed(model):
     still = small.flight(model, n=1200, seed=2)
     still.commands[:, 0] = 0.2
     known = trusted(still)
-    assert trust.claimed(known) == [False, True]
+    assert trust.groups_with_known_effect(known) == [False, True]
     rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
-    assert (rows.low[:, 0] == 0.0).all()
-    assert (rows.high[:, 0] == 1.0).all()
-    assert set(rows.named) <= {"", "unknown", "right+left"}
-    assert not (rows.faulty & (rows.named == "")).any()
-    (line,) = trust.unclaimed_lines(known)
+    assert (rows.effectiveness_low[:, 0] == 0.0).all()
+    assert (rows.effectiveness_high[:, 0] == 1.0).all()
+    assert set(rows.named_surfaces) <= {"", "unknown", "right+left"}
+    assert not (rows.faulty & (rows.named_surfaces == "")).any()
+    (line,) = trust.unknown_effect_lines(known)
     assert line.startswith("of what right does, 100.0%")
     with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
-        right, left = statement(still, known)["groups"]
+        right, left = separability_statement(still, known)["groups"]
     assert set(right["smallest_loss"].values()) == {None}
     assert left["smallest_loss"]["60"] < 0.5
 
@@ -176,8 +178,10 @@ def test_few_minutes_mean_wide_bounds():
     errors = []
     for n in (400, 6400):
         flown = small.flight(small.model(), n=n, seed=6)
-        model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle())
-        errors.append(np.array(fitting.trusted(fitting.stretches_of([flown]), model).fitted.gain_sd))
+        model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle())
+        errors.append(
+            np.array(fitting.add_validity_range(fitting.usable_stretches([flown]), model).fitted.gain_sd)
+        )
     assert (errors[0] / errors[1] > 2.0).all()
     assert (errors[0] / errors[1] < 8.0).all()
 
@@ -185,13 +189,13 @@ def test_few_minutes_mean_wide_bounds():
 def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
     """As of one regressor, the response to the commands, with what the others make up of it taken off."""
     flown = small.flight(small.model(), n=3000, seed=6)
-    model = fitting.fit_model(fitting.stretches_of([flown]), small.vehicle(other_laws=True))
-    stretches = fitting.stretches_of([flown])
-    x, _, _ = fitting.stacked(stretches, model.vehicle, model.history, model.lags)
+    model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle(other_laws=True))
+    stretches = fitting.usable_stretches([flown])
+    x, _, _ = fitting.stacked_regression(stretches, model.vehicle, model.history, model.lags)
     fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
-    white = replace(fit, standard_errors=fit.standard_errors / fit.colour)
-    sd = np.sqrt(np.diag(fit.covariance))
-    for g, found in enumerate(fitting.gain_sd(white, model)):
+    white = replace(fit, standard_errors=fit.standard_errors / fit.standard_error_inflation)
+    sd = np.sqrt(np.diag(fit.residual_covariance))
+    for g, found in enumerate(fitting.group_gain_sd(white, model)):
         first = x.shape[1] - (len(model.groups) - g) * model.lags
         place = np.arange(x.shape[1])
         own = (place >= first) & (place < first + model.lags)
@@ -206,14 +210,14 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
         {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
     ]
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
-    stretches = fitting.stretches_of([frozen])
+    stretches = fitting.usable_stretches([frozen])
     with pytest.raises(BadInput) as error:
-        identification.check_explains(tests, stretches, small.model())
+        identification.check_explained_variance(tests, stretches, small.model())
     said = str(error.value)
     assert "explains less of p than the mean does (p -17.375)" in said
     assert said.endswith("follows; q_rad_s: stands still for 600 s")
     assert "more than these 1.9 min" in said
-    identification.check_explains(
+    identification.check_explained_variance(
         tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3, stretches, small.model()
     )
 
@@ -222,7 +226,7 @@ def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
     def spread(*errors):
         known = model.fitted.model_copy(update={"gain_sd": list(errors)})
         given = model.model_copy(update={"fitted": known})
-        return np.diag(adaptation_of(given).covariance)[4:]
+        return np.diag(build_adaptation_limits(given).initial_covariance)[4:]
 
     step, own = model.settings.level_step, model.settings.own_gain_sd
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
@@ -236,24 +240,24 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
     for error in (0.0, 0.3):
         known = model.fitted.model_copy(update={"gain_sd": [error, error]})
         rows = diagnose(flown, model.model_copy(update={"fitted": known}))
-        widths.append((rows.high - rows.low)[100:].mean())
+        widths.append((rows.effectiveness_high - rows.effectiveness_low)[100:].mean())
     assert widths[1] > 1.5 * widths[0]
 
 
 def test_commands_that_nothing_follows_are_not_credible(model):
     flown = small.flight(model, n=600, seed=4)
     still = np.arange(600) >= 400
-    rows = silenced(flown, model, diagnose(flown, model), still=still)
+    rows = without_rows_not_credible(flown, model, diagnose(flown, model), has_no_response=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
-    assert [reason.split(":")[0] for reason in rows.reasons] == ["nothing answers the commands"]
+    assert [reason.split(":")[0] for reason in rows.reasons_not_credible] == ["nothing answers the commands"]
 
 
 def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
     clipped = np.arange(600) == 100
-    rows = diagnose(small.flight(model, n=600, seed=4, clipped=clipped), model)
+    rows = diagnose(small.flight(model, n=600, seed=4, is_rate_clipped=clipped), model)
     assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
-    assert list(rows.reasons) == ["a rate was clipped in the last 30 s"]
+    assert list(rows.reasons_not_credible) == ["a rate was clipped in the last 30 s"]
 
 
 def test_a_model_that_claims_nothing_says_nothing(model):
@@ -263,7 +267,7 @@ def test_a_model_that_claims_nothing_says_nothing(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
     assert not rows.credible.any()
-    assert list(rows.reasons) == ["of no surface is the effect known from the flights fitted"]
+    assert list(rows.reasons_not_credible) == ["of no surface is the effect known from the flights fitted"]
 
 
 @pytest.mark.parametrize(
@@ -275,13 +279,13 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     n = np.arange(2000)
     rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
     commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])
-    fitted = Fitted(commands=trust.span(commands), rates=trust.span(rates))
+    fitted = FittedRanges(commands=trust.central_range(commands), rates=trust.central_range(rates))
     flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
-            trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+            trust.check_command_units("log", *flown, fitted, ["aileron", "elevator"])
     else:
-        trust.check_commands("log", *flown, fitted, ["aileron", "elevator"])
+        trust.check_command_units("log", *flown, fitted, ["aileron", "elevator"])
 
 
 SPANS = {"commands": [[2.0, 3.0], [-7.0, -6.5]], "rates": [[0.5, 1.1], [-2.2, 0.8], [4.0, 4.4]]}
@@ -303,7 +307,7 @@ def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, l
     for value in (low - 0.02, low + 0.02, high - 0.02, high + 0.02):
         flown = {of: np.tile(values, (300, 1)) for of, values in middle.items()}
         flown[kind][:, column] = value
-        found = trust.outside(small.flight(model, **flown), known)
+        found = trust.rows_outside_model(small.flight(model, **flown), known)
         first, last = SPANS[kind][column]
         says = f"{name} is outside {first:.3g} to {last:.3g}, where the model was fitted"
         assert list(found) == ([] if low < value < high else [says])
@@ -311,13 +315,13 @@ def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, l
 
 def test_a_condition_counts_where_it_holds_in_more_than_half_of_the_last_five_seconds():
     rows = np.array([1, 0, 1, 1, 0, 0, 0, 0, 1, 1, 1], dtype=bool)
-    found = trust._often(rows, small.flight(small.model(), 20, dt_s=1.0))
+    found = trust._mostly_true_recently(rows, small.flight(small.model(), 20, dt_s=1.0))
     assert found.astype(int).tolist() == [1, 0, 1, 1, 1, 0, 0, 0, 0, 0, 1]
 
 
 def test_what_was_clipped_is_remembered_for_half_a_minute():
     for at, found in ((2, [2, 3, 4, 5]), (9, [])):
-        assert np.flatnonzero(trust._lately(np.arange(8) == at, 10.0)).tolist() == found
+        assert np.flatnonzero(trust._was_clipped_recently(np.arange(8) == at, 10.0)).tolist() == found
 
 
 def test_for_how_long_each_column_may_stand_still():
@@ -327,26 +331,32 @@ def test_for_how_long_each_column_may_stand_still():
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
-    assert trust._most_still(samples, model) == most
-    assert trust._most_still(samples, small.model()) == dict(
+    assert trust._max_still_s(samples, model) == most
+    assert trust._max_still_s(samples, small.model()) == dict(
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
     short = replace(samples, t_s=np.arange(3.0), still_s=still_s)
-    assert trust.dead(short, model).tolist() == [False, True, False]
-    clipped = replace(short, clipped=np.array([False, False, True]))
-    assert trust.dead(clipped, model).tolist() == [False, True, True]
+    assert trust.is_dead_sample(short, model).tolist() == [False, True, False]
+    clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
+    assert trust.is_dead_sample(clipped, model).tolist() == [False, True, True]
 
 
 def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
     model = small.model(fitted={"commands": [], "rates": [], "tied": [0.98, 0.979]})
-    assert (trust.claimed(model), trust.unclaimed(model)) == ([False, True], {"right"})
+    assert (trust.groups_with_known_effect(model), trust.surfaces_of_unknown_effect(model)) == (
+        [False, True],
+        {"right"},
+    )
     says = (
         "of what right does, 98.0% follows from the rates, signals and other surfaces of the flights fitted"
     )
-    assert trust.unclaimed_lines(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
+    assert trust.unknown_effect_lines(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
     for unknown in (small.model(), small.model(fitted={"commands": [], "rates": []})):
-        assert (trust.claimed(unknown), trust.unclaimed_lines(unknown)) == ([True, True], [])
+        assert (trust.groups_with_known_effect(unknown), trust.unknown_effect_lines(unknown)) == (
+            [True, True],
+            [],
+        )
 
 
 def test_what_is_kept_of_the_flights_fitted():
@@ -354,28 +364,28 @@ def test_what_is_kept_of_the_flights_fitted():
     reach over that of the fit."""
     climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
     use = np.arange(23) != 21
-    one = small.flight(small.model(), 23, energy_climb=climbs, still_s={"roll": np.array([0.3, 0.2])})
+    one = small.flight(small.model(), 23, energy_climb_mps=climbs, still_s={"roll": np.array([0.3, 0.2])})
     other = small.flight(small.model(), 23, still_s={"roll": np.array([0.4]), "air": np.array([0.7])})
     flights = [(other, use), (one, use)]
-    assert trust._unpowered(flights) == pytest.approx(3.0)
-    assert trust._unpowered(flights[:1]) is None
-    assert trust._longest_still(flights) == {"roll": 0.4, "air": 0.7}
+    assert trust._unpowered_climb_mps(flights) == pytest.approx(3.0)
+    assert trust._unpowered_climb_mps(flights[:1]) is None
+    assert trust._longest_still_times_s(flights) == {"roll": 0.4, "air": 0.7}
     model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
     commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
     flown = replace(other, commands=commands)
-    assert trust._moved(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
-    assert trust._moved(flown, model, ["left", "right"]) == pytest.approx(3.992)
-    assert trust._moved(flown, small.model(), ["left"]) == 0.0
-    assert trust.span(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
-    assert trust.span(np.empty((3, 0))) == []
+    assert trust._relative_command_motion(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
+    assert trust._relative_command_motion(flown, model, ["left", "right"]) == pytest.approx(3.992)
+    assert trust._relative_command_motion(flown, small.model(), ["left"]) == 0.0
+    assert trust.central_range(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
+    assert trust.central_range(np.empty((3, 0))) == []
 
 
 def test_reasons_come_with_their_shares_the_largest_first():
     found = {"one": np.array([1, 0, 0, 0], bool), "other": np.array([1, 1, 0, 1], bool)}
-    assert trust.account(found, np.array([0, 0, 1, 0])) == {
+    assert trust.credibility_entry(found, np.array([0, 0, 1, 0])) == {
         "share": 0.25, "reasons": [{"says": "other", "share": 0.75}, {"says": "one", "share": 0.25}],
     }  # fmt: skip
-    assert trust.account({}, np.array([])) == {"share": 0.0, "reasons": []}
+    assert trust.credibility_entry({}, np.array([])) == {"share": 0.0, "reasons": []}
 
 
 @pytest.mark.parametrize(("counted", "says"), [(19.0, None), (19.01, 3), (100.0, 17)])
@@ -383,20 +393,20 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
     likely = np.array([0.9, 0.3, 0.5, 0.7])
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
-    read = [Reading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
-    monkeypatch.setattr(trust, "_likely_in_parts", lambda samples, _: parts[samples])
-    monkeypatch.setattr(trust, "mended", lambda *_: read)
+    read = [CorrectedReading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
+    monkeypatch.setattr(trust, "_part_log_likelihoods", lambda samples, _: parts[samples])
+    monkeypatch.setattr(trust, "corrected_readings", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
-    assert trust._likelier("as it is", small.model()) == told
+    assert trust._likelier_column_mistake("as it is", small.model()) == told
     parts["as it is"] = None
-    assert trust._likelier("as it is", small.model()) is None
+    assert trust._likelier_column_mistake("as it is", small.model()) is None
 
 
 def test_what_each_column_brings_to_the_axes_of_others():
     """Of a rate what its past does to other axes than its own; of a signal what it does to all."""
     model = small.model(small.TAIL)
     flown = small.flight(model, n=7)
-    found, names = trust._by_column(flown, model)
+    found, names = trust._column_contributions(flown, model)
     past, rates = np.array(model.past), flown.rates
     assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
     for k in range(2, 7):
@@ -416,16 +426,42 @@ def test_what_each_column_brings_to_the_axes_of_others():
 )  # fmt: skip
 def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least, moved, says):
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
-    monkeypatch.setattr(trust, "_moved", lambda samples, model, group: moved)
-    model = SimpleNamespace(groups=[["right", "left"]])
-    found = trust._InAll([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
-    wrong = trust._wrong_answers(None, model, found)
+    monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: moved)
+    model = SimpleNamespace(groups=[["right", "left"]], fitted=None)
+    found = trust._PartGains([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
+    wrong = trust._column_mistakes(None, model, found)
     if not says:
         assert wrong == {}
         return
     ((what, line),) = wrong.items()
     assert what == ("sign right+left" if says == "sign" else "unit right+left")
     assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
-    faint = trust._wrong_answers(None, model, found._replace(columns={"V": 0.49, "p": 0.5}))
+    faint = trust._column_mistakes(None, model, found._replace(max_column_gains={"V": 0.49, "p": 0.5}))
     assert list(faint) == [what, "columns"]
     assert "answer to V is not" in faint["columns"]
+
+
+@pytest.mark.parametrize(
+    ("sd", "refused"), [(0.1, ["sign wing", "unit wing", "columns"]), (0.25, ["sign wing"])]
+)
+def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkeypatch, sd, refused):
+    """Four standard errors of a quarter: by such a model a sound log answers with a gain of 0.19, too."""
+    monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: 3.1)
+    known = SimpleNamespace(tied=[0.9], gain_sd=[sd], column_sd={"V": sd})
+    model = SimpleNamespace(groups=[["wing"]], fitted=known, vehicle=SimpleNamespace(other_laws=True))
+    found: dict[str, str] = {}
+    for most in (-0.31, 0.19):
+        found |= trust._column_mistakes(
+            None, model, trust._PartGains([most], [0.0], {"V": 0.1}, 1.0, np.zeros(4))
+        )
+    assert [what for what in ("sign wing", "unit wing", "columns") if what in found] == refused
+
+
+def test_of_a_rate_without_a_number_no_unit_is_judged():
+    """Were the other axes' spread judged alone, 57.3 times as wide would be deg/s."""
+    known = small.model(fitted={"commands": [], "rates": [], "spread": [1.0, 1.0, 1.0]})
+    rates = np.random.default_rng(1).normal(0.0, 57.3, (200, 3))
+    with pytest.raises(BadInput, match="deg/s"):
+        trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted)
+    rates[:, 2] = np.nan
+    trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted)

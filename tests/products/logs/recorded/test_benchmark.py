@@ -9,7 +9,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import detector_names
 from beaver_ftc_logs.recorded import benchmark, other_days
-from beaver_ftc_logs.recorded.benchmark import OURS, data_sets
+from beaver_ftc_logs.recorded.benchmark import OUR_METHOD_TITLE, load_data_sets
 from products.logs import synthetic
 
 
@@ -45,10 +45,10 @@ def test_every_method_has_a_row_and_ours_is_right(document):
     (part,) = document["sets"]
     rows = {row["method"]: row for row in part["rows"]}
     assert len(rows) == len(detector_names())  # no freeze rule: this vehicle names no servo outputs
-    assert rows[OURS]["classes"] > 0.9
-    assert rows[OURS]["mean_error"] < 0.03
+    assert rows[OUR_METHOD_TITLE]["classes"] > 0.9
+    assert rows[OUR_METHOD_TITLE]["mean_error"] < 0.03
     sliding = next(row for name, row in rows.items() if name.startswith("sliding"))
-    assert 0.5 < sliding["classes"] < rows[OURS]["classes"]
+    assert 0.5 < sliding["classes"] < rows[OUR_METHOD_TITLE]["classes"]
 
 
 def test_tables_have_a_line_a_method(document):
@@ -58,24 +58,10 @@ def test_tables_have_a_line_a_method(document):
         assert f"| {row['method']} |" in page
 
 
-def test_the_page_keeps_what_stands_around_the_tables(document, tmp_path):
-    page = tmp_path / "page.md"
-    begin, end = benchmark.marks(document)
-    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
-    benchmark.update_page(document, page)
-    text = page.read_text()
-    assert text.startswith("before\n")
-    assert text.endswith("after\n")
-    assert "old" not in text
-    page.write_text("no marks")
-    with pytest.raises(BadInput, match="has no place for the tables"):
-        benchmark.update_page(document, page)
-
-
 def test_other_days_have_a_row_each_and_a_worst(folder, monkeypatch, tmp_path):
-    days = other_days.drawn(2, range(2))
-    monkeypatch.setattr(other_days, "grid", lambda mixer, commands: days[:1])
-    monkeypatch.setattr(other_days, "drawn", lambda surfaces, seeds: days[1:])
+    days = other_days.random_days(2, range(2))
+    monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: days[:1])
+    monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: days[1:])
     page = tmp_path / "page.md"
     page.write_text("<!-- other days: begin -->\n<!-- other days: end -->\n")
     arguments = ["compare", "--flights", str(folder), "--other-days", "--format", "json"]
@@ -96,9 +82,9 @@ def test_other_days_without_a_folder():
 
 def test_a_folder_without_flights_is_refused(tmp_path):
     with pytest.raises(BadInput, match="holds no data set"):
-        data_sets(tmp_path)
+        load_data_sets(tmp_path)
     with pytest.raises(BadInput, match="no such folder"):
-        data_sets(tmp_path / "none")
+        load_data_sets(tmp_path / "none")
 
 
 def test_the_command_writes_both_files(compared):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.recorded.other_days import drawn, grid
+from beaver_ftc_logs.recorded.other_days import one_change_days, random_days
 from beaver_ftc_logs.samples import Samples
 
 PAST, NOISE = 0.5 * np.eye(3), 1e-4 * np.eye(3)
@@ -23,24 +23,25 @@ def samples():
 
 
 def test_drawn_days_are_the_same_each_time_and_differ():
-    assert drawn(2, range(3))[1].gain == drawn(2, range(1, 2))[0].gain
-    assert len({day.gain for day in drawn(2, range(16))}) == 16
-    assert len(grid(np.array([[0.5, 0.5], [0.5, -0.5]]), ["roll", "pitch"])) == 21
+    assert random_days(2, range(3))[1].common_gain == random_days(2, range(1, 2))[0].common_gain
+    assert len({day.common_gain for day in random_days(2, range(16))}) == 16
+    assert len(one_change_days(np.array([[0.5, 0.5], [0.5, -0.5]]), ["roll", "pitch"])) == 21
 
 
 def test_drawn_days_differ_as_much_as_is_said():
     """Over 900 days of four surfaces; ratios in their logarithms, what can only be more is half a bell."""
-    days = drawn(4, range(900))
-    assert len({day.name for day in days}) == len({day.gain for day in days}) == 900
+    days = random_days(4, range(900))
+    assert len({day.name for day in days}) == len({day.common_gain for day in days}) == 900
     bells = {
-        "trim": (np.array, 0.015), "neutral": (np.array, 0.01), "own": (np.log, 0.03), "gain": (np.log, 0.1),
-        "late_s": (np.array, 0.02), "excitation": (np.log, 0.25),
+        "trim_commands": (np.array, 0.015), "neutral_commands": (np.array, 0.01),
+        "surface_gains": (np.log, 0.03), "common_gain": (np.log, 0.1), "command_delay_s": (np.array, 0.02),
+        "motion_scale": (np.log, 0.25),
     }  # fmt: skip
     for name, (of, spread) in bells.items():
         values = of([getattr(day, name) for day in days])
         assert np.std(values) == pytest.approx(spread, rel=0.1), name
         assert np.mean(values) == pytest.approx(0.0, abs=0.15 * spread), name
-    for name, least, spread in (("noise", 1.0, 0.3), ("drift", 0.0, 0.006)):
+    for name, least, spread in (("noise_ratio", 1.0, 0.3), ("trim_drift", 0.0, 0.006)):
         more = np.array([getattr(day, name) for day in days]) - least
         assert more.min() >= 0.0, name
         assert np.sqrt(np.mean(more**2)) == pytest.approx(spread, rel=0.1), name

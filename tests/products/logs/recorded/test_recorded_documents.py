@@ -10,7 +10,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.fitting import Stretch
 from beaver_ftc_logs.recorded import benchmark
-from beaver_ftc_logs.recording import Column, Event, Recording
+from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from beaver_ftc_logs.samples import Samples
 from kept import picture
 from products.logs import small, synthetic
@@ -41,7 +41,7 @@ FLIGHTS = [
 EVENTS = {
     "set": "gliders", "left_out": "each flight in turn", "scored_by": "events", "flights": FLIGHTS,
     "rows": [
-        {"method": method, **benchmark.by_events([one for one in FLIGHTS if one["method"] == method])}
+        {"method": method, **benchmark.summarize_failures([of for of in FLIGHTS if of["method"] == method])}
         for method in DELAYS
     ],
     "published": [
@@ -101,7 +101,7 @@ def test_tables_of_a_document(changed, name):
 
 
 def test_the_figure_of_a_document(changed):
-    figure = benchmark.figure_of(DOCUMENT)
+    figure = benchmark.draw_comparison_figure(DOCUMENT)
     assert not changed(picture(figure))
     delays, shares = figure.axes
     marked = {line.get_label(): line.get_xydata() for line in delays.lines}
@@ -112,7 +112,7 @@ def test_the_figure_of_a_document(changed):
 
 
 def test_files_of_a_document():
-    files = benchmark.files_of(DOCUMENT)
+    files = benchmark.result_files(DOCUMENT)
     assert set(files) == {"flights.png", "flights.json", "flights.md"}
     assert json.loads(files["flights.json"])["sets"][0]["set"] == "gliders"
     assert files["flights.md"] == benchmark.as_markdown(DOCUMENT)
@@ -125,11 +125,11 @@ def changed(samples, **changes):
 def recording(samples):
     """A recording beside samples: all that the freeze rule reads of it."""
     still = Column(samples.t_s, np.where(samples.t_s < 20.0, samples.t_s, 20.0))
-    return Recording(samples.name, {"elevator_output": still}, samples.events)
+    return RecordedFlight(samples.name, {"elevator_output": still}, samples.logged_failures)
 
 
 def data_set(model, flights):
-    return benchmark.DataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
+    return benchmark.FlightDataSet("set", model.vehicle, tuple(map(recording, flights)), tuple(flights))
 
 
 @pytest.fixture
@@ -139,10 +139,10 @@ def two_methods(monkeypatch):
 
 
 def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_methods):
-    monkeypatch.setattr(fitting, "_DELAYS", (0.0,))  # quick
+    monkeypatch.setattr(fitting, "_DELAY_CANDIDATES_SAMPLES", (0.0,))  # quick
     flight = small.flight(MODEL, 1000, lost=LOST)
     data = data_set(MODEL, [flight])
-    document = benchmark._compare(data)
+    document = benchmark._compare_methods(data)
     assert not changed(document)
     assert [(one["left_out"], one["method"]) for one in document["flights"]] == [
         (half, method)
@@ -150,21 +150,21 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
         for method in ("bank of filters (ours)", "sliding least squares, 20 s")
     ]
     assert document["rows"][0]["classes"] > document["rows"][1]["classes"] > 0.4
-    stretches = fitting.stretches_of([flight])
+    stretches = fitting.usable_stretches([flight])
     whole = fitting.fit_model(stretches, MODEL.vehicle)
-    bounds = fitting.run_tests(stretches, whole)[1]
+    bounds = fitting.score_folds(stretches, whole)[1]
     expected = whole.settings.model_copy(update={"bounds": bounds})
-    assert benchmark.settings_of(stretches, data) == expected
+    assert benchmark.settings_of_whole_flight(stretches, data) == expected
 
 
 def test_flights_with_a_failure_are_left_out_in_turn(changed, monkeypatch, two_methods):
     """The freeze rule is there as well where the log has outputs."""
     flights = [
-        small.flight(TAIL, 400, seed=1, name="weak", events=(Event(25.0, "elevator"),)),
-        small.flight(TAIL, 400, seed=2, name="engine", events=(Event(30.0, "engine"),)),
+        small.flight(TAIL, 400, seed=1, name="weak", logged_failures=(LoggedFailure(25.0, "elevator"),)),
+        small.flight(TAIL, 400, seed=2, name="engine", logged_failures=(LoggedFailure(30.0, "engine"),)),
         small.flight(TAIL, 400, seed=3, name="sound"),
     ]
-    document = benchmark._compare(data_set(TAIL, flights))
+    document = benchmark._compare_methods(data_set(TAIL, flights))
     assert not changed(document)
     assert [row["method"] for row in document["rows"]] == [
         "bank of filters (ours)", "sliding least squares, 20 s", "freeze rule, 6 s, on the logged outputs",
@@ -178,8 +178,8 @@ def test_settings_of_several_flights_are_those_of_the_fit():
     flights = [
         small.flight(MODEL, 500, seed=seed, name=str(seed), lost=((1, 100, 200, 0.5),)) for seed in (1, 2)
     ]
-    stretches = fitting.stretches_of(flights)
-    settings = benchmark.settings_of(stretches, data_set(MODEL, flights))
+    stretches = fitting.usable_stretches(flights)
+    settings = benchmark.settings_of_whole_flight(stretches, data_set(MODEL, flights))
     assert settings == fitting.fit_model(stretches, MODEL.vehicle).settings
 
 
@@ -187,7 +187,7 @@ def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
     monkeypatch.setattr(benchmark, "diagnose_with", lambda name, samples, model: name)
     stretch = Stretch(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._diagnosed(recording(stretch.samples), stretch, MODEL))
+    found = list(benchmark._rows_of_methods(recording(stretch.samples), stretch, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip
@@ -197,18 +197,22 @@ def test_labels_count_in_the_span_of_what_is_kept():
     samples = small.flight(MODEL, 10)
     use = np.zeros(10, dtype=bool)
     use[[2, 3, 7]] = True
-    labels = benchmark.kept_labels(Stretch(samples, use))
+    labels = benchmark.labels_in_usable_span(Stretch(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
-    assert np.isnan(benchmark.kept_labels(Stretch(samples, np.zeros(10, dtype=bool)))).all()
+    assert np.isnan(benchmark.labels_in_usable_span(Stretch(samples, np.zeros(10, dtype=bool)))).all()
 
 
 def test_a_flight_is_scored_by_what_its_log_has():
     rows = small.rows([(10, "left", [1.0, 0.5])], step_s=0.1)
     use = np.ones(10, dtype=bool)
-    assert "classes" in benchmark._score(Stretch(small.flight(MODEL, 10), use), rows, MODEL)
-    bare = changed(small.flight(MODEL, 10), labels=np.full((10, 2), np.nan), events=(Event(10.2, "left"),))
-    assert benchmark._score(Stretch(bare, use), rows, MODEL)["failure"] == "left"
+    assert "classes" in benchmark._score_against_log(Stretch(small.flight(MODEL, 10), use), rows, MODEL)
+    bare = changed(
+        small.flight(MODEL, 10),
+        labels=np.full((10, 2), np.nan),
+        logged_failures=(LoggedFailure(10.2, "left"),),
+    )
+    assert benchmark._score_against_log(Stretch(bare, use), rows, MODEL)["failure"] == "left"
 
 
 def test_data_sets_below_a_folder(tmp_path):
@@ -227,7 +231,7 @@ def test_data_sets_below_a_folder(tmp_path):
     (tmp_path / "d" / "nothing").mkdir()
     (tmp_path / "e").mkdir()
     synthetic.write_alfa(tmp_path / "e" / "carbonZ", duration_s=8.0)
-    found = benchmark.data_sets(tmp_path)
+    found = benchmark.load_data_sets(tmp_path)
     assert [one.name for one in found] == [tmp_path.name, "a", "b", "e"]
     assert [flight.name for flight in found[1].flights] == ["1", "2"]
     assert [one.name for one in found[1].recordings] == ["1", "2"]
@@ -235,17 +239,19 @@ def test_data_sets_below_a_folder(tmp_path):
     with pytest.raises(
         BadInput, match=r"compare: --flights .*: no such folder, allowed: a folder of recorded"
     ):
-        benchmark.data_sets(tmp_path / "own.csv")
+        benchmark.load_data_sets(tmp_path / "own.csv")
 
 
 def test_the_delay_of_a_flight_in_words():
-    assert [benchmark._delay(of) for of in (
+    assert [benchmark._delay_text(of) for of in (
         {}, {"failures": 2, "mean": None, "found": 0}, {"mean": 1.25},
         {"mean": 1.27, "found": 2, "failures": 3},
     )] == ["", "not found", "1.2", "1.3 (2 of 3)"]  # fmt: skip
 
 
 def test_a_benchmark_has_a_part_a_data_set(monkeypatch, tmp_path):
-    monkeypatch.setattr(benchmark, "data_sets", lambda folder: [SimpleNamespace(n=1), SimpleNamespace(n=2)])
-    monkeypatch.setattr(benchmark, "_compare", lambda one: one.n)
+    monkeypatch.setattr(
+        benchmark, "load_data_sets", lambda folder: [SimpleNamespace(n=1), SimpleNamespace(n=2)]
+    )
+    monkeypatch.setattr(benchmark, "_compare_methods", lambda one: one.n)
     assert benchmark.run_benchmark(tmp_path) == {"sets": [1, 2]}

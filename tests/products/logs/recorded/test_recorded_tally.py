@@ -30,7 +30,7 @@ SCORES = [
 
 
 def test_flights_are_found_missed_or_falsely_alarmed():
-    found = benchmark.by_events(SCORES)
+    found = benchmark.summarize_failures(SCORES)
     assert (found["surface_failures"], found["found"]) == (6, 4)
     assert found["precision"] == pytest.approx(4 / 6)  # two flights with a false alarm
     assert found["recall"] == pytest.approx(4 / 6)
@@ -46,31 +46,31 @@ def test_flights_are_found_missed_or_falsely_alarmed():
 
 def test_delays_are_by_what_failed_first_in_the_name():
     """An aileron beside a rudder counts as an aileron; five seconds are soon."""
-    delays = benchmark.by_events(SCORES)["delay_s"]
+    delays = benchmark.summarize_failures(SCORES)["delay_s"]
     assert delays["aileron"] == {"failures": 3, "found": 3, "within_5_s": 2, "mean": pytest.approx(6.0)}
     assert delays["rudder"] == {"failures": 2, "found": 1, "within_5_s": 1, "mean": 2.0}
     assert delays["elevator"] == {"failures": 1, "found": 0, "within_5_s": 0, "mean": None}
 
 
 def test_where_there_is_nothing_to_count_shares_are_none_of_one():
-    found = benchmark.by_events([score(ENGINE, healthy_s=0.0)])
+    found = benchmark.summarize_failures([score(ENGINE, healthy_s=0.0)])
     assert [found[key] for key in ("precision", "recall", "accuracy")] == [0.0, 0.0, 0.0]
-    once = benchmark.by_events([score("rudder", True, 1.0)])
+    once = benchmark.summarize_failures([score("rudder", True, 1.0)])
     assert [once[key] for key in ("precision", "recall", "accuracy")] == [1.0, 1.0, 1.0]
-    assert benchmark.by_events([score()])["accuracy"] == 1.0
+    assert benchmark.summarize_failures([score()])["accuracy"] == 1.0
 
 
 def test_figures_by_labels_are_weighted_by_rows():
     names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
     one = {"rows": 1} | {name: 0.1 * k for k, name in enumerate(names)}
     other = {"rows": 3} | {name: 0.5 + 0.1 * k for k, name in enumerate(names)}
-    found = benchmark.by_labels([one, other])
+    found = benchmark.summarize_labels([one, other])
     assert found == {"rows": 4} | {name: pytest.approx(0.375 + 0.1 * k) for k, name in enumerate(names)}
 
 
 EVENTS = {
     "set": "gliders", "left_out": "a flight at a time", "scored_by": "events",
-    "rows": [{"method": "ours", **benchmark.by_events(SCORES)}],
+    "rows": [{"method": "ours", **benchmark.summarize_failures(SCORES)}],
     "published": [
         {"method": "theirs", "precision": 0.5, "delay_s": {"aileron": {"mean": 3.0}, "rudder": {}}},
     ],
@@ -85,7 +85,7 @@ DOCUMENT = {"sets": [EVENTS, LABELS]}
 
 
 def test_a_data_set_is_a_table_by_events_or_by_labels():
-    (gliders, (head, (ours, theirs))), (motors, (labels, rows)) = benchmark.tables(DOCUMENT)
+    (gliders, (head, (ours, theirs))), (motors, (labels, rows)) = benchmark.score_tables(DOCUMENT)
     assert (gliders, motors) == ("gliders: left out, a flight at a time", "motors: left out, a day at a time")
     assert len(head) == len(ours) == len(theirs) == 11
     alarms = EVENTS["rows"][0]["false_alarms_per_hour"]
@@ -112,7 +112,7 @@ def test_tables_for_a_terminal_stand_in_columns_and_those_of_a_page_in_bars():
 
 def test_tables_go_between_their_marks_of_a_page(tmp_path):
     page = tmp_path / "page.md"
-    begin, end = benchmark.marks(DOCUMENT)
+    begin, end = benchmark.table_markers(DOCUMENT)
     page.write_text(f"before\n{begin}\nold\n{end}\nafter\n", encoding="utf-8")
     benchmark.update_page(DOCUMENT, page)
     assert page.read_text() == f"before\n{begin}\n{benchmark.as_markdown(DOCUMENT)}{end}\nafter\n"
@@ -121,4 +121,7 @@ def test_tables_go_between_their_marks_of_a_page(tmp_path):
         with pytest.raises(BadInput, match="has no place for the tables"):
             benchmark.update_page(DOCUMENT, page)
         assert page.read_text() == text
-    assert benchmark.marks({"other_days": []}) == ("<!-- other days: begin -->", "<!-- other days: end -->")
+    assert benchmark.table_markers({"other_days": []}) == (
+        "<!-- other days: begin -->",
+        "<!-- other days: end -->",
+    )

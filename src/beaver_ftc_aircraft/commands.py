@@ -27,15 +27,14 @@ def derive(
 ) -> None:
     """Derive an aircraft's design model from JSBSim.
 
-    It samples the aircraft over its envelope, fits sparse terms, and validates them on states that the fit
-    did not use: the largest error becomes the declared bound. Afterwards scenarios can use `aircraft:
-    jsbsim:NAME`.
+    The command computes the accelerations of the aircraft in many states of its envelope and fits sparse
+    terms. It then validates the terms in states that the fit did not use. The largest error becomes the
+    declared bound. Afterwards a scenario can have `aircraft: jsbsim:NAME`.
 
     aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
-    envelope: YAML with airspeed_mps, alpha_deg, altitude_m, sideslip_deg: where to sample.
-    out: Folder to write the aircraft's folder into, if not the cache.
-    engines: Make each engine an effector with its own lever, for moments that the surfaces no longer
-    give. With --out.
+    envelope: YAML file with the range to sample: airspeed_mps, alpha_deg, altitude_m, sideslip_deg.
+    out: Folder that gets the aircraft folder. Default: the cache.
+    engines: Give each engine a lever of its own, with which the law can turn the aircraft. Needs --out.
     """
     from beaver_ftc_aircraft.derive.derivation import derive
     from beaver_ftc_aircraft.derive.derived import document_of, text_of
@@ -56,15 +55,15 @@ def gtm(
 ) -> None:
     """Import NASA's Generic Transport Model.
 
-    Writes an aircraft folder `gtm`: a JSBSim model of its wind-tunnel tables, with 17 surfaces, two jets and
-    six cases of damage, our own file with a derived design model, and scripts that plain JSBSim flies.
-    Afterwards `aircraft: gtm` flies.
+    The aircraft folder `gtm` gets a JSBSim model of the wind-tunnel tables, with 17 surfaces, two jets and
+    six cases of damage; our aircraft file with a derived design model; and scripts for plain JSBSim.
+    Afterwards a scenario can have `aircraft: gtm`.
 
     The data base is not part of this package: gtm_design/config/T2_polynomial_aerodatabase.mat of
     github.com/nasa/GTM_DesignSim, under the NASA Open Source Agreement.
 
     database: Your copy of the data base.
-    out: Folder to write the aircraft's folder into, if not the cache.
+    out: Folder that gets the aircraft folder. Default: the cache.
     """
     from beaver_ftc_aircraft.gtm.conversion import convert, document_of, text_of
 

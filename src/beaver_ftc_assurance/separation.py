@@ -22,18 +22,24 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout
-from beaver_ftc.diagnosis.types import TYPE_NAMES as NAMES
+from beaver_ftc.diagnosis import TYPE_NAMES as NAMES
+from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout, type_index_of
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import Stepping, fly
 from beaver_ftc.results import Document, MemoryLog, result_folder
 from beaver_ftc.scenario import Scenario
-from beaver_ftc.studies import DOUBLET_COLUMNS as DOUBLET
+from beaver_ftc.studies import DOUBLET_COLUMNS
 from beaver_ftc_assurance.certificates import proved
-from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged
-from beaver_ftc_assurance.certificates.inequality import History, Hypothesis, by_each_frame, declared_of
-from beaver_ftc_assurance.certificates.kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK, hypothesis, wrong
-from beaver_ftc_assurance.certificates.tape import Recorder, Tape, recorded
+from beaver_ftc_assurance.certificates.certificate import check_scheme, history_of, logged_columns
+from beaver_ftc_assurance.certificates.inequality import (
+    History,
+    Hypothesis,
+    declared_errors_of,
+    theta_bounds_by_frame,
+)
+from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, is_unexplained_by_health
+from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
 MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
@@ -41,12 +47,17 @@ LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
 HELD_DEG = 1e-9  # by less no surface is moved
-CONSTANT = (CONSTANT_LOSS, STUCK, FLOAT, BIAS)
+RELATIONS = {
+    kind: row.deflection_relation
+    for kind, row in enumerate(TYPES)
+    if row.has_constant_parameter and row.deflection_relation
+}
+LOSS = type_index_of("loss_of_effectiveness")  # all that the class of losses has
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A type (one of CONSTANT, -1 for any) on a surface, its parameter between low and high."""
+    """A type (one of RELATIONS, -1 for any) on a surface, its parameter between low and high."""
 
     surface: int
     kind: int
@@ -55,11 +66,9 @@ class Candidate:
 
     def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
-        if self.kind in (STUCK, FLOAT):
-            return np.full_like(u, self.low), np.full_like(u, self.high)
-        if self.kind == BIAS:
-            return u + self.low, u + self.high
-        ends = (1.0 + self.low) * u, (1.0 + self.high) * u
+        relation = RELATIONS[self.kind]
+        by_share, by_angle = float(relation.theta_is_share), float(not relation.theta_is_share)
+        ends = [(relation.gain + by_share * end) * u + by_angle * end for end in (self.low, self.high)]
         return np.minimum(*ends), np.maximum(*ends)
 
     def off(self, u: np.ndarray) -> np.ndarray:
@@ -187,10 +196,10 @@ def certified(scenario: Scenario, pair: Document) -> tuple[MemoryLog, Document]:
 def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
     """Whether a candidate is excluded."""
     estimators, layout = diagnosis.estimators, diagnosis.layout
-    if not diagnosis.every_type:
-        return estimators[layout.loss_estimator[one.surface]].excluded
-    surface = estimators[layout.position_estimator[one.surface]].excluded
-    return surface or bool(diagnosis.surfaces[one.surface].excluded[one.kind])
+    if not diagnosis.diagnoses_all_types:
+        return estimators[layout.loss_estimator[one.surface]].is_excluded
+    surface = estimators[layout.position_estimator[one.surface]].is_excluded
+    return surface or bool(diagnosis.surface_fault_types[one.surface].is_excluded[one.kind])
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
@@ -214,20 +223,20 @@ def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape,
     if alarm >= len(detected) - 1:
         raise BadInput(f"{scenario.name}: the flight ends with its alarm, allowed: a longer duration_s")
     tape = recorder.tape([alarm, len(detected) - 1], len(detected))
-    return tape, history_of(scenario, logged(log), tape)
+    return tape, history_of(scenario, logged_columns(log), tape)
 
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
-    bound, declared, actuators = frame.diagnosis.bound, declared_of(frame), frame.actuators
-    coupled = declared.coupled * rate**2
+    bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
+    coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
-        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.noise_rad_s / dt),
+        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.gyro_change_bound_rad_s / dt),
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
-        in_blocks=frame.diagnosis.types_config.block_frames > 1, dt=dt,
+        in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
         alpha=frame.alpha_rad, alpha_range=_radians(aircraft.envelope.alpha_deg),
     )  # fmt: skip
 
@@ -240,15 +249,14 @@ def _radians(ends: Sequence[float]) -> tuple[float, float]:
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
     """Every fault that is left and stays as it is, with what is known of its parameter."""
     frames = np.arange(_alarm(tape), tape.end)
-    shown = frames[wrong(history, frames)]
-    if tape.last.diagnosis.isolated == UNANTICIPATED or not len(shown):
+    shown = frames[is_unexplained_by_health(history, frames)]
+    if tape.last.diagnosis.isolated_estimator == UNANTICIPATED or not len(shown):
         return
     for s, kind in _left(tape):
-        of = hypothesis(tape, s, kind)
-        if kind == FLOAT:
-            yield Candidate(s, kind, 0.0, 0.0)
-            continue
-        low, high = _interval(of, history, shown)
+        actuator = tape.last.diagnosis.surface_fault_types[s].actuator
+        low, high = RELATIONS[kind].theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+        if low < high:
+            low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
         if low <= high:
             yield Candidate(s, kind, low, high)
 
@@ -262,31 +270,31 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
     """Surface and type of what is not excluded and stays as it is."""
     diagnosis = tape.last.diagnosis
     estimators, layout = diagnosis.estimators, diagnosis.layout
-    for s, surface in enumerate(diagnosis.surfaces):
-        if not diagnosis.every_type:
+    for s, surface in enumerate(diagnosis.surface_fault_types):
+        if not diagnosis.diagnoses_all_types:
             e = layout.loss_estimator[s]
-            if e >= 0 and not estimators[e].excluded:
-                yield s, CONSTANT_LOSS
-        elif not estimators[layout.position_estimator[s]].excluded:
-            yield from ((s, kind) for kind in CONSTANT if not surface.excluded[kind])
+            if e >= 0 and not estimators[e].is_excluded:
+                yield s, LOSS
+        elif not estimators[layout.position_estimator[s]].is_excluded:
+            yield from ((s, kind) for kind in RELATIONS if not surface.is_excluded[kind])
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     """What is left whose course over many frames tells, not a frame."""
     diagnosis, found = tape.last.diagnosis, []
-    if not diagnosis.every_type:
+    if not diagnosis.diagnoses_all_types:
         return []
-    for s, surface in enumerate(diagnosis.surfaces):
-        if not diagnosis.estimators[diagnosis.layout.position_estimator[s]].excluded:
-            kinds = np.flatnonzero(~surface.excluded)
-            found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in CONSTANT]
+    for s, surface in enumerate(diagnosis.surface_fault_types):
+        if not diagnosis.estimators[diagnosis.layout.position_estimator[s]].is_excluded:
+            kinds = np.flatnonzero(~surface.is_excluded)
+            found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in RELATIONS]
     return sorted(set(found))
 
 
 def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
     """What all of these frames say of its parameter."""
-    least, most, _ = by_each_frame(of, history, frames)
-    return max(of.low, float(least.max())), min(of.high, float(most.min()))
+    least, most, _ = theta_bounds_by_frame(of, history, frames)
+    return max(of.theta_low, float(least.max())), min(of.theta_high, float(most.min()))
 
 
 def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
@@ -376,13 +384,15 @@ def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str,
     long after the start of a healthy flight, or why there is none."""
     frames = round(after_s * scenario.rate_hz)
     healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
-    at = situation_of(recorded(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S))
+    at = situation_of(
+        tape_of_flight_again(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S)
+    )
     names, found = scenario.airframe.surfaces, {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
-        one, other = (Candidate(names.index(name), CONSTANT_LOSS, -told, -told) for name in pair)
+        one, other = (Candidate(names.index(name), LOSS, -told, -told) for name in pair)
         apart = tell_apart(one, other, at, names)
         asked = apart.get("amplitude_deg"), apart.get("time_s"), apart.get("because", "")
-        found[pair] = found[pair[::-1]] = dict(zip(DOUBLET, asked, strict=True))
+        found[pair] = found[pair[::-1]] = dict(zip(DOUBLET_COLUMNS, asked, strict=True))
     return found
 
 
@@ -503,8 +513,8 @@ def _left_behind(at: Situation, s: int) -> tuple[float, float]:
 
 def _words(one: Candidate, names: Sequence[str]) -> Document:
     """A candidate as the document has it: angles in deg, a loss as theta."""
-    scale = 1.0 if one.kind == CONSTANT_LOSS else degrees(1.0)
-    unit = "theta" if one.kind == CONSTANT_LOSS else "deg"
+    is_share = RELATIONS[one.kind].theta_is_share
+    scale, unit = (1.0, "theta") if is_share else (degrees(1.0), "deg")
     return {"surface": names[one.surface], "type": NAMES[one.kind], unit: [scale * one.low, scale * one.high]}
 
 

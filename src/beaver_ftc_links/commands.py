@@ -77,13 +77,13 @@ def command(options: Options) -> None:
     )  # fmt: skip
     flight = serve(scenario, served, lambda line: complain(f"{scenario.name}: {line}"))
     folder = flight.save(options.out, report=not options.no_report)
-    document = flight.metrics | {"folder": str(folder)}
+    found = Metrics.of(flight.metrics)
     if options.format is Format.json:
-        emit_json(document)
+        emit_json(flight.metrics | {"folder": str(folder)})
     else:
-        emit(verdict_text(Metrics.of(document), str(folder), colour=sys.stdout.isatty()))
-    write_junit([document], options.junit)
-    raise typer.Exit(0 if document["passed"] else 1)
+        emit(verdict_text(found, str(folder), colour=sys.stdout.isatty()))
+    write_junit([found.judged], options.junit)
+    raise typer.Exit(0 if found.passed else 1)
 
 
 def address(given: str | None) -> tuple[str, int] | None:

@@ -4,7 +4,7 @@ import json
 import re
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -30,7 +30,7 @@ from beaver_ftc.aircraft import (
     read_aircraft,
 )
 from beaver_ftc.design import design_record
-from beaver_ftc.diagnosis.monitors import THRUST
+from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL
 from beaver_ftc.documents import BadInput, SimulationFailed
 from beaver_ftc.plant import (
     AT_IDLE,
@@ -49,6 +49,7 @@ from beaver_ftc.plant import (
     translated,
 )
 from beaver_ftc.plant import trim_plant as trim_at
+from beaver_ftc.studies.engine import Forks
 from beaver_ftc_aircraft.derive import outline
 from beaver_ftc_aircraft.derive.derived import NAME as PAGE
 from beaver_ftc_aircraft.derive.derived import Derived, page_of
@@ -73,8 +74,7 @@ from beaver_ftc_aircraft.derive.sample import (
     Moves,
     Region,
     Samples,
-    fly_about,
-    joined,
+    fly_about_all,
     sample_all,
 )
 from beaver_ftc_aircraft.derive.thrust import LEAST_ARM_M, effectors_of, thrust_of
@@ -184,11 +184,7 @@ def derive(
             usual_rad = outline.WIDE_SIDESLIP_RAD if source.folder else SIDESLIP_RAD
             sideslip_rad = radians(wanted.sideslip_deg) if wanted.sideslip_deg else usual_rad
             about = _regions(data, plant, trim, sideslip_rad, regions)
-            made = _derived(data, plant, about, moves, folder, tell)
-            if THRUST_TERM not in plant.aircraft.terms:
-                tell("engines")
-                thrust = thrust_of(outline.plant_of(data, folder), trim)
-                data["engine"] |= {"thrust": thrust} if thrust else {}
+            made = _derived(data, plant, trim, about, moves, folder, tell)
         aircraft = outline.aircraft_of(data, target)
         as_filed = read_aircraft(source.folder) if source.folder else None
         took_s = perf_counter() - started_s
@@ -279,28 +275,48 @@ def _regions(
 
 
 def _derived(
-    data: outline.Data, plant: Plant, about: Sequence[Region], moves: Moves, folder: Path, tell: Tell
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sample, fit and check; the data get their terms and errors. Returns the largest errors, (3,) rad/s2."""
+    data: outline.Data, plant: Plant, trim: TrimPoint, about: Sequence[Region], moves: Moves, folder: Path,
+    tell: Tell,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Sample, fit and check, and find the thrust meanwhile; the data get their terms, errors and thrust.
+    Returns the largest errors, (3,) rad/s2."""
     declared = {name: of["property"] for name, of in data["signals"].items()}
     known = {name: of for name, of in SIGNAL_PROPERTIES.items() if plant.has(of)}
     properties = declared or known
     tell("sample")
-    flown = joined([fly_about(plant, of.trim, 3, properties) for of in about])
+    flown = fly_about_all(plant, about, 3, properties)
     first = sample_all(plant, about, SAMPLES, 1, properties, FRESH, moves)
     if not declared:
         wanted = engine_signals(first, flown, plant.aircraft)
-        wanted += [THRUST] if plant.aircraft.effectors else []
+        wanted += [THRUST_SIGNAL] if plant.aircraft.effectors else []
         useful = signals_of_use(first, plant.aircraft, MAX_SIGNALS, wanted)
         data["signals"] = {name: {"property": properties[name]} for name in useful}
     tell("fit")
     weight = nearness(first, len(about), moves) if len(about) > 1 else None
     data["moments"] = outline.named_as(plant.aircraft, _moments(first, data, folder, weight))
     tell("check")
+    with Forks() as forks:
+        if unknown := THRUST_TERM not in plant.aircraft.terms:
+            forks.give(lambda: thrust_of(outline.plant_of(data, folder), trim))
+        made = _check(data, plant, about, moves, folder, properties, (first, flown))
+        if unknown:
+            tell("engines")
+            (thrust,) = forks.results()
+            data["engine"] |= {"thrust": thrust} if thrust else {}
+    return made
+
+
+def _check(
+    data: outline.Data, plant: Plant, about: Sequence[Region], moves: Moves, folder: Path,
+    properties: Mapping[str, str], sampled: tuple[Samples, Samples],
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Measure the errors of the terms, in the states of the fit and in flights, and in states not seen; the
+    data get them. Returns the largest ones of the fit's states and of those not seen, (3,) rad/s2."""
+    first, flown = sampled
     aircraft = outline.aircraft_of(data, folder)
     # Of several regions by random states alone: what a search finds in their corners no flight of the
     # benchmarks came to, and it takes from the diagnosis what boxes by region give.
-    of_one = weight is None
+    of_one = len(about) == 1
     checked, ages = (CHECKED, AGES_OF_WORST) if of_one else (CHECKED_OF_REGIONS, EVERY_AGE)
     errors = partial(errors_of, aircraft) if of_one else None
     other = sample_all(plant, about, checked, 2, properties, ages, moves, errors)

@@ -8,6 +8,7 @@ box by box and written as the aircraft's map.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -16,8 +17,9 @@ from scipy.linalg import lstsq
 
 from beaver_ftc.aircraft import AXES, MOMENTS, Aircraft, MassProperties
 from beaver_ftc.design import inertia_coefficients, inertial
-from beaver_ftc.diagnosis.monitors import THRUST, YAWING, mean_arm
+from beaver_ftc.diagnosis.monitors import THRUST_SIGNAL, YAWING_MOMENT_SIGNAL, mean_thrust_arm
 from beaver_ftc.plant import ENGINE_SIGNALS
+from beaver_ftc.studies.engine import Forks
 from beaver_ftc_aircraft.derive.sample import (
     AGES_S,
     REACHES,
@@ -100,13 +102,22 @@ def regressors(samples: Samples, aircraft: Aircraft, products: Sequence[Candidat
     return np.column_stack(columns)
 
 
-class Products:
-    """Products of the columns of A with each other and with b: all that a pursuit needs of n rows."""
+class Columns:
+    """Columns of n rows, each scaled to length 1, and their products with each other."""
 
-    def __init__(self, A: np.ndarray, b: np.ndarray) -> None:
-        scale = np.linalg.norm(A, axis=0)
-        self.scale = np.where(scale > 0.0, scale, np.inf)  # what is zero everywhere explains nothing
-        self.gram, self.onto = (A / self.scale).T @ (A / self.scale), (A / self.scale).T @ b
+    def __init__(self, A: np.ndarray) -> None:
+        length = np.linalg.norm(A, axis=0)
+        self.A, self.scale = A, np.where(length > 0.0, length, np.inf)  # what is zero explains nothing
+        self.unit = A / self.scale
+        self.gram = self.unit.copy("K").T @ self.unit  # BLAS rounds otherwise where an array meets itself
+        self.used = [k for k in range(A.shape[1]) if A[:, k].any()]
+
+
+class Products:
+    """Products of columns with each other and with b: all that a pursuit needs of n rows."""
+
+    def __init__(self, columns: Columns, b: np.ndarray) -> None:
+        self.gram, self.onto = columns.gram, columns.unit.T @ b
         self.total, self.square = float(np.sum((b - b.mean()) ** 2)) or 1.0, float(b @ b)
 
     def unexplained(self, taken: list[int]) -> float:
@@ -154,10 +165,10 @@ class Products:
         return kept
 
 
-def pursue(A: np.ndarray, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[int], np.ndarray]:
-    """The columns of A taken, and their coefficients."""
-    products, every = Products(A, b), [k for k in range(A.shape[1]) if A[:, k].any()]
-    taken = products.exchanged(products.pursued(every, most), every)
+def pursue(columns: Columns, b: np.ndarray, most: int = MOST_TERMS) -> tuple[list[int], np.ndarray]:
+    """The columns taken, and their coefficients."""
+    products, A = Products(columns, b), columns.A
+    taken = products.exchanged(products.pursued(columns.used, most), columns.used)
     taken = products.of_use(taken, products.unexplained(taken) + EXACT * products.total)
     scale = np.linalg.norm(A[:, taken], axis=0)
     return taken, lstsq(A[:, taken] / scale, b)[0] / scale if taken else np.empty(0)
@@ -183,13 +194,17 @@ def fitted(
     A = regressors(samples, aircraft, known)
     C = moment_coefficients(samples, aircraft.mass, aircraft)
     w = np.ones(len(samples)) if weight is None else weight
-    A = A * w[:, None]
+    columns = Columns(A * w[:, None])
+    exact = [engines in aircraft.signals for engines in EXACT_TERMS.values()]
+    with Forks() as forks:
+        for axis, engines in enumerate(EXACT_TERMS.values()):
+            known_of = samples.signals[engines] if exact[axis] else 0.0
+            forks.give(partial(pursue, columns, w * (C[:, axis] - known_of), most))
+        found = forks.results()
     terms: dict[str, list[Term]] = {}
     for axis, (name, engines) in enumerate(EXACT_TERMS.items()):
-        exact = engines in aircraft.signals
-        taken, values = pursue(A, w * (C[:, axis] - (samples.signals[engines] if exact else 0.0)), most)
-        coefficients = dict(zip(taken, values, strict=True))
-        if exact:
+        coefficients = dict(zip(*found[axis], strict=True))
+        if exact[axis]:
             linear = known.index(({engines: 1}, None))
             coefficients[linear] = coefficients.get(linear, 0.0) + 1.0
         terms[name] = [_term(name, *known[k], float(value)) for k, value in sorted(coefficients.items())]
@@ -211,7 +226,8 @@ def signals_of_use(samples: Samples, aircraft: Aircraft, most: int, wanted: Sequ
     known = candidates(tuple(samples.signals), aircraft.surfaces)
     A = regressors(samples, aircraft, known)
     C = moment_coefficients(samples, aircraft.mass, aircraft) * _accelerations(samples, aircraft)
-    products = [Products(A, C[:, axis]) for axis in range(3)]
+    columns = Columns(A)
+    products = [Products(columns, C[:, axis]) for axis in range(3)]
 
     def misses(signals: set[str]) -> float:
         within = [k for k, (of, _) in enumerate(known) if not (set(of) & set(samples.signals)) - signals]
@@ -292,7 +308,7 @@ def set_engines_apart(boxes: Sequence[dict[str, Any]], aircraft: Aircraft, alike
     """Fill in how unlike engines pull in each box, if they are mirrored; alike: states with all their levers
     where one is. Of others nobody has measured what they do while levers move: a c310's alarmed."""
     of = alike.signals
-    apart = np.abs(of[YAWING] - mean_arm(aircraft) * of[THRUST])
+    apart = np.abs(of[YAWING_MOMENT_SIGNAL] - mean_thrust_arm(aircraft) * of[THRUST_SIGNAL])
     for i, box in enumerate(boxes if apart.max() < MIRRORED else ()):
         box["engines_apart"] = _rounded(MARGIN * float(apart[alike.box <= i].max()) + LEAST_APART, np.ceil)
 

@@ -7,13 +7,15 @@ from trim, its surfaces moved a little by sines: engines turn, the air lags, fue
 model is worst are looked for, from the worst of random ones on.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, FLOW_SIGNALS, M_PER_FT, Aircraft
 from beaver_ftc.plant import PA_PER_PSF, FlightState, Plant
+from beaver_ftc.studies.engine import Forks
 
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
 SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel
@@ -35,6 +37,7 @@ _CLIMB_FROM, _CLIMBS = 12, 2  # states; steps from the worst of them
 _BEFORE_S = 30.0  # in which engines come to run
 _SHARE_OF_TRAVEL = 0.06
 _FREQUENCIES_HZ = (0.2, 0.5, 1.1)
+_SI = np.array([1.0, 1.0, M_PER_FT, PA_PER_PSF])  # of what is read of the flow
 _SPEEDS = (1.0, 1.0, 0.95, 1.05, 1.0, 1.0)  # as shares of the trim's
 
 
@@ -103,6 +106,7 @@ class Samples:
 
 Ends = tuple[float, float]
 Place = dict[str, float]
+Row = list[float]
 
 
 def _about(middle: float, half: float) -> Ends:
@@ -199,26 +203,57 @@ class Draw:
         )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Drawn:
+    """Where to look with the engines as they are: places, each with the share of the travel that it is of;
+    and, of each share, the ends between which the worst is looked for, and the places to begin from."""
+
+    places: Sequence[tuple[Place, int]]
+    searches: Sequence[tuple[Mapping[str, Ends], Sequence[Place]]]
+
+
 class _Standing:
     """An aircraft for which time stands still, put from place to place; what it is there is kept as rows."""
 
-    def __init__(self, plant: Plant, draw: Draw, properties: Mapping[str, str]) -> None:
-        self.plant, self.draw, self.properties = plant, draw, properties
-        self.tanks, self.rows = Tanks(plant, draw.trim), list[tuple]()
+    def __init__(self, plant: Plant, draw: Draw, reader: "Reader") -> None:
+        self.plant, self.draw, self.reader = plant, draw, reader
+        self.tanks, self.rows = Tanks(plant, draw.trim), list[Row]()
 
     def start(self, box: int, age: int, youngest_s: float, apart: float, turn: int) -> None:
         """Let the engines come to run somewhere in a box, in a flight of some age; turn: as `Draw.start`."""
         draw, plant = self.draw, self.plant
         self.tanks.fill(draw.between(youngest_s, _BEFORE_S + AGES_S[age]))
-        self.started, self.box, self.age = draw.start(REACHES[box], turn), box, age
-        for effector in plant.aircraft.effectors.values():
-            plant.write(effector.throttle, draw.around(0.0, REACHES[box] * apart))
+        self.started, self.box, self.age, self.rows = draw.start(REACHES[box], turn), box, age, []
+        for lever in _levers(plant.aircraft):
+            plant.write(lever, draw.around(0.0, REACHES[box] * apart))
         plant.start(self.started)
+
+    def drawn(self, shares: Sequence[float], n: int, search: bool) -> _Drawn:
+        """So many places in the box, and where to begin if the worst is looked for."""
+        ends = [self.draw.ends(REACHES[self.box], share) for share in shares]
+        levels = [i % len(ends) for i in range(n)]
+        places = [(self.draw.place(ends[level]), level) for level in levels]
+        first = [[self.draw.place(of) for _ in range(_CLIMB_FROM)] for of in ends] if search else []
+        return _Drawn(places, list(zip(ends, first, strict=False)))
+
+    def look(self, drawn: _Drawn, errors: Errors | None) -> list[Row]:
+        """What is seen where it was drawn, and where errors are large."""
+        for place, level in drawn.places:
+            self.put(place, level)
+        if errors is not None:
+            for level, (ends, first) in enumerate(drawn.searches):
+                _climb(self, ends, first, level, errors)
+        return self.rows
+
+    def pass_over(self, drawn: _Drawn) -> None:
+        """Go on as if the places had been looked at."""
+        for place, _ in drawn.places:
+            self.plant.pass_over(self.draw.state(self.started, place))
 
     def put(self, place: Place, level: int) -> None:
         """Look at one place, with the surfaces within a share of their travel."""
         self.plant.hold(self.draw.state(self.started, place))
-        self.rows.append((*seen_at(self.plant, self.properties), self.box, level, self.age))
+        self.rows.append(self.reader.row(self.box, level, self.age))
 
 
 def sample(
@@ -228,42 +263,46 @@ def sample(
 ) -> Samples:  # fmt: skip
     """So many random states; properties: of each signal to be read there; ages: of the flights; starts: how
     often the engines are started again; errors: of samples, (m, 3) rad/s2: if given, states where these are
-    large are looked for as well."""
+    large are looked for as well.
+
+    Engines go on from start to start. From each of them, another process looks at the states of a region:
+    who samples by regions wrote the model, and nothing in it but the initial conditions goes on from state to
+    state. The flight control of other models may, and a search goes where the states before it lead.
+    """
     draw = Draw(seed, plant.aircraft, envelope, trim, moves)
-    standing = _Standing(plant, draw, properties)
-    for k in range(starts):
-        box, of_box = k % len(REACHES), k // len(REACHES)
-        turn, of = divmod(of_box, len(ages))
-        age = ages[of]
-        youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
-        standing.start(box, age, youngest_s, moves.apart, of_box)
-        ends = [draw.ends(REACHES[box], share) for share in moves.shares]
-        for i in range(max(1, n // starts)):
-            level = i % len(moves.shares)
-            standing.put(draw.place(ends[level]), level)
-        if errors is not None:
-            for level, of_share in enumerate(ends):
-                _climb(standing, of_share, level, errors)
+    reader = Reader(plant, properties)
+    standing = _Standing(plant, draw, reader)
+    with Forks(envelope.of_region and errors is None) as forks:
+        for k in range(starts):
+            box, of_box = k % len(REACHES), k // len(REACHES)
+            turn, of = divmod(of_box, len(ages))
+            age = ages[of]
+            youngest_s = _BEFORE_S + AGES_S[age] if turn % 2 else AGES_S[age - 1] if age else 0.0
+            standing.start(box, age, youngest_s, moves.apart, of_box)
+            drawn = standing.drawn(moves.shares, max(1, n // starts), errors is not None)
+            forks.give(partial(standing.look, drawn, errors), partial(standing.pass_over, drawn))
+        rows = [row for of_start in forks.results() for row in of_start]
     standing.tanks.fill(0.0)
     _together(plant)
     plant.start(trim)
-    return as_arrays(standing.rows, tuple(properties))
+    return finite(reader.samples(rows))
 
 
-def _climb(standing: _Standing, ends: Mapping[str, Ends], level: int, errors: Errors) -> None:
+def _climb(
+    standing: _Standing, ends: Mapping[str, Ends], drawn: Sequence[Place], level: int, errors: Errors
+) -> None:
     """From the worst of some states on each axis, go where the error is larger.
 
     Each quantity is put to its ends and its middle, the others as they are; then all together are put where
     each alone was worst. Corners of so many quantities are too many for random states to be near all of them.
     """
 
-    def look(places: list[Place]) -> np.ndarray:
+    def look(places: Sequence[Place]) -> np.ndarray:
         for place in places:
             standing.put(place, level)
-        return np.nan_to_num(errors(_arrays(standing.rows[-len(places) :], tuple(standing.properties))))
+        return np.nan_to_num(errors(standing.reader.samples(standing.rows[-len(places) :])))
 
     moved = [name for name in ends if name not in _ATTITUDE]
-    drawn = [standing.draw.place(ends) for _ in range(_CLIMB_FROM)]
     found = look(drawn)
     for axis, first in enumerate(found.argmax(axis=0)):
         place, error = drawn[first], found[first, axis]
@@ -302,21 +341,51 @@ def joined(parts: Sequence[Samples]) -> Samples:
     return Samples(signals=signals, **arrays)
 
 
+def _levers(aircraft: Aircraft) -> tuple[str, ...]:
+    """What moves each engine that is an effector away from the common lever."""
+    return tuple(of.throttle for of in aircraft.effectors.values())
+
+
 def _together(plant: Plant) -> None:
     """All engines at the common lever."""
-    for effector in plant.aircraft.effectors.values():
-        plant.write(effector.throttle, 0.0)
+    for lever in _levers(plant.aircraft):
+        plant.write(lever, 0.0)
 
 
-def as_arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
-    """Rows of x, y, signals, u, rate, box, level, age as samples; without those that are not finite."""
-    samples = _arrays(rows, names)
+def finite(samples: Samples) -> Samples:
+    """Those whose accelerations are finite."""
     return samples.at(np.isfinite(samples.rate).all(axis=1))
 
 
-def _arrays(rows: list[tuple], names: tuple[str, ...]) -> Samples:
-    x, y, signals, u, rate, *indices = (np.array(column) for column in zip(*rows, strict=True))
-    return Samples(x, y, dict(zip(names, signals.T, strict=True)), u, rate, *indices)
+class Reader:
+    """What is read of an aircraft at one instant, as a row of numbers; and such rows as samples.
+
+    properties: of each signal.
+    """
+
+    def __init__(self, plant: Plant, properties: Mapping[str, str]) -> None:
+        blocks = (
+            [f"velocities/{axis}-rad_sec" for axis in AXES],
+            ["aero/alpha-rad", "aero/beta-rad", "velocities/vt-fps", "aero/qbar-psf"],
+            [*properties.values()],
+            [surface.effective for surface in plant.aircraft.surface.values()],
+            [f"accelerations/{axis}dot-rad_sec2" for axis in AXES],
+        )
+        self._plant, self._signals = plant, tuple(properties)
+        self._names = tuple(name for block in blocks for name in block)
+        self._ends = np.cumsum([len(block) for block in blocks])
+
+    def row(self, box: int = 0, level: int = 0, age: int = 0) -> Row:
+        """What is read now; box, level, age: as of `Samples`."""
+        return [*self._plant.read_all(self._names), box, level, age]
+
+    def samples(self, rows: Sequence[Row]) -> Samples:
+        """All rows in one, also those whose accelerations are not finite."""
+        blocks = np.split(np.array(rows), self._ends, axis=1)
+        x, y, signals, u, rate, indices = (block.copy() for block in blocks)
+        y *= _SI
+        box, level, age = indices.T.astype(int, order="C")
+        return Samples(x, y, dict(zip(self._signals, signals.T, strict=True)), u, rate, box, level, age)
 
 
 class Tanks:
@@ -337,17 +406,6 @@ class Tanks:
             self._plant.write(name, left * full)
 
 
-def seen_at(plant: Plant, properties: Mapping[str, str]) -> Iterator[list[float]]:
-    """x, y, signals, u, rate where the aircraft is."""
-    read = plant.read
-    yield [read(f"velocities/{axis}-rad_sec") for axis in AXES]
-    flow = [read("aero/alpha-rad"), read("aero/beta-rad"), read("velocities/vt-fps") * M_PER_FT]
-    yield [*flow, read("aero/qbar-psf") * PA_PER_PSF]
-    yield [read(name) for name in properties.values()]
-    yield [read(surface.effective) for surface in plant.aircraft.surface.values()]
-    yield [read(f"accelerations/{axis}dot-rad_sec2") for axis in AXES]
-
-
 def quantities(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
     """What terms multiply, by name: alpha, beta, ph, qh, rh, the samples' signals, and the surfaces."""
     (alpha, beta, V, _), (p, q, r) = samples.y.T, samples.x.T
@@ -359,31 +417,50 @@ def quantities(samples: Samples, aircraft: Aircraft) -> dict[str, np.ndarray]:
 
 def fly_about(plant: Plant, trim: FlightState, seed: int, properties: Mapping[str, str]) -> Samples:
     """Some short flights from trim; `box` and `level` are not sorted yet."""
-    rng, rows = np.random.default_rng(seed), []
-    for share in _SPEEDS:
-        plant.start(replace(trim, airspeed_mps=share * trim.airspeed_mps))
-        phases = rng.uniform(0.0, 2.0 * np.pi, (plant.aircraft.n, len(_FREQUENCIES_HZ)))
-        for k in range(FRAMES):
+    rng, rows, reader = np.random.default_rng(seed), list[Row](), Reader(plant, properties)
+    aircraft, t_s = plant.aircraft, plant.dt_s * np.arange(FRAMES)
+    commanded = *(of.command for of in aircraft.surface.values()), *_levers(aircraft)
+    for state in _starts(trim):
+        plant.start(state)
+        phases = rng.uniform(0.0, 2.0 * np.pi, (aircraft.n, len(_FREQUENCIES_HZ)))
+        for k, commands in enumerate(_commands(aircraft, trim, phases, t_s).tolist()):
             if k % EVERY == 0:
-                rows.append((*seen_at(plant, properties), 0, 0, 0))
-            _move(plant, trim, phases, k * plant.dt_s)
+                rows.append(reader.row())
+            plant.write_all(commanded, commands)
             plant.run()
         _together(plant)
     plant.start(trim)
-    return as_arrays(rows, tuple(properties))
+    return finite(reader.samples(rows))
 
 
-def _move(plant: Plant, trim: FlightState, phases: np.ndarray, t_s: float) -> None:
-    """Command the surfaces for one frame."""
-    waves = np.sin(2.0 * np.pi * np.array(_FREQUENCIES_HZ) * t_s + phases).sum(axis=1)
-    for (name, surface), wave in zip(plant.aircraft.surface.items(), waves.tolist(), strict=True):
-        travel = plant.aircraft.travel[name]
-        reach = _SHARE_OF_TRAVEL * min(-travel.min_rad, travel.max_rad)
-        there = trim.surfaces_rad[name] + reach * wave
-        plant.write(surface.command, min(max(there, travel.min_rad), travel.max_rad))
-    for effector in plant.aircraft.effectors.values():
-        side = np.sign(effector.right_m) * np.sin(_APART_RAD_S * t_s)
-        plant.write(effector.throttle, _APART * REACHES[0] * float(side))
+def fly_about_all(
+    plant: Plant, regions: Sequence[Region], seed: int, properties: Mapping[str, str]
+) -> Samples:
+    """The same from the trim of each region; of several, other processes fly: see `sample`."""
+    with Forks(len(regions) > 1) as forks:
+        for trim in (of.trim for of in regions):
+            forks.give(partial(fly_about, plant, trim, seed, properties), partial(_pass_over, plant, trim))
+        return joined(forks.results())
+
+
+def _pass_over(plant: Plant, trim: FlightState) -> None:
+    """Go on as if the flights had been flown."""
+    for state in (*_starts(trim), trim):
+        plant.start(state)
+
+
+def _starts(trim: FlightState) -> list[FlightState]:
+    return [replace(trim, airspeed_mps=share * trim.airspeed_mps) for share in _SPEEDS]
+
+
+def _commands(aircraft: Aircraft, trim: FlightState, phases: np.ndarray, t_s: np.ndarray) -> np.ndarray:
+    """Of each frame those of the surfaces, rad, and of the engines' levers, (frames, surfaces + engines)."""
+    waves = np.sin(2.0 * np.pi * np.array(_FREQUENCIES_HZ) * t_s[:, None, None] + phases).sum(axis=2)
+    low, high = np.array([(of.min_rad, of.max_rad) for of in aircraft.travel.values()]).T
+    middle = np.array([trim.surfaces_rad[name] for name in aircraft.surfaces])
+    surfaces = np.clip(middle + _SHARE_OF_TRAVEL * np.minimum(-low, high) * waves, low, high)
+    sides = np.array([np.sign(of.right_m) for of in aircraft.effectors.values()])
+    return np.hstack([surfaces, _APART * REACHES[0] * (sides * np.sin(_APART_RAD_S * t_s)[:, None])])
 
 
 def sorted_in(samples: Samples, ends: Sequence[np.ndarray], aircraft: Aircraft, moves: Moves) -> Samples:

@@ -1,5 +1,5 @@
-"""Blocks of frames, by which types are tested where gyros are noisy (diagnosis/types/registry.py): to every
-rule a block is a frame of several instants, whose bound has the noise of its two ends alone.
+"""Blocks of frames, by which types are tested where gyros are noisy (diagnosis/types/registry.py): every rule
+takes a block as a frame of several instants, whose bound has the gyro noise of its two ends alone.
 """
 
 from collections.abc import Iterator
@@ -8,11 +8,13 @@ from math import ceil
 
 import numpy as np
 
-from beaver_ftc_assurance.certificates.inequality import Document, History, Term, directions
+from beaver_ftc_assurance.certificates.inequality import Document, History, Term, axis_directions
 from beaver_ftc_assurance.certificates.tape import Tape
 
-_MEANS = "offset", "slope", "spread"  # of the tape; of all else the last frame's counts
-_SLOW_PER_S = 0.1  # of a filter that adds a block up
+# Quantities of a tape that a block has the mean of; of all others it has the value of its last frame
+AVERAGED_QUANTITIES = "offset", "slope", "spread"
+ADDING_POLE_PER_S = 0.1  # slow enough for the filter to add up a block
+BLOCK_INSTANT_SHARE = 0.5  # any share below 1 says that a block has several instants
 
 
 @dataclass(frozen=True)
@@ -24,53 +26,64 @@ class Blocks(History):
     length: int
 
     @property
-    def said(self) -> Document:
-        """Frames in a block, the first row, and the one after the last."""
-        return {"block": [self.length, self.begin, self.begin + self.length * len(self.x)]}
+    def statement_fields(self) -> Document:
+        """Rows in a block, the first row, and the one after the last."""
+        return {"block": [self.length, self.begin, self.begin + self.length * len(self.rates_rad_s)]}
 
-    def rest(self, rows: slice) -> np.ndarray:
-        """The mean over a block."""
-        return self.mean(
-            self.frames.rest(slice(*(self.begin + n * self.length for n in (rows.start, rows.stop))))
-        )
+    def unstated_bound(self, rows: slice) -> np.ndarray:
+        """The mean over each block, (blocks, 3) rad/s2."""
+        of_rows = slice(*(self.begin + n * self.length for n in (rows.start, rows.stop)))
+        return self.mean(self.frames.unstated_bound(of_rows))
 
     def mean(self, values: np.ndarray) -> np.ndarray:
-        """Of each block of these frames; of a part of one that is left over none."""
+        """Mean (blocks, ...) of values (frames, ...) over each whole block; an incomplete last one is left
+        out."""
         n = len(values) // self.length
         blocks = values[: n * self.length].reshape(n, self.length, *values.shape[1:])
         return np.asarray(blocks.mean(axis=1))
 
-    def added_up(self, k: int, asked: tuple[int, ...]) -> Iterator[list[Term]]:
-        """Inequalities of all frames in block k, and in the one before, where each may have its own theta."""
-        for end in (self.begin + n * self.length - 1 for n in (k, k + 1)):
-            yield from ([Term(d, _SLOW_PER_S, end - self.length, end)] for d in directions(asked))
+    def summed_frame_tests(self, block: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:
+        """Inequalities of all frames in this block, and in the one before; theta may differ by frame."""
+        for end in (self.begin + n * self.length - 1 for n in (block, block + 1)):
+            yield from (
+                [Term(direction, ADDING_POLE_PER_S, end - self.length, end)]
+                for direction in axis_directions(axes)
+            )
 
 
 def by_blocks(history: History, length: int, begin: int) -> Blocks:
-    """The blocks of this length, the first of which begins with this row."""
+    """The blocks of `length` rows, the first of which begins with row `begin`."""
     none = np.empty((0, 3))
-    of = Blocks(length * history.dt, 0.5, none, none, none, history.declared, history, begin, length)
-    model, eta_bar = (of.mean(values[begin:]) for values in (history.model, history.eta_bar))
-    return replace(of, x=history.x[begin + length - 1 :: length], model=model, eta_bar=eta_bar)
+    empty = Blocks(
+        length * history.dt, BLOCK_INSTANT_SHARE, none, none, none, history.declared, history, begin, length
+    )
+    return replace(
+        empty,
+        rates_rad_s=history.rates_rad_s[begin + length - 1 :: length],
+        model_rad_s2=empty.mean(history.model_rad_s2[begin:]),
+        eta_bar_rad_s2=empty.mean(history.eta_bar_rad_s2[begin:]),
+    )
 
 
-def in_blocks(tape: Tape, history: History, alarm: int) -> tuple[Tape, Blocks, int]:
-    """Tape, history and alarm by the blocks that the types were held against."""
+def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, Blocks, int]:
+    """Tape, history and frame of the alarm by the blocks that types were tested with."""
     diagnosis = tape.alarm.diagnosis
-    length = diagnosis.types_config.block_frames
-    begin = (alarm + 1 - diagnosis.frames_in_block) % length
-    of, first = by_blocks(history, length, begin), ceil((tape.first - begin) / length)
-    since = begin + first * length - tape.first
+    length = diagnosis.types_config.frames_per_block
+    begin = (alarm_frame + 1 - diagnosis.n_frames_in_block) % length
+    blocks, first_block = by_blocks(history, length, begin), ceil((tape.first - begin) / length)
+    skipped = begin + first_block * length - tape.first
     kept = {
-        name: of.mean(values[since:]) if name in _MEANS else values[since + length - 1 :: length]
+        name: blocks.mean(values[skipped:])
+        if name in AVERAGED_QUANTITIES
+        else values[skipped + length - 1 :: length]
         for name, values in tape.kept.items()
     }
-    examined = replace(tape, first=first, frames=(tape.frames - since) // length, kept=kept)
-    raised = max(ceil((alarm - begin) / length), 1)  # of the first block no one knows how it began
-    return examined, of, raised
+    block_tape = replace(tape, first=first_block, frames=(tape.frames - skipped) // length, kept=kept)
+    alarm_block = max(ceil((alarm_frame - begin) / length), 1)  # block 0 has no rates from before it
+    return block_tape, blocks, alarm_block
 
 
-def rows_of(said: Document, span: Document) -> np.ndarray:
-    """The log's rows of a term or bound of a statement."""
+def log_rows_of(said: Document, span: Document) -> np.ndarray:
+    """The log's rows of a term or bound, `span`, of a statement."""
     length, begin, _ = said.get("block", (1, 0, 0))
     return np.arange(begin + span["first"] * length, begin + (span["frame"] + 1) * length)

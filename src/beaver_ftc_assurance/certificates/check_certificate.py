@@ -1,4 +1,4 @@
-"""Check the certificate of a flight against its log and its scenario; certificates.md has each field.
+"""Check the certificate of a flight against its log and its scenario.
 
     python check_certificate.py FOLDER                        the folder of a run
     python check_certificate.py CERTIFICATE LOG [SCENARIO]    files that lie elsewhere
@@ -24,17 +24,31 @@ import yaml
 from pyarrow.parquet import read_table
 
 AXES = "pqr"
-FORMAT = 5
+FORMAT_VERSION = 5
 NOISE_LIMIT_SIGMA = 4.0  # noise of a sensor is cut off here
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905
 ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding
-LEAST_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
-SAME = 1e-12  # relative difference between a stated side and the recomputed one: order of summation
+MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
+MAX_RELATIVE_DIFFERENCE = 1e-12  # of a stated side from the recomputed one: order of summation
 TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
     "engine_rpm", "manifold_pressure",
 )  # fmt: skip
-OF_A_SUM = ("", "stuck", "float", "loss_of_effectiveness", "loss_of_effectiveness that varies")
+# How a fault type moves a surface: p = gain u + theta, or p = (gain + theta) u if theta is a share of the
+# command u. By the travel low, high (rad): gain, whether theta is a share, whether it is one number while the
+# fault shows, least and largest theta. A type that neither table has is what the log's columns say of it.
+RELATIONS = {
+    "stuck": lambda low, high: (0.0, False, True, low, high),
+    "float": lambda low, high: (0.0, False, True, *2 * (min(max(0.0, low), high),)),
+    "loss_of_effectiveness": lambda low, high: (1.0, True, True, -1.0, 0.0),
+    "loss_of_effectiveness that varies": lambda low, high: (1.0, True, False, -1.0, 0.0),
+}
+# Types that many frames exclude: the comparison (section 7 below), and the stop that the surface runs to.
+COURSES = {
+    "bias": ("offset", 0), "bias that grows": ("growing_offset", 0), "hardover up": ("runaway", 1),
+    "hardover down": ("runaway", -1), "oscillatory": ("swing", 0), "rate_limit": ("approach", 0),
+}  # fmt: skip
+RELATION_COLUMNS = "gain", "theta_is_share", "theta_is_constant", "theta_low", "theta_high"
 
 
 class Refused(Exception):
@@ -50,121 +64,172 @@ def require(condition, why):
 # --- 1. The form: which fields there are, and what may stand in each -------------------------------------
 
 
-def number(value):
+def is_number(value):
     """A finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
-def positive(value):
+def is_positive(value):
     """A finite number above zero."""
-    return number(value) and value > 0
+    return is_number(value) and value > 0
 
 
-def size(value):
+def is_non_negative(value):
     """A finite number, zero or more."""
-    return number(value) and value >= 0
+    return is_number(value) and value >= 0
 
 
-def row(value):
+def is_row(value):
     """A row of the log, or a count: an integer, zero or more."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
-def mapping(value):
+def is_mapping(value):
     """A mapping."""
     return isinstance(value, dict)
 
 
-def text(value):
+def is_text(value):
     """Words."""
     return isinstance(value, str)
 
 
-def one_of(*words):
+def is_one_of(*words):
     """One of these words."""
     return lambda value: value in words
 
 
-def optional(of):
+def is_null_or(of):
     """Such a value, or null."""
     return lambda value: value is None or of(value)
 
 
-def list_of(of, length=None):
+def is_list_of(of, length=None):
     """A list of such values, of this length if one is given."""
     return lambda value: (
         isinstance(value, list) and len(value) == (length or len(value)) and all(map(of, value))
     )
 
 
-def by_axis(of):
+def is_by_axis(of):
     """Such a value for some of the axes p, q, r."""
     return lambda value: isinstance(value, dict) and set(value) <= set(AXES) and all(map(of, value.values()))
 
 
-def share(value):
+def is_share(value):
     """More than zero, at most one."""
-    return positive(value) and value <= 1
+    return is_positive(value) and value <= 1
 
 
-def below_one(value):
+def is_below_one(value):
     """Zero or more, below one."""
-    return size(value) and value < 1
+    return is_non_negative(value) and value < 1
 
 
-VECTORS, MATRIX = list_of(list_of(number, 3)), list_of(list_of(number))
-DOCUMENT = {
-    "format": row, "scenario": text, "scenario_sha256": text, "rows": row, "statements": list_of(mapping),
-    "without": list_of(mapping), "digest": text,
-}  # fmt: skip
-IF_STATED = {
-    "declared": mapping, "dt_s": positive, "instants": row, "omega_E": size, "begins_s": number,
-}  # fmt: skip
-DECLARED = {name: by_axis(size) for name in "cbgoB"} | {"m": by_axis(below_one)}
-EVENT = {"what": optional(text), "column": text, "frame": row}
-THETA = one_of("any", "constant", "constant while it shows")
-SUM = {"theta": THETA, "terms": list_of(mapping), "sides": list_of(number, 2)}
-SUM_TOO = {"block": list_of(row, 3), "least": number, "most": number}
-TERM = {
-    "weight": positive, "d": list_of(number, 3), "first": row, "frame": row, "x": VECTORS, "F": VECTORS,
-    "eta_bar": VECTORS,
-}  # fmt: skip
-TERM_TOO = {
-    "pole_per_s": positive, "since": row, "fault": size, "rest": VECTORS, "h": list_of(optional(number)),
-    "Z": list_of(optional(number)), "r": list_of(size),
-}  # fmt: skip
-COURSE = {
-    "theta": one_of("course"), "bounds": list_of(mapping),
-    "sides": list_of(list_of(number), 2),
-}  # fmt: skip
-COURSE_TOO = {
-    "block": list_of(row, 3), "stops": list_of(number), "pace_rad_s": positive, "slowest_rad_s": positive,
-    "ordered": list_of(number), "step": size, "near": number,
-}  # fmt: skip
-BOUND = {
-    "d": list_of(number, 3), "first": row, "frame": row, "h": list_of(number), "Z": list_of(number),
-    "r": list_of(size),
-}  # fmt: skip
-CHANCE = {
-    "likelihood": text, "level": positive, "axes": list_of(one_of(0, 1, 2)),
-    "sense": one_of("less", "either"),
-    "tolerance": list_of(positive), "R": list_of(optional(size)), "Y": list_of(list_of(optional(number))),
-    "P": list_of(list_of(optional(number))), "first": row, "frames": list_of(mapping),
-    "sides": list_of(list_of(number, 2), 2),
-}  # fmt: skip
-FRAME = {"signature": list_of(number), "jitter": list_of(size), "drift": MATRIX}
-FRAME_TOO = {
-    "bounded": list_of(size), "pace": size, "keep": share, "known": MATRIX, "air": list_of(number),
-    "foreseen": list_of(number),
-}  # fmt: skip
-LOOKS = {"test": one_of(*TESTS), "looks": list_of(list_of(number, 3)), "sides": list_of(number, 2)}
-MISSING = {"missing": list_of(row, 1), "sides": list_of(number, 2)}
-LIKE_THE_ALARM = {"as": one_of("alarm")}
+is_vector_list, is_matrix = is_list_of(is_list_of(is_number, 3)), is_list_of(is_list_of(is_number))
+CERTIFICATE_FIELDS = {
+    "format": is_row,
+    "scenario": is_text,
+    "scenario_sha256": is_text,
+    "rows": is_row,
+    "statements": is_list_of(is_mapping),
+    "without": is_list_of(is_mapping),
+    "digest": is_text,
+}
+OPTIONAL_CERTIFICATE_FIELDS = {
+    "declared": is_mapping,
+    "dt_s": is_positive,
+    "instants": is_row,
+    "omega_E": is_non_negative,
+    "begins_s": is_number,
+}
+DECLARED_FIELDS = {name: is_by_axis(is_non_negative) for name in "cbgoB"} | {"m": is_by_axis(is_below_one)}
+EVENT_FIELDS = {"what": is_null_or(is_text), "column": is_text, "frame": is_row}
+is_theta_assumption = is_one_of("any", "constant", "constant while it shows")
+SUM_FIELDS = {
+    "theta": is_theta_assumption,
+    "terms": is_list_of(is_mapping),
+    "sides": is_list_of(is_number, 2),
+}
+OPTIONAL_SUM_FIELDS = {"block": is_list_of(is_row, 3), "least": is_number, "most": is_number}
+TERM_FIELDS = {
+    "weight": is_positive,
+    "d": is_list_of(is_number, 3),
+    "first": is_row,
+    "frame": is_row,
+    "x": is_vector_list,
+    "F": is_vector_list,
+    "eta_bar": is_vector_list,
+}
+OPTIONAL_TERM_FIELDS = {
+    "pole_per_s": is_positive,
+    "since": is_row,
+    "fault": is_non_negative,
+    "rest": is_vector_list,
+    "h": is_list_of(is_null_or(is_number)),
+    "Z": is_list_of(is_null_or(is_number)),
+    "r": is_list_of(is_non_negative),
+}
+COURSE_FIELDS = {
+    "theta": is_one_of("course"),
+    "bounds": is_list_of(is_mapping),
+    "sides": is_list_of(is_list_of(is_number), 2),
+}
+OPTIONAL_COURSE_FIELDS = {
+    "block": is_list_of(is_row, 3),
+    "stops": is_list_of(is_number),
+    "pace_rad_s": is_positive,
+    "slowest_rad_s": is_positive,
+    "ordered": is_list_of(is_number),
+    "step": is_non_negative,
+    "near": is_number,
+}
+BOUND_FIELDS = {
+    "d": is_list_of(is_number, 3),
+    "first": is_row,
+    "frame": is_row,
+    "h": is_list_of(is_number),
+    "Z": is_list_of(is_number),
+    "r": is_list_of(is_non_negative),
+}
+LIKELIHOOD_FIELDS = {
+    "likelihood": is_text,
+    "level": is_positive,
+    "axes": is_list_of(is_one_of(0, 1, 2)),
+    "sense": is_one_of("less", "either"),
+    "tolerance": is_list_of(is_positive),
+    "R": is_list_of(is_null_or(is_non_negative)),
+    "Y": is_list_of(is_list_of(is_null_or(is_number))),
+    "P": is_list_of(is_list_of(is_null_or(is_number))),
+    "first": is_row,
+    "frames": is_list_of(is_mapping),
+    "sides": is_list_of(is_list_of(is_number, 2), 2),
+}
+FRAME_FIELDS = {"signature": is_list_of(is_number), "jitter": is_list_of(is_non_negative), "drift": is_matrix}
+OPTIONAL_FRAME_FIELDS = {
+    "bounded": is_list_of(is_non_negative),
+    "pace": is_non_negative,
+    "keep": is_share,
+    "known": is_matrix,
+    "air": is_list_of(is_number),
+    "foreseen": is_list_of(is_number),
+}
+INSTRUMENT_TEST_FIELDS = {
+    "test": is_one_of(*TESTS),
+    "looks": is_list_of(is_list_of(is_number, 3)),
+    "sides": is_list_of(is_number, 2),
+}
+MISSING_READING_FIELDS = {"missing": is_list_of(is_row, 1), "sides": is_list_of(is_number, 2)}
+BY_ALARM_FIELDS = {"as": is_one_of("alarm")}
 # The field that says which kind of evidence a statement has, and the fields of that kind.
-KINDS = {
-    "terms": (SUM, SUM_TOO), "bounds": (COURSE, COURSE_TOO), "likelihood": (CHANCE, {}),
-    "looks": (LOOKS, {}), "missing": (MISSING, {}), "as": (LIKE_THE_ALARM, {}),
-}  # fmt: skip
+FIELDS_BY_EVIDENCE = {
+    "terms": (SUM_FIELDS, OPTIONAL_SUM_FIELDS),
+    "bounds": (COURSE_FIELDS, OPTIONAL_COURSE_FIELDS),
+    "likelihood": (LIKELIHOOD_FIELDS, {}),
+    "looks": (INSTRUMENT_TEST_FIELDS, {}),
+    "missing": (MISSING_READING_FIELDS, {}),
+    "as": (BY_ALARM_FIELDS, {}),
+}
 
 
 def check_form(document, needed, allowed, where):
@@ -179,31 +244,31 @@ def check_form(document, needed, allowed, where):
         require(fields[name](value), f"{where}: {name} is not allowed, allowed: {allowed_is}")
 
 
-def kind_of(said):
+def evidence_kind(said):
     """Which kind of evidence a statement has."""
-    found = [name for name in KINDS if name in said]
+    found = [name for name in FIELDS_BY_EVIDENCE if name in said]
     require(len(found) == 1, "the statement has no evidence, or more than one kind of it")
     return found[0]
 
 
 def check_statement_form(said):
     """The fields of a statement; the lists in it have as many entries as frames."""
-    kind = kind_of(said)
-    needed, allowed = KINDS[kind]
-    check_form(said, EVENT | needed, allowed, "statement")
+    kind = evidence_kind(said)
+    needed, allowed = FIELDS_BY_EVIDENCE[kind]
+    check_form(said, EVENT_FIELDS | needed, allowed, "statement")
     for term in said.get("terms", []):
-        check_form(term, TERM, TERM_TOO, "term")
+        check_form(term, TERM_FIELDS, OPTIONAL_TERM_FIELDS, "term")
         check_lengths(term, ("x", "F", "eta_bar", "rest", "h", "Z", "r"))
         require(("pole_per_s" in term) == ("since" in term), "a pole needs the frame since which it filters")
         require("fault" not in term or "pole_per_s" in term, "a frame by itself has no past")
     for bound in said.get("bounds", []):
-        check_form(bound, BOUND, {}, "bound")
+        check_form(bound, BOUND_FIELDS, {}, "bound")
         check_lengths(bound, ("h", "Z", "r"))
         require(all(bound["Z"]), "the surface does not act along this direction")
     if kind in ("terms", "bounds", "looks"):
         require(len(said[kind]) > 0, "the evidence is empty")
     if kind == "likelihood":
-        check_chance_form(said)
+        check_likelihood_form(said)
 
 
 def check_lengths(span, names):
@@ -215,7 +280,7 @@ def check_lengths(span, names):
             require(len(span[name]) == span["frame"] + 1 - span["first"], f"{name}: frames are missing")
 
 
-def check_chance_form(said):
+def check_likelihood_form(said):
     """Sizes of the lists of a statistical alarm: n axes, m constants."""
     n, m = len(said["axes"]), len(said["tolerance"])
     require(n in (1, 2) and len(set(said["axes"])) == n, "axes: one or two different ones are allowed")
@@ -226,7 +291,7 @@ def check_chance_form(said):
     require(np.array_equal(P, P.T) and (P.diagonal() >= 0).all(), "P is no covariance")
     require(said["first"] >= 1 and said["frames"], "frames are missing")
     for its in said["frames"]:
-        check_form(its, FRAME, FRAME_TOO, "frame")
+        check_form(its, FRAME_FIELDS, OPTIONAL_FRAME_FIELDS, "frame")
         for name in ("signature", "jitter", "bounded", "air", "foreseen"):
             require(len(its.get(name, [0] * n)) == n, f"{name}: one value for each axis")
         drift, known = np.array(its["drift"]), its.get("known", [])
@@ -241,71 +306,75 @@ def check_chance_form(said):
 
 @dataclass
 class Declared:
-    """What a scenario declares about the frame, and about the errors of the gyros from some row on."""
+    """What a scenario declares at some row: length of a frame, s; JSBSim steps in a frame; by axis the errors
+    of a gyro (offset rad/s, constant part of it rad/s, slope), the constant bound rad/s2, and the share of
+    inertia coupling; the row with which the diagnosis started last; the scenario."""
 
     dt: float
     instants: int
-    gyros: dict  # by axis: (offset rad/s, constant part of it rad/s, slope)
-    constant: dict  # by axis, rad/s2
-    coupled: dict  # by axis
-    from_row: int  # the diagnosis began again with this row
+    gyro_errors: dict
+    constant_bounds: dict
+    inertia_shares: dict
+    start_row: int
     scenario: dict
 
 
-def declared_in(scenario, k):
-    """What a resolved scenario declares, as it is in force at row k."""
+def declared_at_row(scenario, row_number):
+    """What a resolved scenario declares, as it is in force at a row."""
     require(
         isinstance(scenario, dict) and isinstance(scenario.get("fdi"), dict), "the scenario is no scenario"
     )
     fdi, rate = scenario["fdi"], float(scenario["rate_hz"])
-    sensors, from_row = fdi["bounds"]["sensors"], 0
+    sensors, start_row = fdi["bounds"]["sensors"], 0
     for change in scenario.get("changes") or []:
         begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
-        if begins <= k:
+        if begins <= row_number:
             sensors = change.get("declared_sensors") or sensors
             restarted = any(
                 change.get(name) is not None for name in ("scheme", "sensors", "declared_sensors")
             )
-            from_row = begins if restarted else from_row
-    gyros = {}
+            start_row = begins if restarted else start_row
+    gyro_errors = {}
     for axis in AXES:
         gyro = sensors[axis]
         bias = abs(radians(gyro["bias_deg_s"]))
         offset = NOISE_LIMIT_SIGMA * radians(gyro["noise_std_deg_s"]) + bias
-        gyros[axis] = offset + radians(gyro["quantum_deg_s"]) / 2, bias, abs(gyro["scale_error"])
+        gyro_errors[axis] = offset + radians(gyro["quantum_deg_s"]) / 2, bias, abs(gyro["scale_error"])
     return Declared(
-        1.0 / rate, int(scenario["substeps"]), gyros, fdi["bounds"]["constant_rad_s2"],
-        fdi["bounds"]["inertia_coupling"], from_row, scenario,
+        1.0 / rate, int(scenario["substeps"]), gyro_errors, fdi["bounds"]["constant_rad_s2"],
+        fdi["bounds"]["inertia_coupling"], start_row, scenario,
     )  # fmt: skip
 
 
-def check_declared(about, declared):
+def check_declared(document, declared):
     """The bounds in the certificate are those of the scenario.
 
     A bias of a gyro may be left out: then the bound on its noise is larger, which proves less. c, b and g
     only explain the bound that the log has; c must be zero where the scenario's share is.
     """
-    check_form(about.get("declared"), DECLARED, {}, "declared")
-    for axis, (offset, bias, slope) in declared.gyros.items():
-        o, B, m = (about["declared"][name].get(axis, 0.0) for name in "oBm")
+    check_form(document.get("declared"), DECLARED_FIELDS, {}, "declared")
+    for axis, (offset, bias, slope) in declared.gyro_errors.items():
+        o, B, m = (document["declared"][name].get(axis, 0.0) for name in "oBm")
         same = np.isclose(o, offset, 1e-12, 0) and np.isclose(m, slope, 1e-12, 0)
         require(same and (B == 0 or np.isclose(B, bias, 1e-12, 0)),
                 f"the declared error of gyro {axis} is not that of the scenario")  # fmt: skip
         require(o >= B, f"gyro {axis}: the constant error is larger than the whole error")
-        if "omega_E" not in about:
+        if "omega_E" not in document:
             continue
-        c, b, g = (about["declared"][name].get(axis, 0.0) for name in "cbg")
+        c, b, g = (document["declared"][name].get(axis, 0.0) for name in "cbg")
         require(
-            b >= declared.constant[axis] * (1 - 1e-12), f"b on {axis} is smaller than the scenario's bound"
+            b >= declared.constant_bounds[axis] * (1 - 1e-12),
+            f"b on {axis} is smaller than the scenario's bound",
         )
-        require(c == 0 or declared.coupled[axis] > 0, f"c on {axis}: the scenario declares none")
-        require(g >= 1 if about["omega_E"] else g == 0, f"g on {axis} is not allowed")
-    require(np.isclose(about.get("dt_s", declared.dt), declared.dt, 1e-12, 0),
+        require(c == 0 or declared.inertia_shares[axis] > 0, f"c on {axis}: the scenario declares none")
+        require(g >= 1 if document["omega_E"] else g == 0, f"g on {axis} is not allowed")
+    require(np.isclose(document.get("dt_s", declared.dt), declared.dt, 1e-12, 0),
             "dt_s is not the frame of the scenario")  # fmt: skip
     require(
-        about.get("instants", declared.instants) == declared.instants, "instants: not those of the scenario"
+        document.get("instants", declared.instants) == declared.instants,
+        "instants: not those of the scenario",
     )
-    require(about.get("omega_E", 0) == 0 or np.isclose(about["omega_E"], EARTH_RATE_RAD_S, 1e-12, 0),
+    require(document.get("omega_E", 0) == 0 or np.isclose(document["omega_E"], EARTH_RATE_RAD_S, 1e-12, 0),
             "omega_E is not the Earth's rate")  # fmt: skip
 
 
@@ -313,51 +382,63 @@ def check_declared(about, declared):
 
 
 class Frames:
-    """Innovation and bounds of each frame (docs/explanation/theory.md, sections 1 and 2), arrays (frames, 3).
+    """Innovation and bounds of each frame, arrays (frames, 3).
 
-    x: measured rates, rad/s; F: model, eta_bar: bound on what the model does not know, published: the part of
-    it that c, b, g and the Earth's rate explain, rad/s2; n: changing error of the gyros, rad/s;
-    nu: innovation, most: the largest healthy one, rad/s2; shows: health does not explain it (frames,).
-    A block of L rows counts as one frame of several instants: x and n of its last row, all else the mean.
+    docs/explanation/detection.md derives them: "The innovation", "The bound on the model error", "Changing
+    error of a gyro".
+
+    rates: measured. model: acceleration by the design model. eta_bar: bound on the model's error;
+    stated_bound: the part of it that c, b, g and the Earth's rate explain. gyro_change: bound on the changing
+    error of the gyros. innovation_bound: on the innovation without a fault. is_unexplained (frames,): health
+    does not explain the frame; late_frames: 1 if a frame has several instants, and so may show a fault that
+    has begun within it. A block of L rows counts as one frame of several instants: rates and gyro_change of
+    its last row, all else the mean.
     """
 
-    def __init__(self, about, log, declared, block=None):
+    def __init__(self, document, log, declared, block=None):
         self.log = log
         length, begin, end = block or (1, 0, len(log["t_s"]))
         require(length >= 1 and 0 <= begin < end <= len(log["t_s"]) and (end - begin) % length == 0,
                 "the block has other rows")  # fmt: skip
         self.length, self.begin, self.rows = length, begin, slice(begin, end)
         self.dt, instants = declared.dt * length, declared.instants
-        self.x = self.last(self.columns("{}_measured_rad_s"))
-        self.F, self.eta_bar = (self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar"))
-        said, earth = about["declared"], about.get("omega_E", 0.0)
+        self.rates_rad_s = self.last_rows(self.columns("{}_measured_rad_s"))
+        self.model_rad_s2, self.eta_bar_rad_s2 = (
+            self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar")
+        )
+        said, earth = document["declared"], document.get("omega_E", 0.0)
         c, b, g, o, B, m = (
-            np.array([said[name].get(axis, 0.0) for axis in AXES])  # by axis; what each is: see DECLARED
-            for name in ("c", "b", "g", "o", "B", "m")
+            np.array([said[name].get(axis, 0.0) for axis in AXES])
+            for name in ("c", "b", "g", "o", "B", "m")  # certificates.md, "The fields", explains the letters
         )
         x = self.columns("{}_measured_rad_s")
         rates = np.abs(x) + (o + m * np.abs(x)) / (1 - m)  # as large as the true rates can be
-        self.n = self.last(o - B + m * rates)
+        self.gyro_change_rad_s = self.last_rows(o - B + m * rates)
         of_earth = earth * ((1 + g) * rates.sum(axis=1, keepdims=True) + g * earth)
-        published = c * rates[:, [1, 0, 0]] * rates[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
-        published = np.roll(published, 1, axis=0) / instants  # of the row with which the frame began
-        published[0] = np.nan
-        self.published = self.mean(published)
-        before = np.roll(self.x, 1, axis=0)
+        stated_bound = c * rates[:, [1, 0, 0]] * rates[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
+        stated_bound = np.roll(stated_bound, 1, axis=0) / instants  # of the row with which the frame began
+        stated_bound[0] = np.nan
+        self.stated_bound_rad_s2 = self.mean(stated_bound)
+        before = np.roll(self.rates_rad_s, 1, axis=0)
         before[0] = np.nan
-        self.nu = (self.x - before) / self.dt - self.F
-        self.most = self.eta_bar + (self.n + np.roll(self.n, 1, axis=0)) / self.dt
-        self.late = int(instants * length > 1)
-        beyond = (np.abs(self.nu) > self.most).any(axis=1)
-        explained = (self.published <= self.eta_bar * (1 + 1e-13)).all(axis=1)
-        shows = beyond & explained  # never in frame 0: what was before it is not known
-        self.shows = shows & np.roll(shows, self.late) & np.roll(shows, -self.late)
+        self.innovation_rad_s2 = (self.rates_rad_s - before) / self.dt - self.model_rad_s2
+        self.innovation_bound_rad_s2 = (
+            self.eta_bar_rad_s2
+            + (self.gyro_change_rad_s + np.roll(self.gyro_change_rad_s, 1, axis=0)) / self.dt
+        )
+        self.late_frames = int(instants * length > 1)
+        beyond = (np.abs(self.innovation_rad_s2) > self.innovation_bound_rad_s2).any(axis=1)
+        explained = (self.stated_bound_rad_s2 <= self.eta_bar_rad_s2 * (1 + 1e-13)).all(axis=1)
+        unexplained = beyond & explained  # never in frame 0: what was before it is not known
+        self.is_unexplained = (
+            unexplained & np.roll(unexplained, self.late_frames) & np.roll(unexplained, -self.late_frames)
+        )
 
     def columns(self, name):
         """The log's columns of the three axes, side by side (rows, 3)."""
         return np.column_stack([np.asarray(self.log[name.format(axis)], float) for axis in AXES])
 
-    def last(self, values):
+    def last_rows(self, values):
         """Of each block the last row's."""
         return values[self.rows][self.length - 1 :: self.length]
 
@@ -373,7 +454,7 @@ class Frames:
 # --- 4. The event: what the log's own column says --------------------------------------------------------
 
 
-def column_of(what, log):
+def event_column(what, log):
     """The column that says whether this is excluded; the alarm's if nothing is named."""
     if what is None:
         return "detected"
@@ -384,7 +465,7 @@ def column_of(what, log):
 def check_event(said, log):
     """The log's column is set from the stated row to the end, and not in the row before."""
     name, k = said["column"], said["frame"]
-    require(name == column_of(said["what"], log), f"{name} is another column than that of this event")
+    require(name == event_column(said["what"], log), f"{name} is another column than that of this event")
     require(name in log, f"the log has no column {name}: it was not written with this certificate")
     values = np.asarray(log[name], float)
     require(k < len(values), f"the log has no row {k}")
@@ -396,28 +477,34 @@ def check_event(said, log):
 
 @dataclass
 class Effect:
-    """offset + theta slope, give or take spread (frames, 3), rad/s2; theta between low and high."""
+    """Effect of a fault on the innovation: offset + theta slope, within +-spread, rad/s2, (frames, 3); theta
+    between theta_low and theta_high. theta_is_constant: one number in the frames that show the fault."""
 
     offset: np.ndarray
     slope: np.ndarray
     spread: np.ndarray
-    low: float
-    high: float
+    theta_low: float
+    theta_high: float
+    theta_is_constant: bool = False
 
-    def along(self, d, rows):
-        """h, Z and r: along a direction, in these frames."""
-        return self.offset[rows] @ d, self.slope[rows] @ d, self.spread[rows] @ np.abs(d)
+    def along(self, direction, rows):
+        """h, Z and r: offset, slope and spread along a direction (3,) in these frames."""
+        return (
+            self.offset[rows] @ direction,
+            self.slope[rows] @ direction,
+            self.spread[rows] @ np.abs(direction),
+        )
 
-    def most(self, h, Z, r):
-        """The most that a fault can do which may be absent; at most rounding is nothing."""
-        ends = np.maximum(h + self.low * Z, h + self.high * Z)
-        return np.where(ends <= LEAST_EFFECT_RAD_S2, 0.0, ends) + r
+    def max_effect(self, h, Z, r):
+        """Largest effect of a fault that may be absent; an effect of no more than rounding counts as none."""
+        ends = np.maximum(h + self.theta_low * Z, h + self.theta_high * Z)
+        return np.where(ends <= MIN_EFFECT_RAD_S2, 0.0, ends) + r
 
 
-def effect_of(what, frames):
+def effect_of_fault(what, frames):
     """The effect of the fault that is excluded, from the log's columns; of the alarm none."""
     if what is None:
-        zero = np.zeros_like(frames.x)
+        zero = np.zeros_like(frames.rates_rad_s)
         return Effect(zero, zero, zero, 0.0, 0.0)
     surface, _, kind = what.partition(" ")
     name = f"fie_{surface}_position" if kind else f"fie_{surface}"
@@ -427,13 +514,40 @@ def effect_of(what, frames):
     columns = f"{name}_{{}}_offset_rad_s2", f"{name}_{{}}_slope", f"{name}_{{}}_spread_rad_s2"
     offset, slope, spread = (frames.mean(frames.columns(column)) for column in columns)
     ends = f"{surface}_travel_{{}}_rad" if kind else f"{name}_theta_{{}}"
-    low, high = (constant(frames.log[ends.format(end)]) for end in ("low", "high"))
+    low, high = (constant_value(frames.log[ends.format(end)]) for end in ("low", "high"))
     if not kind:
         return Effect(offset, slope, spread, low, high)
-    return of_type(kind, offset, slope, spread, low, high)
+    course = course_of(what, frames.log)
+    if course is not None:  # theta says where the surface was; of a swing, how far off its command
+        relation = float(course[0] == "swing"), False, False, low, high
+    else:
+        relation = relation_of(what, frames.log, low, high)
+    return effect_of_relation(relation, offset, slope, spread)
 
 
-def constant(values):
+def course_of(what, log):
+    """The comparison and the stop of a type that many frames exclude, of another None."""
+    kind = what.partition(" ")[2]
+    if kind in RELATIONS or kind in COURSES:
+        return COURSES.get(kind)
+    begins = f"{what.replace(' ', '_')}_course_"
+    found = [
+        (name.removeprefix(begins), constant_value(log[name])) for name in log if name.startswith(begins)
+    ]
+    return found[0] if found else None
+
+
+def relation_of(what, log, low, high):
+    """How this type moves the surface, see RELATIONS; low, high: the travel, rad."""
+    kind = what.partition(" ")[2]
+    if kind in RELATIONS:
+        return RELATIONS[kind](low, high)
+    columns = [f"{what.replace(' ', '_')}_{name}" for name in RELATION_COLUMNS]
+    require(all(name in log for name in columns), f"neither this checker nor the log says what {kind} is")
+    return tuple(constant_value(log[name]) for name in columns)
+
+
+def constant_value(values):
     """The one value of a column that says it in some rows."""
     values = np.asarray(values, float)
     found = np.unique(values[np.isfinite(values)])
@@ -441,39 +555,38 @@ def constant(values):
     return float(found[0])
 
 
-def of_type(kind, offset, slope, spread, low, high):
-    """Of a fault type; offset and slope of the surface's position: -G u and G. Stuck p = c, floating p = 0, a
-    loss p = (1 + theta) u; a course says where the surface was, theta = p, of an oscillation p - u."""
-    zero = np.zeros_like(slope)
-    if kind == "float":
-        return Effect(offset + min(max(0.0, low), high) * slope, zero, spread, 0.0, 0.0)
-    if kind.startswith("loss_of_effectiveness"):
-        return Effect(zero, -offset, spread, -1.0, 0.0)
-    if kind == "oscillatory":
-        return Effect(zero, slope, spread, low, high)
-    return Effect(offset, slope, spread, low, high)
+def effect_of_relation(relation, offset, slope, spread):
+    """G (p - u) of a relation; offset and slope are those of the surface's position: -G u and G."""
+    gain, is_share, is_constant, low, high = relation
+    Z = -offset if is_share else slope
+    h = (1.0 - gain) * offset
+    if low == high:
+        return Effect(h + low * Z, np.zeros_like(Z), spread, 0.0, 0.0, bool(is_constant))
+    return Effect(h, Z, spread, low, high, bool(is_constant))
 
 
-# --- 6. The sum over filters (theory.md, section 4) --------------------------------------------------
+# --- 6. The sum over filters (docs/explanation/certificates.md, "The inequality") ---------------------
 
 
-def sum_of_terms(said, frames, declared):
+def sides_of_terms(said, frames, declared):
     """Both sides: the sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
     what, theta = said["what"], said["theta"]
-    effect = effect_of(what, frames)
-    kind = (what or "").partition(" ")[2]
-    require(kind in OF_A_SUM, "a sum of frames says nothing of this type")
+    effect = effect_of_fault(what, frames)
+    of_course = what is not None and " " in what and course_of(what, frames.log) is not None
+    require(not of_course, "a sum of frames says nothing of this type")
     check_theta(said, effect, declared, frames)
-    sums = [abs(term["weight"]) * filtered(term, said, frames, effect, declared) for term in said["terms"]]
+    sums = [
+        abs(term["weight"]) * evaluate_term(term, said, frames, effect, declared) for term in said["terms"]
+    ]
     value, limit, slope = np.sum(sums, axis=0)
-    if theta != "any" and abs(slope) > LEAST_EFFECT_RAD_S2:
-        limit += max(effect.low * slope, effect.high * slope)
+    if theta != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
+        limit += max(effect.theta_low * slope, effect.theta_high * slope)
     return value, limit
 
 
 def check_theta(said, effect, declared, frames):
     """The stated ends are those of the log; one constant theta is allowed where the scenario declares it."""
-    for end, known in (("least", effect.low), ("most", effect.high)):
+    for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
         require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
     fdi, alarm = declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
     if said["theta"] == "constant":
@@ -483,11 +596,12 @@ def check_theta(said, effect, declared, frames):
         require("block" not in said and min(since) >= alarm, "a frame before the alarm may be healthy")
     if said["theta"] == "constant while it shows":
         require(said["what"] and " " in said["what"], "only a fault type is at fault where health fails")
+        require(effect.theta_is_constant, "theta of this type is not one number")
     if said["what"] is None:
         require("block" not in said, "an alarm is raised by frames, not by blocks")
 
 
-def filtered(term, said, frames, effect, declared):
+def evaluate_term(term, said, frames, effect, declared):
     """One filter along d: its value E, the limit on it without theta, and what a constant theta multiplies.
 
     E[k] = sum of a^(k-j) dt nu[j].d    over j = since + 1 ... k
@@ -496,84 +610,94 @@ def filtered(term, said, frames, effect, declared):
     dt, d = frames.dt, np.array(term["d"])
     decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
     since = term["since"] if "pole_per_s" in term else k - 1
-    begun = declared.from_row if frames.length == 1 else 0
-    require(begun <= since < first <= k < len(frames.x), "the frames of a term are not in order")
+    begun = declared.start_row if frames.length == 1 else 0
+    require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
     require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
     require("pole_per_s" in term or first == k, "without a pole a term has one frame")
-    require(said["theta"] != "constant while it shows" or frames.shows[k], "health explains a frame")
-    past, size = np.arange(since + 1, k + 1), np.abs(d)
-    left = decay ** (k - past.astype(float))  # what is left at frame k of each frame's input
-    noise = frames.n @ size
-    value = left @ (dt * frames.nu[past] @ d)
-    limit = left @ (dt * frames.eta_bar[past] @ size + (1 - decay) * noise[past - 1])
-    limit += decay * left[0] * noise[since] + noise[k]
+    require(said["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame")
+    summed_frames, abs_direction = np.arange(since + 1, k + 1), np.abs(d)
+    weights = decay ** (k - summed_frames.astype(float))  # of each frame's input, at frame k
+    noise = frames.gyro_change_rad_s @ abs_direction
+    value = weights @ (dt * frames.innovation_rad_s2[summed_frames] @ d)
+    limit = weights @ (
+        dt * frames.eta_bar_rad_s2[summed_frames] @ abs_direction + (1 - decay) * noise[summed_frames - 1]
+    )
+    limit += decay * weights[0] * noise[since] + noise[k]
     if said["what"] is not None:
-        h, Z, r = effect.along(d, past)
-        check_effect(term, h[first - past[0] :], Z[first - past[0] :], r[first - past[0] :], effect, said)
-        before = done_before(term, h, Z, r, effect, decay, dt, first - past[0])
-        own = slice(first - past[0], None)
-        done = (h + r)[own] if said["theta"] != "any" else effect.most(h, Z, r)[own]
-        limit += left[own] @ (dt * done) + decay ** (k + 1.0 - first) * before
-        slope = dt * left[own] @ Z[own] if said["theta"] != "any" else 0.0
+        h, Z, r = effect.along(d, summed_frames)
+        check_stated_effect(
+            term,
+            h[first - summed_frames[0] :],
+            Z[first - summed_frames[0] :],
+            r[first - summed_frames[0] :],
+            effect,
+            said,
+        )
+        before = checked_effect_before(term, h, Z, r, effect, decay, dt, first - summed_frames[0])
+        written = slice(first - summed_frames[0], None)
+        done = (h + r)[written] if said["theta"] != "any" else effect.max_effect(h, Z, r)[written]
+        limit += weights[written] @ (dt * done) + decay ** (k + 1.0 - first) * before
+        slope = dt * weights[written] @ Z[written] if said["theta"] != "any" else 0.0
     else:
         require(not {"h", "Z", "r", "fault"} & set(term), "an alarm has no effect of a fault")
         slope = 0.0
-    check_copies(term, frames, slice(first, k + 1))
+    check_logged_values(term, frames, slice(first, k + 1))
     return np.array([value, limit, slope])
 
 
-def done_before(term, h, Z, r, effect, decay, dt, written):
+def checked_effect_before(term, h, Z, r, effect, decay, dt, written):
     """What the fault can have done to the filter before the frames that are written: as stated, and no less
     than the logged effects of the frames before add up to."""
     stated = term.get("fault", 0.0)
     known = np.isfinite(h[:written]) & np.isfinite(Z[:written])
     places = np.arange(written)[known]
-    most = effect.most(h[:written], Z[:written], r[:written])[known]
+    most = effect.max_effect(h[:written], Z[:written], r[:written])[known]
     least = float(dt * decay ** (written - 1.0 - places) @ most) if len(places) else 0.0
     require(stated >= least * (1 - 1e-9) - 1e-15, "the effect before the written frames is too small")
     return stated
 
 
-def check_effect(term, h, Z, r, effect, said):
+def check_stated_effect(term, h, Z, r, effect, said):
     """Where h, Z, r are stated they are those of the log; null where the fault adds only rounding."""
     for name, known in (("h", h), ("Z", Z), ("r", r)):
         for stated, value in zip(term.get(name, ()), known, strict=False):
-            require(stated is None or np.isclose(stated, value, 1e-9, LEAST_EFFECT_RAD_S2),
+            require(stated is None or np.isclose(stated, value, 1e-9, MIN_EFFECT_RAD_S2),
                     f"{name} is not that of the log")  # fmt: skip
     require(np.isfinite(h).all() and np.isfinite(Z).all() and np.isfinite(r).all(),
             "the log has no effect of this fault in these rows")  # fmt: skip
 
 
-def check_copies(term, frames, rows):
+def check_logged_values(term, frames, rows):
     """What stands in the log as well is the same; eta_bar is a published part and a rest of zero or more."""
-    for name in ("x", "F", "eta_bar"):
-        require(
-            np.allclose(term[name], getattr(frames, name)[rows], 1e-13, 0), f"{name} is not that of the log"
-        )
-    rest, eta_bar = np.array(term.get("rest", np.zeros((1, 3)))), frames.eta_bar[rows]
+    logged = {"x": frames.rates_rad_s, "F": frames.model_rad_s2, "eta_bar": frames.eta_bar_rad_s2}
+    for name, values in logged.items():
+        require(np.allclose(term[name], values[rows], 1e-13, 0), f"{name} is not that of the log")
+    rest, eta_bar = np.array(term.get("rest", np.zeros((1, 3)))), frames.eta_bar_rad_s2[rows]
     require((rest >= -1e-13 * eta_bar).all(), "rest: a part of a bound is below zero")
     require(
-        np.allclose(frames.published[rows] + rest, eta_bar, 3e-14, 0), "the declared bounds are not the log's"
+        np.allclose(frames.stated_bound_rad_s2[rows] + rest, eta_bar, 3e-14, 0),
+        "the declared bounds are not the log's",
     )
 
 
-# --- 7. The course of a surface (fault-types.md) -----------------------------------------------------
+# --- 7. The course of a surface (docs/explanation/certificates.md, "Types that pairs exclude") --------
 
 
-def course(said, frames, declared):
+def course_pairs(said, frames, declared):
     """Pairs (what must be more, than what) that a fault type forbids, from where frames say the surface was.
 
-    In each frame |nu.d - h - theta Z| <= most.|d| + r bounds the deflection theta from below where Z > 0,
+    In each frame |nu.d - h - theta Z| <= most.|d| + r bounds the position theta from below where Z > 0,
     from above where Z < 0. Downwards is upwards with every sign of theta turned.
     """
-    effect = effect_of(said["what"], frames)
-    surface, _, kind = said["what"].partition(" ")
+    effect, surface = effect_of_fault(said["what"], frames), said["what"].partition(" ")[0]
+    comparison, stop = course_of(said["what"], frames.log) or (None, 0)
+    require(comparison is not None, "this is no type with a course")
     low: dict = {}
     high: dict = {}
     signs = set()
     for bound in said["bounds"]:
         for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
-            theta, command, sign = deflection(bound, place, k, frames, effect)
+            theta, command, sign = position_bound(bound, place, k, frames, effect)
             signs.add(sign)
             (low if bound["Z"][place] > 0 else high)[k] = theta, command
     require(len(signs) == 1, "a surface deflects one way")
@@ -581,31 +705,31 @@ def course(said, frames, declared):
     require(
         low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
     )
-    require(len(high) == (kind != "oscillatory"), "one frame bounds the deflection from above")
+    require(len(high) == (comparison != "swing"), "one frame bounds the deflection from above")
     first, last = min(low), max(low)
     above = next(iter(high), first)
     reached, commanded = np.array([low[k] for k in sorted(low)]).T
     most, most_command = high.get(above, (np.nan, np.nan))
-    ends = sorted((sign * effect.low, sign * effect.high))
-    if kind.startswith("bias"):
+    ends = sorted((sign * effect.theta_low, sign * effect.theta_high))
+    if comparison in ("offset", "growing_offset"):
         stops = said["stops"]
         require(len(stops) == 2 and stops[0] >= ends[0] - 1e-12 and stops[1] <= ends[1] + 1e-12, "stops")
         pairs = [(reached[0] - commanded[0], most - most_command), (reached[0], stops[0]), (stops[1], most)]
-        if kind == "bias that grows":
+        if comparison == "growing_offset":
             pairs = [(reached[0] - commanded[0], 0.0), *pairs, (above, first)]
         return pairs
-    if kind in ("hardover up", "hardover down"):
-        require(sign == (1 if kind == "hardover up" else -1), "the surface runs the other way")
+    if comparison == "runaway":
+        require(sign == stop, "the surface runs the other way")
         require(said["stops"] == [ends[1]], "the stop is not that of the log")
         rate = radians(declared.scenario["actuators"][surface]["rate_limit_deg_s"]) or pi / 3
         require(np.isclose(said["pace_rad_s"], rate / 2, 1e-12, 0), "pace_rad_s is not half the rate limit")
-        went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late)
+        went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late_frames)
         return [(ends[1], most), (above, first), (went, most)]
-    if kind == "oscillatory":
+    if comparison == "swing":
         slowest = declared.scenario["fdi"]["slowest_oscillation_rad_s"]
         require(said["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
         return [(last - first, pi / slowest / frames.dt), (reached.min(), 0.0), (reached.sum(), 0.0)]
-    require(kind == "rate_limit" and above == first, f"{kind} is no type with a course")
+    require(comparison == "approach" and above == first, f"{comparison} is no known course")
     require(len(said["ordered"]) == len(reached), "ordered: frames are missing")
     require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
     ahead = reached - said["ordered"]
@@ -614,28 +738,28 @@ def course(said, frames, declared):
             (1.0, 0.0)]  # fmt: skip
 
 
-def deflection(bound, place, k, frames, effect):
+def position_bound(bound, place, k, frames, effect):
     """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned."""
-    require(k < len(frames.x) and frames.shows[k], "health explains a frame")
+    require(k < len(frames.rates_rad_s) and frames.is_unexplained[k], "health explains a frame")
     d = np.array(bound["d"])
     h, Z, r = (bound[name][place] for name in "hZr")
     known_h, known_Z, known_r = (float(values[0]) for values in effect.along(d, slice(k, k + 1)))
     same = [np.isclose(h, known_h, 1e-9, 1e-12), np.isclose(abs(Z), abs(known_Z), 1e-9, 1e-12)]
     require(all(same) and np.isclose(r, known_r, 1e-9, 1e-12), "h, Z or r is not that of the log")
-    theta = (frames.nu[k] @ d - h - frames.most[k] @ np.abs(d) - r) / Z
+    theta = (frames.innovation_rad_s2[k] @ d - h - frames.innovation_bound_rad_s2[k] @ np.abs(d) - r) / Z
     return theta, -h / Z, int(np.sign(Z * known_Z))
 
 
-# --- 8. A statistical alarm (theory.md, section 7) ---------------------------------------------------
+# --- 8. A statistical alarm (docs/explanation/certificates.md, "A statistical alarm") -----------------
 
 
-def likelihood(said, frames, declared):
+def likelihood_pairs(said, frames, declared):
     """Evidence against its limit; and the log's share of the level against the ratio of the two.
 
-    N = sum w.g and D = sum w.g_s, see `whitened`; limit: max(z sqrt D, room + z/2 sqrt D).
+    N = sum w.g and D = sum w.g_s, see `whitened_sums`; limit: max(z sqrt D, room + z/2 sqrt D).
     """
     check_level(said, declared)
-    (N, D, *of_constants, foreseen), room = whitened(said, frames)
+    (N, D, *of_constants, foreseen), room = whitened_sums(said, frames)
     require(D >= 0, "the evidence has a negative variance")
     evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
     if of_constants:
@@ -659,26 +783,26 @@ def check_level(said, declared):
     require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
 
 
-def whitened(said, frames):
+def whitened_sums(said, frames):
     """Sums over the frames of w.g for each column g, and the room that a bounded drift needs.
 
     A Kalman filter with the stated variances whitens the columns of Y: innovation, signature g_s, constants.
     It has two states for each axis, a value and its drift. w = S^-1 g_s, S: covariance of the innovation.
     """
     dt, axes, n = frames.dt, said["axes"], len(said["axes"])
-    Y, P, R = (with_zeros(said[name]) for name in ("Y", "P", "R"))
+    Y, P, R = (array_with_zeros(said[name]) for name in ("Y", "P", "R"))
     values, drifts = slice(None, n), slice(n, None)
     sums, stayed, swung, paced = 0.0, 0.0, 0.0, 0.0
     w, last_swing = np.zeros(n), 0.0
     for k, its in enumerate(said["frames"], said["first"]):
         # Prediction: the frame's inputs come in, and the drift forgets a part of itself.
-        innovation = frames.nu[k, axes] - its.get("air", 0)
+        innovation = frames.innovation_rad_s2[k, axes] - its.get("air", 0)
         inputs = np.stack([innovation, its["signature"], *its.get("known", [])], 1)
         forgets = 1 - its.get("keep", 1)
-        step = np.kron([[1, dt], [0, 1 - forgets]], np.eye(n))
+        transition = np.kron([[1, dt], [0, 1 - forgets]], np.eye(n))
         noise = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
-        Y = step @ Y + dt * np.eye(2 * n, n) @ inputs
-        P = step @ (P + noise) @ step.T
+        Y = transition @ Y + dt * np.eye(2 * n, n) @ inputs
+        P = transition @ (P + noise) @ transition.T
         # Weights of this frame's innovation.
         inverse = np.linalg.inv(P[values, values] + np.diag(R))
         K = P[:, values] @ inverse
@@ -696,25 +820,28 @@ def whitened(said, frames):
     return np.asarray(sums), stayed + min(swung + last_swing, paced)
 
 
-def with_zeros(values):
+def array_with_zeros(values):
     """An array of a list, or of a list of lists, null as 0."""
-    return np.array([with_zeros(one) if isinstance(one, list) else one or 0.0 for one in values])
+    return np.array([array_with_zeros(one) if isinstance(one, list) else one or 0.0 for one in values])
 
 
-def like_the_alarm(said, about, frames):
+def check_exclusion_by_alarm(said, document, frames):
     """The statistical alarm came on axes that this fault does not move: that excludes it."""
-    alarm = about["statements"][0]
+    alarm = document["statements"][0]
     require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
     require(alarm["frame"] <= said["frame"] and said["what"] is not None, "the alarm came later")
-    effect, rows = effect_of(said["what"], frames), slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1)
+    effect, rows = (
+        effect_of_fault(said["what"], frames),
+        slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1),
+    )
     moved = np.abs([effect.offset[rows], effect.slope[rows], effect.spread[rows]])[..., alarm["axes"]]
     require(moved.max() == 0, "this fault moves the axes of the alarm")
 
 
-# --- 9. An alarm between instruments (theory.md, section 9) ------------------------------------------
+# --- 9. An alarm between instruments (docs/explanation/certificates.md, same heading) ----------------
 
 
-def instruments(said, log):
+def instrument_sides(said, log):
     """Residual and bound of the test; the log's share in that row is at least as large."""
     require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
     k = said["frame"]
@@ -736,55 +863,60 @@ def instruments(said, log):
 # --- 10. All statements ----------------------------------------------------------------------------------
 
 
-def check_statement(said, about, log, declared):
+def check_statement(said, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
     check_statement_form(said)
     check_event(said, log)
-    kind = kind_of(said)
-    frames = Frames(about, log, declared, said.get("block"))
+    kind = evidence_kind(said)
+    frames = Frames(document, log, declared, said.get("block"))
     if kind == "as":
-        like_the_alarm(said, about, frames)
+        check_exclusion_by_alarm(said, document, frames)
         return
     if kind == "terms":
-        pairs = [sum_of_terms(said, frames, declared)]
+        pairs = [sides_of_terms(said, frames, declared)]
     elif kind == "bounds":
-        pairs = course(said, frames, declared)
+        pairs = course_pairs(said, frames, declared)
     elif kind == "likelihood":
-        pairs = likelihood(said, frames, declared)
+        pairs = likelihood_pairs(said, frames, declared)
     else:
-        pairs = [instruments(said, log)]
+        pairs = [instrument_sides(said, log)]
     stated = said["sides"] if kind in ("bounds", "likelihood") else [[side] for side in said["sides"]]
     sides = np.array(pairs, float).T
     require(np.isfinite(sides).all() and sides.shape == np.shape(stated), "the sides are no numbers")
     least = 1e-10 * np.abs(sides).max(axis=0) if kind == "terms" else 0.0
     require((sides[0] > sides[1] + least).all(), f"{sides[0][0]:.6g} is not more than {sides[1][0]:.6g}")
-    require(np.allclose(sides, stated, SAME, 0), "the stated sides are not the recomputed ones")
+    require(
+        np.allclose(sides, stated, MAX_RELATIVE_DIFFERENCE, 0), "the stated sides are not the recomputed ones"
+    )
 
 
-def digest(about):
+def digest(document):
     """SHA-256 of the certificate without its own digest, keys sorted, no spaces."""
-    plain = dumps(about | {"digest": ""}, sort_keys=True, separators=(",", ":"))
+    plain = dumps(document | {"digest": ""}, sort_keys=True, separators=(",", ":"))
     return sha256(plain.encode()).hexdigest()
 
 
-def failures(about, log, scenario=""):
+def failures(document, log, scenario=""):
     """A sentence for each reason to refuse; log: column -> values, scenario: the text of scenario.yaml."""
     try:
-        check_form(about, DOCUMENT, IF_STATED, "certificate")
-        require(about["format"] == FORMAT, f"this checker reads format {FORMAT}, not {about['format']}")
-        require(digest(about) == about["digest"],
+        check_form(document, CERTIFICATE_FIELDS, OPTIONAL_CERTIFICATE_FIELDS, "certificate")
+        require(
+            document["format"] == FORMAT_VERSION,
+            f"this checker reads format {FORMAT_VERSION}, not {document['format']}",
+        )
+        require(digest(document) == document["digest"],
                 "SHA-256 does not match: the file was edited, or belongs to another log")  # fmt: skip
         rows = len(log["t_s"])
-        another = f"the log has {rows} rows, not {about['rows']}: the certificate belongs to another log"
-        require(rows == about["rows"], another)
+        another = f"the log has {rows} rows, not {document['rows']}: the certificate belongs to another log"
+        require(rows == document["rows"], another)
         another = "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight"
-        require(sha256(scenario.encode()).hexdigest() == about["scenario_sha256"], another)
-        if not about["statements"]:
+        require(sha256(scenario.encode()).hexdigest() == document["scenario_sha256"], another)
+        if not document["statements"]:
             return
-        events = [said.get("frame") for said in about["statements"]]
-        require(all(map(row, events)), "statement: the field frame is missing, or no row")
-        declared = declared_in(yaml.safe_load(scenario), min(events))
-        check_declared(about, declared)
+        events = [said.get("frame") for said in document["statements"]]
+        require(all(map(is_row, events)), "statement: the field frame is missing, or no row")
+        declared = declared_at_row(yaml.safe_load(scenario), min(events))
+        check_declared(document, declared)
         times = np.asarray(log["t_s"], float)
         require(np.allclose(times, np.arange(rows) * declared.dt, 0, 1e-6),
                 "dt_s: the log's rows are not that far apart")  # fmt: skip
@@ -794,25 +926,28 @@ def failures(about, log, scenario=""):
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, yaml.YAMLError) as why:
         yield f"certificate, log and scenario do not fit together: {type(why).__name__}: {why}"
         return
-    for said in about["statements"]:
+    for said in document["statements"]:
         try:
-            check_statement(said, about, log, declared)
+            check_statement(said, document, log, declared)
         except Refused as why:
-            yield f"{name_of(said)}: {why}"
+            yield f"{statement_name(said)}: {why}"
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as why:
-            yield f"{name_of(said)}: the numbers do not fit the log: {type(why).__name__}: {why}"
+            yield f"{statement_name(said)}: the numbers do not fit the log: {type(why).__name__}: {why}"
 
 
-def name_of(said):
+def statement_name(said):
     """What a statement is about, in words."""
     what = said.get("what")
     return "alarm" if what is None else f"{what} excluded"
 
 
-def sentences(about, log):
+def sentences(document, log):
     """What the certificate states, a sentence for each statement."""
-    for said in about["statements"]:
-        at = f"{name_of(said)} at {log['t_s'][said['frame']]:.3f} s (row {said['frame']})"
+    for said in document["statements"]:
+        at = f"{statement_name(said)} at {log['t_s'][said['frame']]:.3f} s (row {said['frame']})"
+        kind = (said.get("what") or "").partition(" ")[2]
+        if kind and kind not in {*RELATIONS, *COURSES}:
+            at += f", {kind} being what the log defines"
         if "as" in said:
             yield f"{at}: the statistical alarm came on axes that this fault does not move"
         elif "missing" in said:
@@ -828,7 +963,7 @@ def sentences(about, log):
             yield f"{at}: {value:.4g}{unit} is more than {limit:.4g}{unit}, the most that bounds allow"
 
 
-def no_constant(name):
+def refuse_json_constant(name):
     """JSON has no NaN and no infinity."""
     raise ValueError(f"{name} is no number of JSON")
 
@@ -841,14 +976,14 @@ def check(certificate, log=None, scenario=None):
     file = Path(certificate, "certificate.json") if Path(certificate).is_dir() else Path(certificate)
     log = Path(log) if log else file.parent / "log.parquet"
     scenario = Path(scenario) if scenario else log.parent / "scenario.yaml"
-    about = loads(file.read_text(encoding="utf-8"), parse_constant=no_constant)
-    require(isinstance(about, dict), f"{file}: this is no certificate")
+    document = loads(file.read_text(encoding="utf-8"), parse_constant=refuse_json_constant)
+    require(isinstance(document, dict), f"{file}: this is no certificate")
     table = read_table(log)
     columns = {name: table[name].to_numpy() for name in table.column_names}
-    why = list(failures(about, columns, scenario.read_text(encoding="utf-8")))
-    said = [] if why else list(sentences(about, columns))
+    why = list(failures(document, columns, scenario.read_text(encoding="utf-8")))
+    said = [] if why else list(sentences(document, columns))
     said += (
-        [f"not certified: {name_of(one)}: {one.get('because')}" for one in about["without"]]
+        [f"not certified: {statement_name(one)}: {one.get('because')}" for one in document["without"]]
         if not why
         else []
     )

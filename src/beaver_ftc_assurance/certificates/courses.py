@@ -1,7 +1,9 @@
-"""Exclusions of fault types by their course: what single frames say of where the surface was, compared.
+"""Exclusions of fault types by their course: bounds of single frames on the surface's position, compared.
 
-In each frame that health does not explain the surface was between two bounds; a type forbids some of what
-they say together (theory.md, section 4). A rule has the surface `Seen`, and yields what it finds.
+Each frame that health does not explain bounds the surface's position from below, or above; a fault type
+forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and yields what it finds: pairs
+(greater, less), where the type requires greater <= less. The pairs of each rule, in order, are Table 10 of
+docs/explanation/certificates.md, "Types that pairs exclude".
 """
 
 from collections.abc import Callable, Iterator
@@ -11,227 +13,298 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.diagnosis import Actuator, TypesConfig
-from beaver_ftc.diagnosis.types import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
+from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis import Actuator, FaultTypesConfig
 from beaver_ftc.scenario import Scenario
-from beaver_ftc_assurance.certificates.inequality import Document, History, Hypothesis, by_each_frame
-from beaver_ftc_assurance.certificates.kinds import wrong
+from beaver_ftc_assurance.certificates.inequality import (
+    Document,
+    History,
+    Hypothesis,
+    theta_bounds_by_frame,
+)
+from beaver_ftc_assurance.certificates.kinds import is_unexplained_by_health
 from beaver_ftc_assurance.certificates.tape import Tape
 
-_LEAST = 1e-9  # rad: by less no two positions are compared
-Pair = tuple[float, float]  # what must be more, than what
+MIN_POSITION_DIFFERENCE_RAD = 1e-9  # two positions that differ by less are not compared
+Pair = tuple[float, float]  # greater, less: rad, or frames
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Where a surface was by frame from `first` on, by axis `least` to `most` (frames, 3), rad; mirrored by
-    sign -1, so that a type needs one rule.
+class SurfaceBounds:
+    """Bounds on a surface's position p, and its commands, in frames first_frame, first_frame + 1, ...; rad.
 
-    command: where a healthy one was; commands (frames, 3): by each axis, which has a mean of its own where
-    the effectiveness changes within the frame; room (frames, 2): how far below and above that within the
-    frame, of several instants. wrong: health explains nothing. ordered: what it was told, at most. stops: low
-    and high. slowest_rad_s: of an oscillation.
+    For sign -1 all positions, commands and stops are multiplied by -1, so that a type needs one rule. Shapes,
+    with n frames and the axes p, q, r:
+
+    lower, upper (n, 3): bounds on p by the innovation of one axis; infinite where that axis bounds nothing.
+    command (n,): position of a healthy surface, as the axis on which the surface acts most has it.
+    axis_commands (n, 3): the same as each axis has it; they differ if the effectiveness changes in a frame.
+    command_range (n, 2): how far below and above `command` the commands of the frame's instants reach, >= 0.
+    is_unexplained (n,): health does not explain the frame. max_order (n,): largest command in effect in the
+    frame. stops (2,): low and high end of travel. slowest_oscillation_rad_s: angular frequency.
     """
 
-    first: int
+    first_frame: int
     sign: int
-    least: np.ndarray
-    most: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
     command: np.ndarray
-    commands: np.ndarray
-    room: np.ndarray
-    wrong: np.ndarray
-    ordered: np.ndarray
+    axis_commands: np.ndarray
+    command_range: np.ndarray
+    is_unexplained: np.ndarray
+    max_order: np.ndarray
     stops: np.ndarray
-    slowest_rad_s: float
+    slowest_oscillation_rad_s: float
 
     @cached_property
-    def low(self) -> np.ndarray:
-        """By all axes."""
-        return np.asarray(self.least.max(axis=1))
+    def largest_lower(self) -> np.ndarray:
+        """Largest lower bound over the axes, (n,) rad."""
+        return np.asarray(self.lower.max(axis=1))
 
     @cached_property
-    def high(self) -> np.ndarray:
-        """By all axes."""
-        return np.asarray(self.most.min(axis=1))
+    def smallest_upper(self) -> np.ndarray:
+        """Smallest upper bound over the axes, (n,) rad."""
+        return np.asarray(self.upper.min(axis=1))
 
-    def off_command(self) -> tuple[np.ndarray, np.ndarray]:
-        """How far off its command it was, at least and at most; unlimited at the stop that may hide it."""
-        least = self.wrong & (self.low - self.room[:, 0] > self.stops[0] + _LEAST)
-        most = self.wrong & (self.high + self.room[:, 1] < self.stops[1] - _LEAST)
-        low = np.where(least, self.low - self.command, -np.inf)
-        return low, np.where(most, self.high - self.command, np.inf)
+    def offset_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound (n,) on p - command, rad; infinite where a stop may hide an offset."""
+        above_low_stop = self.largest_lower - self.command_range[:, 0] > (
+            self.stops[0] + MIN_POSITION_DIFFERENCE_RAD
+        )
+        below_high_stop = self.smallest_upper + self.command_range[:, 1] < (
+            self.stops[1] - MIN_POSITION_DIFFERENCE_RAD
+        )
+        lower = np.where(self.is_unexplained & above_low_stop, self.largest_lower - self.command, -np.inf)
+        upper = np.where(self.is_unexplained & below_high_stop, self.smallest_upper - self.command, np.inf)
+        return lower, upper
 
-    def since(self, beyond: np.ndarray) -> np.ndarray:
-        """Of each frame the first of the unbroken run of frames `beyond` that it ends; one later if none."""
-        places = np.arange(len(beyond))
-        return np.maximum.accumulate(np.where(beyond, 0, places + 1))
+
+def run_starts(flags: np.ndarray) -> np.ndarray:
+    """For each frame k of flags (n,): the first frame of the unbroken run of flags that ends with k; k + 1 if
+    the flag of k is not set."""
+    places = np.arange(len(flags))
+    return np.maximum.accumulate(np.where(flags, 0, places + 1))
 
 
 @dataclass(frozen=True)
-class Found:
-    """Frames whose bounds from below are compared, by which axis, and the one whose bound from above is."""
+class Exclusion:
+    """What a rule has found: frames whose lower bounds are compared, by number from first_frame on, and by
+    which axis, None for the one with the largest; the frame whose upper bound is compared, None if there is
+    none; the pairs; and further fields of the statement."""
 
-    run: range
-    beside: int | None
-    compared: list[Pair]
-    said: Document = field(default_factory=dict)
-    axis: int | None = None  # None: the one that says most
-
-
-def _bias(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
-    """One offset: at least what one frame says, and less by another."""
-    low, high = seen.off_command()
-    i, j = int(np.argmax(low)), int(np.argmin(high))
-    if low[i] > high[j] + _LEAST:
-        yield from _offsets(seen, i, j)
+    lower_frames: range
+    upper_frame: int | None
+    pairs: list[Pair]
+    fields: Document = field(default_factory=dict)
+    axis: int | None = None
 
 
-def _growing(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
-    """Of one sign, and smaller than it was."""
-    low, high = seen.off_command()
-    for j in np.flatnonzero(high < np.inf).tolist():
-        i = int(np.argmax(low[: j + 1]))
-        if i < j and low[i] > max(high[j], 0.0) + _LEAST:
-            for found in _offsets(seen, i, j):
-                (off, _), frames = found.compared[0], (seen.first + j, seen.first + i)
-                if off > 0.0:
-                    yield replace(found, compared=[(off, 0.0), *found.compared, frames])
+def _exclude_offset(
+    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig
+) -> Iterator[Exclusion]:
+    """A constant offset: its lower bound by one frame exceeds its upper bound by another."""
+    lower, upper = bounds.offset_bounds()
+    i, j = int(np.argmax(lower)), int(np.argmin(upper))
+    if lower[i] > upper[j] + MIN_POSITION_DIFFERENCE_RAD:
+        yield from _compare_offsets(bounds, i, j)
+
+
+def _exclude_growing_offset(
+    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig
+) -> Iterator[Exclusion]:
+    """An offset that only grows, and keeps its sign: a positive one is smaller in a later frame."""
+    lower, upper = bounds.offset_bounds()
+    for j in np.flatnonzero(upper < np.inf).tolist():
+        i = int(np.argmax(lower[: j + 1]))
+        if i < j and lower[i] > max(upper[j], 0.0) + MIN_POSITION_DIFFERENCE_RAD:
+            for found in _compare_offsets(bounds, i, j):
+                (offset, _), frames = found.pairs[0], (bounds.first_frame + j, bounds.first_frame + i)
+                if offset > 0.0:
+                    yield replace(found, pairs=[(offset, 0.0), *found.pairs, frames])
             return
 
 
-def _offsets(seen: Seen, i: int, j: int) -> Iterator[Found]:
-    """Two offsets, away from the stops: these as far as the command comes near them within the frames."""
-    commands = seen.commands[i, seen.least[i].argmax()], seen.commands[j, seen.most[j].argmin()]
-    low, high = seen.stops[0] + seen.room[i, 0], seen.stops[1] - seen.room[j, 1]
-    off = seen.low[i] - commands[0], seen.high[j] - commands[1]
-    pairs = [off, (seen.low[i], low), (high, seen.high[j])]
-    if off[0] > off[1]:
-        yield Found(range(i, i + 1), j, pairs, {"stops": [float(low), float(high)]})
+def _compare_offsets(bounds: SurfaceBounds, i: int, j: int) -> Iterator[Exclusion]:
+    """The offsets of frames i and j, away from the stops, which are nearer by the range of the command."""
+    commands = (
+        bounds.axis_commands[i, bounds.lower[i].argmax()],
+        bounds.axis_commands[j, bounds.upper[j].argmin()],
+    )
+    low_stop = bounds.stops[0] + bounds.command_range[i, 0]
+    high_stop = bounds.stops[1] - bounds.command_range[j, 1]
+    offsets = bounds.largest_lower[i] - commands[0], bounds.smallest_upper[j] - commands[1]
+    pairs = [offsets, (bounds.largest_lower[i], low_stop), (high_stop, bounds.smallest_upper[j])]
+    if offsets[0] > offsets[1]:
+        yield Exclusion(range(i, i + 1), j, pairs, {"stops": [float(low_stop), float(high_stop)]})
 
 
-def _runaway(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
-    """Less far than its least rate takes it; of several instants, by the frame before."""
-    pace, stop = actuator.least_runaway_rad_s, seen.stops[1]
-    step, late = pace * config.block_s, int(not config.single_instant)
-    began = np.where(seen.wrong, seen.low - step * np.arange(len(seen.low)), -np.inf)
-    for j in np.flatnonzero(seen.wrong & (seen.high < stop - _LEAST)).tolist():
-        if j <= late:
+def _exclude_runaway(
+    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig
+) -> Iterator[Exclusion]:
+    """A runaway at its least rate or faster: a later frame shows less travel. In a frame of several instants
+    the lower bound may hold from its last instant on only: a frame less counts."""
+    rate, high_stop = actuator.min_runaway_rate_rad_s, bounds.stops[1]
+    step, late_frames = rate * config.block_duration_s, int(not config.is_single_instant)
+    # lower bound of each frame, traced back to frame 0 at the least rate
+    traced_back = np.where(
+        bounds.is_unexplained,
+        bounds.largest_lower - step * np.arange(len(bounds.largest_lower)),
+        -np.inf,
+    )
+    below_stop = bounds.smallest_upper < high_stop - MIN_POSITION_DIFFERENCE_RAD
+    for j in np.flatnonzero(bounds.is_unexplained & below_stop).tolist():
+        if j <= late_frames:
             continue
-        i = int(np.argmax(began[: j - late]))
-        reached = seen.low[i] + step * (j - i - late)
-        if seen.wrong[i] and reached > seen.high[j] + _LEAST:
-            pairs = [(stop, seen.high[j]), (seen.first + j, seen.first + i), (reached, seen.high[j])]
-            yield Found(range(i, i + 1), j, pairs, {"stops": [float(stop)], "pace_rad_s": pace})
+        i = int(np.argmax(traced_back[: j - late_frames]))
+        reached, upper = bounds.largest_lower[i] + step * (j - i - late_frames), bounds.smallest_upper[j]
+        if bounds.is_unexplained[i] and reached > upper + MIN_POSITION_DIFFERENCE_RAD:
+            frames = bounds.first_frame + j, bounds.first_frame + i
+            pairs = [(high_stop, upper), frames, (reached, upper)]
+            yield Exclusion(range(i, i + 1), j, pairs, {"stops": [float(high_stop)], "pace_rad_s": rate})
             return
 
 
-def _swing(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
-    """On one side for longer than half of the slowest oscillation."""
-    for axis, low in enumerate(seen.least.T):
-        begins = seen.since(seen.wrong & (low > seen.command + _LEAST))
-        for k in np.flatnonzero(np.arange(len(begins)) - begins > config.half_cycle_frames)[:1].tolist():
-            run = range(int(begins[k]), k + 1)
-            slowest = pi / seen.slowest_rad_s / config.dt_s
-            pairs = [(k - run[0], slowest), *_beyond(low - seen.command, run)]
-            yield Found(run, None, pairs, {"slowest_rad_s": seen.slowest_rad_s}, axis)
+def _exclude_oscillation(
+    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig
+) -> Iterator[Exclusion]:
+    """An oscillation about the command: the surface is on one side of it for longer than half of the slowest
+    period."""
+    for axis, lower in enumerate(bounds.lower.T):
+        starts = run_starts(bounds.is_unexplained & (lower > bounds.command + MIN_POSITION_DIFFERENCE_RAD))
+        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.slowest_half_cycle_frames)[
+            :1
+        ].tolist():
+            run = range(int(starts[k]), k + 1)
+            half_period_frames = pi / bounds.slowest_oscillation_rad_s / config.dt_s
+            pairs = [(k - run[0], half_period_frames), *_positive_pairs(lower - bounds.command, run)]
+            yield Exclusion(run, None, pairs, {"slowest_rad_s": bounds.slowest_oscillation_rad_s}, axis)
 
 
-def _slow(seen: Seen, actuator: Actuator, config: TypesConfig) -> Iterator[Found]:
-    """Further away from all that it was ordered to than one can be that comes nearer at its least pace, until
-    its lag makes the steps smaller."""
-    step = actuator.slowest_step_rad
-    least, close = config.instants * config.block_frames * step, step / actuator.approach
-    for axis, low in enumerate(seen.least.T):
-        beyond = seen.wrong & (low > seen.ordered + _LEAST)
-        begins, comes = seen.since(beyond), seen.high + least * np.arange(len(low))
-        for k in np.flatnonzero(beyond & (begins < np.arange(len(low)))).tolist():
-            i = int(begins[k]) + int(np.argmin(comes[begins[k] : k]))
-            run, top = range(i, k + 1), seen.high[i] - least * (k - i - 1)
-            near = float(seen.ordered[i : k + 1].max()) + close
-            if low[k] > max(top, near) + _LEAST:
-                said = {"ordered": seen.ordered[i : k + 1].tolist(), "near": near}
-                said |= {"step": least} if k - i > 1 else {}
-                pairs = [*_beyond(low - seen.ordered, run), (low[k], top), (low[k], near), (1.0, 0.0)]
-                yield Found(run, i, pairs, said, axis)
+def _exclude_rate_limit(
+    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig
+) -> Iterator[Exclusion]:
+    """A surface that approaches its order by its least step in every instant, until its lag makes the steps
+    smaller: in a run of frames beyond all orders, a later one shows a position farther away."""
+    min_step = actuator.min_motion_per_substep_rad
+    min_approach = config.n_substeps * config.frames_per_block * min_step  # of a frame, rad
+    lag_distance = (
+        min_step / actuator.lag_share_per_substep
+    )  # from the order, within which the steps are smaller
+    for axis, lower in enumerate(bounds.lower.T):
+        is_beyond = bounds.is_unexplained & (lower > bounds.max_order + MIN_POSITION_DIFFERENCE_RAD)
+        starts = run_starts(is_beyond)
+        # upper bound of each frame, traced back to frame 0 at the least approach
+        traced_back = bounds.smallest_upper + min_approach * np.arange(len(lower))
+        for k in np.flatnonzero(is_beyond & (starts < np.arange(len(lower)))).tolist():
+            i = int(starts[k]) + int(np.argmin(traced_back[starts[k] : k]))
+            run, upper = range(i, k + 1), bounds.smallest_upper[i] - min_approach * (k - i - 1)
+            near = float(bounds.max_order[i : k + 1].max()) + lag_distance
+            if lower[k] > max(upper, near) + MIN_POSITION_DIFFERENCE_RAD:
+                fields = {"ordered": bounds.max_order[i : k + 1].tolist(), "near": near}
+                fields |= {"step": min_approach} if k - i > 1 else {}
+                beyond = _positive_pairs(lower - bounds.max_order, run)
+                yield Exclusion(
+                    run, i, [*beyond, (lower[k], upper), (lower[k], near), (1.0, 0.0)], fields, axis
+                )
                 return
 
 
-def _beyond(ahead: np.ndarray, run: range) -> list[Pair]:
-    """In every frame of the run by more than nothing."""
-    here = ahead[run[0] : run[-1] + 1]
-    return [(here.min(), 0.0), (here.sum(), 0.0)]
+def _positive_pairs(distance: np.ndarray, run: range) -> list[Pair]:
+    """Pairs that hold if the distance is positive in every frame of the run: the smallest, and the sum."""
+    of_run = distance[run[0] : run[-1] + 1]
+    return [(of_run.min(), 0.0), (of_run.sum(), 0.0)]
 
 
-# By the type in words; a type without a rule is not certified by its course.
-RULES: dict[str, Callable[[Seen, Actuator, TypesConfig], Iterator[Found]]] = {
-    "hardover up": _runaway, "hardover down": _runaway, "bias": _bias, "bias that grows": _growing,
-    "oscillatory": _swing, "rate_limit": _slow,
+# By the course that a type's row names.
+RULES: dict[str, Callable[[SurfaceBounds, Actuator, FaultTypesConfig], Iterator[Exclusion]]] = {
+    "runaway": _exclude_runaway, "offset": _exclude_offset, "growing offset": _exclude_growing_offset,
+    "swing": _exclude_oscillation, "approach": _exclude_rate_limit,
 }  # fmt: skip
 
 
-def excludes(
-    scenario: Scenario, tape: Tape, history: History, of: Hypothesis, s: int, kind: int, alarm: int
+def statement_by_course(
+    scenario: Scenario,
+    tape: Tape,
+    history: History,
+    held: Hypothesis,
+    surface: int,
+    fault_type: int,
+    alarm_frame: int,
 ) -> Document | None:
-    """What excludes a type on surface s by its course; None where single frames do not.
+    """The statement that excludes a fault type on a surface by its course; None where single frames do not.
 
-    of: that the surface is held somewhere, theta.
+    held: the hypothesis that the surface is held at a position theta, rad, by which frames bound it.
     """
     diagnosis = tape.last.diagnosis
-    direction = TYPES[kind].direction
+    direction, actuator = TYPES[fault_type].stop_direction, diagnosis.surface_fault_types[surface].actuator
+    rule, slowest_rad_s = (
+        RULES[TYPES[fault_type].excluding_comparison],
+        scenario.fdi.slowest_oscillation_rad_s,
+    )
     for sign in (direction,) if direction else (1, -1):
-        seen = _seen(tape, history, of, s, alarm, sign, scenario.fdi.slowest_oscillation_rad_s)
-        for found in RULES[WORDS[kind]](seen, diagnosis.surfaces[s].actuator, diagnosis.types_config):
-            return _written(found, seen, of)
+        bounds = _surface_bounds(tape, history, held, surface, alarm_frame, sign, slowest_rad_s)
+        for found in rule(bounds, actuator, diagnosis.types_config):
+            return _statement(found, bounds, held)
     return None
 
 
-def _seen(
-    tape: Tape, history: History, of: Hypothesis, s: int, alarm: int, sign: int, slowest_rad_s: float
-) -> Seen:
-    """The frames from the alarm on that the types have judged."""
-    frames = np.arange(alarm, tape.end - 1)
-    here, whole = slice(alarm - tape.first, tape.end - 1 - tape.first), history.share == 1.0
-    least, most, _ = by_each_frame(of, history, frames)
+def _surface_bounds(
+    tape: Tape,
+    history: History,
+    held: Hypothesis,
+    surface: int,
+    alarm_frame: int,
+    sign: int,
+    slowest_rad_s: float,
+) -> SurfaceBounds:
+    """The bounds of the frames from the alarm on that the diagnosis has tested types with."""
+    frames = np.arange(alarm_frame, tape.end - 1)
+    here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
+    is_single_instant = history.instant_share == 1.0
+    lower, upper, _ = theta_bounds_by_frame(held, history, frames)
     if sign < 0:
-        least, most = -most, -least
-    slope = of.slope[here]
-    commands = -sign * of.offset[here] / np.where(slope == 0.0, np.inf, slope)
-    command = commands[:, np.abs(slope).sum(axis=0).argmax()]
-    told = tape.command_high if sign > 0 else -tape.command_low
-    reach = np.column_stack([tape.least[here, s, 0], tape.greatest[here, s, 0]])[:, ::sign] * sign
-    room = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not whole)
-    actuator = tape.last.diagnosis.surfaces[s].actuator
+        lower, upper = -upper, -lower
+    slope = held.slope[here]
+    axis_commands = -sign * held.offset[here] / np.where(slope == 0.0, np.inf, slope)
+    command = axis_commands[:, np.abs(slope).sum(axis=0).argmax()]
+    orders = tape.command_high if sign > 0 else -tape.command_low
+    reach = np.column_stack([tape.least[here, surface, 0], tape.greatest[here, surface, 0]])[:, ::sign] * sign
+    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * (not is_single_instant)
+    actuator = tape.last.diagnosis.surface_fault_types[surface].actuator
     stops = np.sort(sign * np.array([actuator.travel_low_rad, actuator.travel_high_rad]))
-    judged = slice(here.start + 1, here.stop + 1)
-    ordered = np.maximum(told[judged, s, 2], told[judged, s, 2 if whole else 1])
-    shows = wrong(history, frames)
-    return Seen(alarm, sign, least, most, command, commands, room, shows, ordered, stops, slowest_rad_s)
+    next_frames = slice(here.start + 1, here.stop + 1)
+    max_order = np.maximum(
+        orders[next_frames, surface, 2], orders[next_frames, surface, 2 if is_single_instant else 1]
+    )
+    is_unexplained = is_unexplained_by_health(history, frames)
+    return SurfaceBounds(
+        alarm_frame, sign, lower, upper, command, axis_commands, command_range, is_unexplained, max_order,
+        stops, slowest_rad_s,
+    )  # fmt: skip
 
 
-def _written(found: Found, seen: Seen, of: Hypothesis) -> Document:
-    """The statement."""
-    i, j = found.run[0], found.beside
-    axis = int(seen.least[i].argmax()) if found.axis is None else found.axis
-    if j is None:  # of an oscillation theta is the offset
-        of = replace(of, offset=np.zeros_like(of.offset))
-    bounds = [_bound(seen, of, found.run, axis, 1)]
+def _statement(found: Exclusion, bounds: SurfaceBounds, held: Hypothesis) -> Document:
+    """The fields of a statement of what a rule has found."""
+    i, j = found.lower_frames[0], found.upper_frame
+    axis = int(bounds.lower[i].argmax()) if found.axis is None else found.axis
+    if j is None:  # an oscillation: theta is the distance from the command
+        held = replace(held, offset=np.zeros_like(held.offset))
+    said = [_bound_fields(bounds, held, found.lower_frames, axis, 1)]
     if j is not None:
-        bounds.append(_bound(seen, of, range(j, j + 1), int(seen.most[j].argmin()), -1))
-    sides = [[float(value) for value in column] for column in zip(*found.compared, strict=True)]
-    return {"theta": "course", **found.said, "bounds": bounds, "sides": sides}
+        said.append(_bound_fields(bounds, held, range(j, j + 1), int(bounds.upper[j].argmin()), -1))
+    sides = [[float(value) for value in column] for column in zip(*found.pairs, strict=True)]
+    return {"theta": "course", **found.fields, "bounds": said, "sides": sides}
 
 
-def _bound(seen: Seen, of: Hypothesis, frames: range, axis: int, side: int) -> Document:
-    """What frames take to bound the surface by an axis: from below (side 1), or above."""
-    first, last = seen.first + frames[0], seen.first + frames[-1]
-    rows, d = slice(first - of.first, last + 1 - of.first), np.zeros(3)
-    d[axis] = side * seen.sign * np.sign(of.slope[rows.start, axis])
-    numbers = {
-        "h": of.offset[rows] @ d,
-        "Z": seen.sign * of.slope[rows] @ d,
-        "r": of.spread[rows] @ np.abs(d),
+def _bound_fields(bounds: SurfaceBounds, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
+    """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""
+    first, last = bounds.first_frame + frames[0], bounds.first_frame + frames[-1]
+    rows, direction = slice(first - held.first_frame, last + 1 - held.first_frame), np.zeros(3)
+    direction[axis] = side * bounds.sign * np.sign(held.slope[rows.start, axis])
+    effect = {
+        "h": held.offset[rows] @ direction,
+        "Z": bounds.sign * held.slope[rows] @ direction,
+        "r": held.spread[rows] @ np.abs(direction),
     }
-    said = {"d": d.tolist(), "first": first, "frame": last}
-    return said | {name: values.tolist() for name, values in numbers.items()}
+    said = {"d": direction.tolist(), "first": first, "frame": last}
+    return said | {name: values.tolist() for name, values in effect.items()}

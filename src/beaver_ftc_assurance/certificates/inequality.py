@@ -1,10 +1,11 @@
-"""The inequality that an alarm or an exclusion is, and the search for it (docs/explanation/certificates.md).
+"""The inequality that an alarm or an exclusion is, and the search for it.
 
     c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the most that hypothesis and declared errors allow
 
-E is the innovation through a filter of pole lam, the frame's own for a pole of infinity; d is a direction.
-With one term the fault's parameter may move as it likes, or the fault be absent, in every frame; with
-`constant` it is one number for all terms.
+E[k] rad/s: the innovation through a filter of pole lam up to frame k; for an infinite pole the innovation of
+frame k alone, times dt. d (3,): a direction; c > 0: a weight. With one term the fault's parameter theta may
+take any value in its range in every frame, or the fault be absent; with `theta_is_constant` theta is one
+number for all terms. docs/explanation/certificates.md, "The inequality", derives it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,294 +21,343 @@ from beaver_ftc.diagnosis import ROUNDING_RAD_S2
 from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Document
 
-WINDOW = 16  # frames that are written out; what was before them is the filter's state
-_LEAST = 1e-9  # of a margin, as a share of the limit: more than another order of summation makes
-_ROUNDING = 4e-15  # of a bound: a smaller part of it is rounding
-_LEAST_EFFECT = 1e-12  # rad/s2, of a fault: less is rounding
-_LEAST_SLOPE = 1e-12  # of a theta that two terms let drop out
-_FORGOTTEN = 16.0  # time constants of a filter: of what is older e^-16 is left
+N_WRITTEN_FRAMES = 16  # of a filter; what was before them is stated as the filter's state
+MIN_RELATIVE_MARGIN = 1e-9  # by which the left side is larger, over the larger side: summation may do less
+ROUNDING_SHARE = 4e-15  # of a bound: a smaller part of it is rounding
+MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
+MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one comes from rounding, where theta drops out of two terms
+MEMORY_TIME_CONSTANTS = 16.0  # of a filter: of an older innovation less than e^-16 is left
 
 
 @dataclass(frozen=True)
 class DeclaredErrors:
-    """Declared errors that the bound on the model's error has in it, by axis (3,).
+    """Declared errors that the bound on the model's error contains, by axis (3,).
 
-    coupled: share by which the inertial coupling may be off, times its coefficient; of products of two rates.
-    constant_rad_s2. earth_rad_s: rate of the Earth that the model leaves out, earth_share: what of it each
-    axis feels. gyro: error of a reading, offset + slope |rate|; steady: what of the offset does not change.
+    inertia_coupling: largest error of the model's coefficient of a product of two rates, 1/rad.
+    constant_rad_s2: constant part. earth_rad_s: rate of the Earth, which the model leaves out; earth_gain:
+    largest coefficient of a product with it, 1/rad, at least 1. Error of a gyro's reading: at most
+    gyro_offset_rad_s + gyro_slope |rate|, of which gyro_constant_rad_s does not change.
     """
 
-    coupled: np.ndarray
+    inertia_coupling: np.ndarray
     constant_rad_s2: np.ndarray
     earth_rad_s: float
-    earth_share: np.ndarray
+    earth_gain: np.ndarray
     gyro_offset_rad_s: np.ndarray
-    gyro_steady_rad_s: np.ndarray
+    gyro_constant_rad_s: np.ndarray
     gyro_slope: np.ndarray
 
 
 @dataclass(frozen=True)
 class History:
-    """Rows of a log, (rows, 3): rates x, model, eta_bar; and of the declared errors of gyros what a reading's
-    changes by, noise. declared: what they follow from."""
+    """Columns of a log, (rows, 3) by axis: measured body rates; angular acceleration of the design model, and
+    bound on its error, of the frame that ends with the row.
+
+    dt: of a frame, s. instant_share: 1 / number of instants (JSBSim frames) in a frame.
+    """
 
     dt: float
-    share: float  # one over the instants in a frame
-    x: np.ndarray
-    model: np.ndarray
-    eta_bar: np.ndarray
+    instant_share: float
+    rates_rad_s: np.ndarray
+    model_rad_s2: np.ndarray
+    eta_bar_rad_s2: np.ndarray
     declared: DeclaredErrors
 
-    def asking(self, axes: np.ndarray) -> "History":
-        """The same, with what gyros are always off by on these axes alone, (3,); on others it may change."""
-        steady = self.declared.gyro_steady_rad_s * axes
-        return replace(self, declared=replace(self.declared, gyro_steady_rad_s=steady))
+    def with_constant_gyro_errors_on(self, axes: np.ndarray) -> "History":
+        """The same, with a constant gyro error on the axes where `axes` (3,) is 1 alone; on others all of the
+        error may change."""
+        constant = self.declared.gyro_constant_rad_s * axes
+        return replace(self, declared=replace(self.declared, gyro_constant_rad_s=constant))
 
     @property
-    def said(self) -> Document:
-        """What a statement says of the rows that it goes by: frames."""
+    def statement_fields(self) -> Document:
+        """Fields of a statement that say which rows make a frame: none, each row is one."""
         return {}
 
     @cached_property
-    def noise(self) -> np.ndarray:
-        """n of theory, section 2, (rows, 3) rad/s."""
+    def gyro_error_change_rad_s(self) -> np.ndarray:
+        """n of docs/explanation/detection.md, "Changing error of a gyro", (rows, 3)."""
         declared = self.declared
-        changing = declared.gyro_offset_rad_s - declared.gyro_steady_rad_s
-        return np.asarray(changing + declared.gyro_slope * (np.abs(self.x) + self.off))
+        changing = declared.gyro_offset_rad_s - declared.gyro_constant_rad_s
+        max_rates = np.abs(self.rates_rad_s) + self.gyro_error_rad_s
+        return np.asarray(changing + declared.gyro_slope * max_rates)
 
     @cached_property
-    def off(self) -> np.ndarray:
-        """How far a rate can be from its reading, (rows, 3) rad/s."""
-        slope = self.declared.gyro_slope
-        return np.asarray((self.declared.gyro_offset_rad_s + slope * np.abs(self.x)) / (1.0 - slope))
+    def gyro_error_rad_s(self) -> np.ndarray:
+        """Bound on |true rate - reading|, (rows, 3)."""
+        offset, slope = self.declared.gyro_offset_rad_s, self.declared.gyro_slope
+        return np.asarray((offset + slope * np.abs(self.rates_rad_s)) / (1.0 - slope))
 
     @cached_property
-    def _nu(self) -> np.ndarray:
-        return np.asarray(np.diff(self.x, axis=0, prepend=np.nan * self.x[:1]) / self.dt - self.model)
+    def _innovation(self) -> np.ndarray:
+        rates = self.rates_rad_s
+        return np.asarray(np.diff(rates, axis=0, prepend=np.nan * rates[:1]) / self.dt - self.model_rad_s2)
 
     def innovation(self, rows: slice) -> np.ndarray:
-        """nu of rows after the first, (rows, 3) rad/s2."""
-        return self._nu[rows]
+        """nu of these rows, (rows, 3) rad/s2; not a number in the log's first row."""
+        return self._innovation[rows]
 
-    def frame_bound(self, rows: slice) -> np.ndarray:
-        """The bound on it, (rows, 3) rad/s2; not a number in the first row, before which nothing is known."""
-        return np.asarray(self.eta_bar[rows] + (self.noise[rows] + _before(self.noise)[rows]) / self.dt)
+    def innovation_bound(self, rows: slice) -> np.ndarray:
+        """Bound on |nu| without a fault, (rows, 3) rad/s2; not a number in the first row."""
+        change = self.gyro_error_change_rad_s
+        return np.asarray(self.eta_bar_rad_s2[rows] + (change + _row_before(change))[rows] / self.dt)
 
-    def rest(self, rows: slice) -> np.ndarray:
-        """What of eta_bar is neither published nor the Earth's, nor of the row before; (rows, 3) rad/s2."""
-        declared, f = self.declared, _before(np.abs(self.x) + self.off)[rows]
-        earth, g = declared.earth_rad_s, declared.earth_share
-        pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
-        of_earth = earth * ((1.0 + g) * f.sum(axis=1, keepdims=True) + g * earth) + ROUNDING_RAD_S2
-        declared_now = declared.coupled * pairs + declared.constant_rad_s2 + of_earth
-        return np.asarray(self.eta_bar[rows] - self.share * declared_now)
+    def unstated_bound(self, rows: slice) -> np.ndarray:
+        """The part of eta_bar that does not follow from the declared errors, (rows, 3) rad/s2: it is without
+        inertia, constant and Earth, at the row before."""
+        declared = self.declared
+        rates = _row_before(np.abs(self.rates_rad_s) + self.gyro_error_rad_s)[rows]
+        earth, gain = declared.earth_rad_s, declared.earth_gain
+        products = _products_of_other_axes(rates)
+        by_earth = earth * ((1.0 + gain) * rates.sum(axis=1, keepdims=True) + gain * earth) + ROUNDING_RAD_S2
+        stated = declared.inertia_coupling * products + declared.constant_rad_s2 + by_earth
+        return np.asarray(self.eta_bar_rad_s2[rows] - self.instant_share * stated)
 
 
-def _before(values: np.ndarray) -> np.ndarray:
-    """Of each row the one before, (rows, 3); before the first there is none."""
+def _products_of_other_axes(rates: np.ndarray) -> np.ndarray:
+    """q r, p r, p q of rates (rows, 3)."""
+    return np.column_stack((rates[:, 1] * rates[:, 2], rates[:, 0] * rates[:, 2], rates[:, 0] * rates[:, 1]))
+
+
+def _row_before(values: np.ndarray) -> np.ndarray:
+    """Values (rows, 3) moved by a row: in each row those of the row before; in the first not a number."""
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
-def declared_of(frame: FrameReadout) -> DeclaredErrors:
-    """What a flight's record holds of the declared bounds, and of the coefficients in them."""
-    bound, of = frame.diagnosis.bound, frame.inertia
-    most = {name: abs(value) for name, value in of._asdict().items()}
-    shares = (
-        most["Ppq"] + most["Pqr"],
-        most["Qpr"] + 2.0 * max(most["Qpp"], most["Qrr"]),
-        most["Rpq"] + most["Rqr"],
+def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
+    """The declared errors in a flight's record, with the coefficients of inertia that they multiply."""
+    bound, inertia = frame.diagnosis.declared_bounds, frame.inertia
+    size = {name: abs(value) for name, value in inertia._asdict().items()}
+    gains = (
+        size["Ppq"] + size["Pqr"],
+        size["Qpr"] + 2.0 * max(size["Qpp"], size["Qrr"]),
+        size["Rpq"] + size["Rqr"],
     )
     return DeclaredErrors(
-        coupled=bound.inertia * np.abs([of.Pqr, of.Qpr, of.Rpq]), constant_rad_s2=bound.constant_rad_s2,
-        earth_rad_s=bound.earth_rate_rad_s, earth_share=np.maximum(shares, 1.0),
-        gyro_offset_rad_s=bound.gyro_offset_rad_s, gyro_steady_rad_s=bound.gyro_steady_rad_s,
-        gyro_slope=bound.gyro_slope,
+        inertia_coupling=bound.inertia_coupling_share * np.abs([inertia.Pqr, inertia.Qpr, inertia.Rpq]),
+        constant_rad_s2=bound.constant_bound_rad_s2,
+        earth_rad_s=bound.earth_rate_rad_s, earth_gain=np.maximum(gains, 1.0),
+        gyro_offset_rad_s=bound.gyro_error_offset_rad_s, gyro_constant_rad_s=bound.gyro_constant_error_rad_s,
+        gyro_slope=bound.gyro_error_per_rate,
     )  # fmt: skip
 
 
-def declaration(history: History, frames: list[np.ndarray], asked: np.ndarray) -> Document:
-    """What the certificate says of it, in the letters of theory, section 2, by axis: what is not zero, and
-    adds anything to the bounds of these rows, on the axes `asked` (3,)."""
+def declared_fields(history: History, frames: list[np.ndarray], axes: np.ndarray) -> Document:
+    """The field `declared` of a certificate, by letter and axis (docs/explanation/certificates.md, "The
+    fields"): what is not zero, and adds to the bounds of these frames. axes (3,): 1 where a constant error of
+    the gyro counts."""
     declared = history.declared
-    steady = declared.gyro_steady_rad_s * asked
-    of = {"o": declared.gyro_offset_rad_s, "B": steady, "m": declared.gyro_slope}
+    gyro = {
+        "o": declared.gyro_offset_rad_s,
+        "B": declared.gyro_constant_rad_s * axes,
+        "m": declared.gyro_slope,
+    }
     if not frames:
-        return _by_axis(of | {name: [] for name in "cbg"})
+        return _by_axis(gyro | {name: [] for name in "cbg"})
     rows = np.concatenate(frames)
-    f = (np.abs(history.x) + history.off)[rows - 1]
-    pairs = np.column_stack((f[:, 1] * f[:, 2], f[:, 0] * f[:, 2], f[:, 0] * f[:, 1]))
-    c = declared.coupled.copy()
-    c[(c * pairs * history.share <= _ROUNDING * history.eta_bar[rows]).all(axis=0)] = 0.0
-    g = declared.earth_share if declared.earth_rad_s else np.empty(0)
-    return _by_axis(of | {"c": c, "b": declared.constant_rad_s2, "g": g})
+    products = _products_of_other_axes((np.abs(history.rates_rad_s) + history.gyro_error_rad_s)[rows - 1])
+    coupling = declared.inertia_coupling.copy()
+    added = coupling * products * history.instant_share
+    coupling[(added <= ROUNDING_SHARE * history.eta_bar_rad_s2[rows]).all(axis=0)] = 0.0
+    gain = declared.earth_gain if declared.earth_rad_s else np.empty(0)
+    return _by_axis(gyro | {"c": coupling, "b": declared.constant_rad_s2, "g": gain})
 
 
-def _by_axis(of: Mapping[str, Sequence[float] | np.ndarray]) -> Document:
+def _by_axis(numbers: Mapping[str, Sequence[float] | np.ndarray]) -> Document:
+    """By name and axis the numbers that are not zero."""
     return {
         name: {axis: float(v) for axis, v in zip(AXES, values, strict=False) if v}
-        for name, values in of.items()
+        for name, values in numbers.items()
     }
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """What a fault adds to the innovation: offset + theta slope, give or take spread; theta in [low, high].
+    """A fault's effect on the innovation: offset + theta slope, within +-spread, rad/s2; theta in
+    [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on.
 
-    Arrays (frames, 3) from frame `first` on. constant: theta is one number; shown: in frames that health does
-    not explain. asked: the axes on which it is held against the data.
+    theta_is_constant: theta is one number; only_where_shown: one in frames that health does not explain,
+    while elsewhere the fault may be absent. axes: those of the innovation that the hypothesis is tested on.
     """
 
-    first: int
+    first_frame: int
     offset: np.ndarray
     slope: np.ndarray
     spread: np.ndarray
-    low: float
-    high: float
-    constant: bool = False
-    shown: bool = False
-    asked: tuple[int, ...] = (0, 1, 2)
+    theta_low: float
+    theta_high: float
+    theta_is_constant: bool = False
+    only_where_shown: bool = False
+    axes: tuple[int, ...] = (0, 1, 2)
+
+    def along(self, direction: np.ndarray, frames: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Offset, slope and spread (frames,) along a direction (3,) in these frames."""
+        here = slice(frames.start - self.first_frame, frames.stop - self.first_frame)
+        size = np.abs(direction)
+        return self.offset[here] @ direction, self.slope[here] @ direction, self.spread[here] @ size
 
 
-def nothing(first: int, frames: int) -> Hypothesis:
-    """No fault."""
-    zero = np.zeros((frames, 3))
-    return Hypothesis(first, zero, zero, zero, 0.0, 0.0)
+def no_fault(first_frame: int, n_frames: int) -> Hypothesis:
+    """The hypothesis of health."""
+    zero = np.zeros((n_frames, 3))
+    return Hypothesis(first_frame, zero, zero, zero, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Term:
-    """One filter in one direction (3,), up to a frame: begun, with no residual, at frame `since`.
+    """One filter along a direction (3,), from frame filter_start, where its residual is zero, to last_frame.
 
-    before: rad/s, what the fault can have done to it by the frame `known_from`, before which nothing is kept.
+    effect_before: rad/s, largest effect of the fault on the filter up to frame first_kept_frame, before which
+    the fault's effects are not kept.
     """
 
     direction: np.ndarray
     pole_per_s: float
-    since: int
-    frame: int
+    filter_start: int
+    last_frame: int
     weight: float = 1.0
-    known_from: int = 0
-    before: float = 0.0
+    first_kept_frame: int = 0
+    effect_before: float = 0.0
 
     def decay(self, dt: float) -> float:
-        """What a frame leaves of the residual."""
+        """Share of the residual that is left after a frame of dt s."""
         return 0.0 if isinf(self.pole_per_s) else exp(-self.pole_per_s * dt)
 
 
-def measure(term: Term, of: Hypothesis, history: History, first: int) -> tuple[float, float, float, float]:
-    """The term's value; the most that it can be, and what a constant theta multiplies in that; and what the
-    fault can have done before frame `first`."""
-    a, d, dt = term.decay(history.dt), term.direction, history.dt
-    size, n = np.abs(d), history.noise @ np.abs(d)
-    past = slice(term.since + 1, term.frame + 1)
-    weight = _weights(a, term.frame - term.since)
-    value = dt * weight @ (history.innovation(past) @ d)
-    noise = a * weight[0] * n[term.since] + (1.0 - a) * weight @ n[term.since : term.frame] + n[term.frame]
-    limit = dt * weight @ (history.eta_bar[past] @ size) + noise
-    here = slice(first - of.first, term.frame + 1 - of.first)
-    offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ size
-    weight = _weights(a, term.frame + 1 - first)
-    before = _done_before(term, of, dt, first)
-    if of.constant:
-        done = a * weight[0] * before + dt * weight @ (offset + spread)
-        return value, limit + done, float(dt * weight @ slope), before
-    most = _most(offset + of.low * slope, offset + of.high * slope) + spread
-    return value, limit + a * weight[0] * before + dt * weight @ most, 0.0, before
+def evaluate_term(
+    term: Term, hypothesis: Hypothesis, history: History, first_frame: int
+) -> tuple[float, float, float, float]:
+    """The term's value, rad/s; the limit on it without a constant theta; the factor of a constant theta in
+    that limit; and the largest effect of the fault before first_frame."""
+    decay, direction, dt = term.decay(history.dt), term.direction, history.dt
+    abs_direction = np.abs(direction)
+    gyro = history.gyro_error_change_rad_s @ abs_direction
+    filtered_frames = slice(term.filter_start + 1, term.last_frame + 1)
+    weights = _filter_weights(decay, term.last_frame - term.filter_start)
+    value = dt * weights @ (history.innovation(filtered_frames) @ direction)
+    gyro_limit = (
+        decay * weights[0] * gyro[term.filter_start]
+        + (1.0 - decay) * weights @ gyro[term.filter_start : term.last_frame]
+        + gyro[term.last_frame]
+    )
+    limit = dt * weights @ (history.eta_bar_rad_s2[filtered_frames] @ abs_direction) + gyro_limit
+    offset, slope, spread = hypothesis.along(direction, slice(first_frame, term.last_frame + 1))
+    weights = _filter_weights(decay, term.last_frame + 1 - first_frame)
+    before = _max_effect_before(term, hypothesis, dt, first_frame)
+    if hypothesis.theta_is_constant:
+        effect = decay * weights[0] * before + dt * weights @ (offset + spread)
+        return value, limit + effect, float(dt * weights @ slope), before
+    effects = (
+        _max_effect(offset + hypothesis.theta_low * slope, offset + hypothesis.theta_high * slope) + spread
+    )
+    return value, limit + decay * weights[0] * before + dt * weights @ effects, 0.0, before
 
 
-def _most(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The most that a fault between these does, if it may be absent."""
-    return np.asarray(np.maximum(0.0, np.maximum(low, high)))
+def _max_effect(at_low: np.ndarray, at_high: np.ndarray) -> np.ndarray:
+    """Largest effect of a fault that may be absent, of its effects at both ends of theta's range."""
+    return np.asarray(np.maximum(0.0, np.maximum(at_low, at_high)))
 
 
-def _weights(a: float, n: int) -> np.ndarray:
-    """What is left of the last n frames' inputs."""
-    return np.asarray(a ** np.arange(n - 1.0, -1.0, -1.0))
+def _filter_weights(decay: float, n: int) -> np.ndarray:
+    """Weights of the last n frames in a filter, (n,), the last of them 1."""
+    return np.asarray(decay ** np.arange(n - 1.0, -1.0, -1.0))
 
 
-def _done_before(term: Term, of: Hypothesis, dt: float, first: int) -> float:
-    """The most the fault can have done to a filter before frame `first`."""
-    a, d = term.decay(dt), term.direction
-    begin = max(term.since, term.known_from) + 1
-    if first <= begin:
-        return term.before
-    here = slice(begin - of.first, first - of.first)
-    offset, slope, spread = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ np.abs(d)
-    most = _most(offset + of.low * slope, offset + of.high * slope) + spread
-    weight = _weights(a, first - begin)
-    return float(a * weight[0] * term.before + dt * weight @ most)
+def _max_effect_before(term: Term, hypothesis: Hypothesis, dt: float, first_frame: int) -> float:
+    """Largest effect of the fault on a filter before first_frame, rad/s."""
+    decay = term.decay(dt)
+    begin = max(term.filter_start, term.first_kept_frame) + 1
+    if first_frame <= begin:
+        return term.effect_before
+    offset, slope, spread = hypothesis.along(term.direction, slice(begin, first_frame))
+    effects = (
+        _max_effect(offset + hypothesis.theta_low * slope, offset + hypothesis.theta_high * slope) + spread
+    )
+    weights = _filter_weights(decay, first_frame - begin)
+    return float(decay * weights[0] * term.effect_before + dt * weights @ effects)
 
 
-def sides(terms: list[Term], of: Hypothesis, history: History) -> tuple[float, float]:
+def sides(terms: list[Term], hypothesis: Hypothesis, history: History) -> tuple[float, float]:
     """Both sides of the inequality."""
-    measured = [measure(term, of, history, _first(term, of, history.dt)) for term in terms]
+    evaluated = [
+        evaluate_term(term, hypothesis, history, _first_written_frame(term, hypothesis, history.dt))
+        for term in terms
+    ]
     weights = np.array([term.weight for term in terms])
-    value, limit, slope, _ = (float(weights @ column) for column in zip(*measured, strict=True))
-    return value, limit + max(of.low * slope, of.high * slope)
+    value, limit, slope, _ = (float(weights @ column) for column in zip(*evaluated, strict=True))
+    return value, limit + max(hypothesis.theta_low * slope, hypothesis.theta_high * slope)
 
 
-def _first(term: Term, of: Hypothesis, dt: float) -> int:
-    """The first frame that is written out: what is forgotten would decide nothing. A constant parameter needs
-    all there are."""
+def _first_written_frame(term: Term, hypothesis: Hypothesis, dt: float) -> int:
+    """The first frame that is written out: what the filter has forgotten would decide nothing. A constant
+    theta needs all frames that the filter remembers."""
     if isinf(term.pole_per_s):
-        return term.frame
-    longest = term.frame - term.since if of.constant else WINDOW
-    known = int(_FORGOTTEN / (term.pole_per_s * dt))
-    return max(term.frame + 1 - max(min(longest, known), 1), term.since + 1, term.known_from + 1)
+        return term.last_frame
+    longest = term.last_frame - term.filter_start if hypothesis.theta_is_constant else N_WRITTEN_FRAMES
+    remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * dt))
+    first = term.last_frame + 1 - max(min(longest, remembered), 1)
+    return max(first, term.filter_start + 1, term.first_kept_frame + 1)
 
 
-def is_violated(terms: list[Term], of: Hypothesis, history: History) -> bool:
-    """Whether the data are beyond what the hypothesis allows, by more than rounding."""
-    value, limit = sides(terms, of, history)
-    return value - limit > _LEAST * max(abs(limit), abs(value))
+def is_violated(terms: list[Term], hypothesis: Hypothesis, history: History) -> bool:
+    """Whether the data exceed the limit of the hypothesis by more than rounding."""
+    value, limit = sides(terms, hypothesis, history)
+    return value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value))
 
 
-def written(terms: list[Term], of: Hypothesis, history: History) -> Document:
-    """The inequality with every number it takes, and none that decides nothing."""
-    theta = ("constant while it shows" if of.shown else "constant") if of.constant else "any"
-    said = [_term(term, of, history) for term in terms]
+def inequality_fields(terms: list[Term], hypothesis: Hypothesis, history: History) -> Document:
+    """The fields of a statement: every number that the inequality takes, and none that decides nothing."""
+    low, high, is_constant = hypothesis.theta_low, hypothesis.theta_high, hypothesis.theta_is_constant
+    theta = (
+        ("constant while it shows" if hypothesis.only_where_shown else "constant") if is_constant else "any"
+    )
+    said = [_term_fields(term, hypothesis, history) for term in terms]
     slope = sum(one["weight"] * one.pop("slope") for one in said)
     value, limit = (sum(one["weight"] * one.pop(side) for one in said) for side in ("value", "limit"))
     decides = [one.pop("decides") for one in said]
-    most = max(of.low * slope, of.high * slope) if of.constant and abs(slope) > _LEAST_SLOPE else 0.0
-    ends = {"least": of.low, "most": of.high}
-    if of.constant:
-        looked_at = {"least": most and slope < 0.0, "most": most and slope > 0.0}
-        if abs(slope) > _LEAST_SLOPE and not most:  # a fault of this size does nothing
+    by_theta = max(low * slope, high * slope) if is_constant and abs(slope) > MIN_SLOPE else 0.0
+    ends = {"least": low, "most": high}
+    if is_constant:
+        is_used = {"least": by_theta and slope < 0.0, "most": by_theta and slope > 0.0}
+        if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
             for one in said:
                 one.pop("Z", None)
     else:
-        looked_at = {end: any(each[end] for each in decides) for end in ends}
+        is_used = {end: any(each[end] for each in decides) for end in ends}
     return {
         "theta": theta,
-        **{end: number for end, number in ends.items() if looked_at[end]},
+        **{end: number for end, number in ends.items() if is_used[end]},
         "terms": said,
-        "sides": [value, limit + most],
+        "sides": [value, limit + by_theta],
     }
 
 
-def _term(term: Term, of: Hypothesis, history: History) -> Document:
-    """A term: filter, direction, what the fault can have done to it before, its frames; and what they add up
-    to: value, limit, slope; and which end of theta `decides`, in any frame."""
-    first = _first(term, of, history.dt)
-    value, limit, slope, fault = measure(term, of, history, first)
-    rows, here = slice(first, term.frame + 1), slice(first - of.first, term.frame + 1 - of.first)
-    d, filters = term.direction, not isinf(term.pole_per_s)
-    h, Z, r = of.offset[here] @ d, of.slope[here] @ d, of.spread[here] @ np.abs(d)
-    rest = history.rest(rows)
-    rest[np.abs(rest) < _ROUNDING * history.eta_bar[rows]] = 0.0
-    low, high = h + of.low * Z, h + of.high * Z
-    adds = np.ones(len(h), bool) if of.constant else np.maximum(low, high) > _LEAST_EFFECT
-    rounding = np.where(adds, 0.0, _most(low, high))
-    limit -= float(history.dt * _weights(term.decay(history.dt), len(h)) @ rounding)
-    said: Document = {"weight": term.weight, "d": d.tolist()}
-    if filters:
-        said |= {"pole_per_s": term.pole_per_s, "since": term.since}
-    said |= {"first": first, "frame": term.frame}
-    if filters and fault:
-        said["fault"] = fault
-    said |= {name: values[rows].tolist() for name, values in
-             (("x", history.x), ("F", history.model), ("eta_bar", history.eta_bar))}  # fmt: skip
+def _term_fields(term: Term, hypothesis: Hypothesis, history: History) -> Document:
+    """A term: filter, direction, effect of the fault before, its frames; and, to be added up by the caller,
+    `value`, `limit` and `slope`, and which end of theta `decides` in any frame."""
+    first = _first_written_frame(term, hypothesis, history.dt)
+    value, limit, slope, before = evaluate_term(term, hypothesis, history, first)
+    rows = slice(first, term.last_frame + 1)
+    is_filtered = not isinf(term.pole_per_s)
+    h, Z, r = hypothesis.along(term.direction, rows)
+    rest = history.unstated_bound(rows)
+    rest[np.abs(rest) < ROUNDING_SHARE * history.eta_bar_rad_s2[rows]] = 0.0
+    at_low, at_high = h + hypothesis.theta_low * Z, h + hypothesis.theta_high * Z
+    adds = (
+        np.ones(len(h), bool)
+        if hypothesis.theta_is_constant
+        else np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
+    )
+    rounding = np.where(adds, 0.0, _max_effect(at_low, at_high))
+    limit -= float(history.dt * _filter_weights(term.decay(history.dt), len(h)) @ rounding)
+    said: Document = {"weight": term.weight, "d": term.direction.tolist()}
+    if is_filtered:
+        said |= {"pole_per_s": term.pole_per_s, "since": term.filter_start}
+    said |= {"first": first, "frame": term.last_frame}
+    if is_filtered and before:
+        said["fault"] = before
+    logged = {"x": history.rates_rad_s, "F": history.model_rad_s2, "eta_bar": history.eta_bar_rad_s2}
+    said |= {name: values[rows].tolist() for name, values in logged.items()}
     if rest.any():
         said["rest"] = rest.tolist()
     for name, values in (("h", h), ("Z", Z)):
@@ -315,72 +365,79 @@ def _term(term: Term, of: Hypothesis, history: History) -> Document:
             said[name] = [float(v) if there else None for v, there in zip(values, adds, strict=True)]
     if r.any():
         said["r"] = r.tolist()
-    decides = {"least": bool((adds & (low > high)).any()), "most": bool((adds & (high > low)).any())}
+    decides = {
+        "least": bool((adds & (at_low > at_high)).any()),
+        "most": bool((adds & (at_high > at_low)).any()),
+    }
     return said | {"value": value, "limit": limit, "slope": slope, "decides": decides}
 
 
-def directions(asked: tuple[int, ...]) -> Iterator[np.ndarray]:
-    """Both ways along each axis."""
-    for i in asked:
+def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
+    """Both directions (3,) along each of the axes."""
+    for i in axes:
         for sign in (1.0, -1.0):
-            d = np.zeros(3)
-            d[i] = sign
-            yield d
+            direction = np.zeros(3)
+            direction[i] = sign
+            yield direction
 
 
-def of_one_frame(k: int, of: Hypothesis) -> Iterator[list[Term]]:
-    """The tests of a frame by itself: each axis; two of them such that theta drops out."""
-    for d in directions(of.asked):
-        yield [Term(d, inf, k - 1, k)]
-    Z = of.slope[k - of.first]
-    for i in of.asked:
-        for j in of.asked:
-            if i < j and (Z[i] or Z[j]):
-                d = np.zeros(3)
-                d[i], d[j] = Z[j], -Z[i]
-                d /= np.abs(d).max()
-                yield [Term(d, inf, k - 1, k)]
-                yield [Term(-d, inf, k - 1, k)]
+def single_frame_tests(frame: int, hypothesis: Hypothesis) -> Iterator[list[Term]]:
+    """The inequalities of one frame: along each axis; across two of them such that theta drops out."""
+    for direction in axis_directions(hypothesis.axes):
+        yield [Term(direction, inf, frame - 1, frame)]
+    slope = hypothesis.slope[frame - hypothesis.first_frame]
+    for i in hypothesis.axes:
+        for j in hypothesis.axes:
+            if i < j and (slope[i] or slope[j]):
+                direction = np.zeros(3)
+                direction[i], direction[j] = slope[j], -slope[i]
+                direction /= np.abs(direction).max()
+                yield [Term(direction, inf, frame - 1, frame)]
+                yield [Term(-direction, inf, frame - 1, frame)]
 
 
-def by_each_frame(
-    of: Hypothesis, history: History, frames: np.ndarray
+def theta_bounds_by_frame(
+    hypothesis: Hypothesis, history: History, frames: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What each frame and axis says of a constant theta: at least, at most, and Z; (frames, 3) from the first
-    to the last of `frames`, unlimited where not asked."""
+    """Bounds on theta by each frame and axis: lower, upper, and the slope they come from; (n, 3), for the n
+    frames from the first to the last of `frames`. Infinite, with a slope of 1, in frames that are not
+    among `frames`, on axes that are not the hypothesis's, and where the slope is zero."""
     rows = slice(int(frames[0]), int(frames[-1]) + 1)
-    asked = np.zeros((rows.stop - rows.start, 3), bool)
-    asked[np.ix_(frames - rows.start, np.array(of.asked))] = True
-    here = slice(rows.start - of.first, rows.stop - of.first)
-    Z, room = of.slope[here], history.frame_bound(rows) + of.spread[here]
-    value = history.innovation(rows) - of.offset[here]
-    asked &= Z != 0.0
-    size = np.where(asked, np.abs(Z), 1.0)
-    middle = value * np.sign(Z) / size
-    least = np.where(asked, middle - room / size, -inf)
-    most = np.where(asked, middle + room / size, inf)
-    return least, most, np.where(asked, Z, 1.0)
+    is_bound = np.zeros((rows.stop - rows.start, 3), bool)
+    is_bound[np.ix_(frames - rows.start, np.array(hypothesis.axes))] = True
+    here = slice(rows.start - hypothesis.first_frame, rows.stop - hypothesis.first_frame)
+    slope = hypothesis.slope[here]
+    tolerance = history.innovation_bound(rows) + hypothesis.spread[here]
+    effect = history.innovation(rows) - hypothesis.offset[here]
+    is_bound &= slope != 0.0
+    size = np.where(is_bound, np.abs(slope), 1.0)
+    middle = effect * np.sign(slope) / size
+    lower = np.where(is_bound, middle - tolerance / size, -inf)
+    upper = np.where(is_bound, middle + tolerance / size, inf)
+    return lower, upper, np.where(is_bound, slope, 1.0)
 
 
-def constant_pair(of: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
-    """Two frames that no one theta explains, or one that none in its set does; empty if there are none.
-
-    frames: those that may be asked.
-    """
+def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
+    """Terms of two frames that no one theta explains, or of one that no theta in its range does; empty if
+    there are no frames to choose from."""
     if not len(frames):
         return []
-    least, most, Z = by_each_frame(of, history, frames)
-    low, high = np.unravel_index(np.argmax(least), least.shape), np.unravel_index(np.argmin(most), most.shape)
+    lower, upper, slope = theta_bounds_by_frame(hypothesis, history, frames)
+    largest = np.unravel_index(np.argmax(lower), lower.shape)
+    smallest = np.unravel_index(np.argmin(upper), upper.shape)
     terms, first = [], int(frames[0])
-    if least[low] > of.low:
-        terms.append(_one_sided(low, 1.0, Z, first, history.dt))
-    if most[high] < of.high:
-        terms.append(_one_sided(high, -1.0, Z, first, history.dt))
+    if lower[largest] > hypothesis.theta_low:
+        terms.append(_term_bounding_theta(largest, 1.0, slope, first, history.dt))
+    if upper[smallest] < hypothesis.theta_high:
+        terms.append(_term_bounding_theta(smallest, -1.0, slope, first, history.dt))
     return terms
 
 
-def _one_sided(place: tuple[Any, ...], sign: float, Z: np.ndarray, first: int, dt: float) -> Term:
-    """The term that bounds theta from one side by one frame on one axis."""
-    k, d = first + int(place[0]), np.zeros(3)
-    d[place[1]] = sign * np.sign(Z[place])
-    return Term(d, inf, k - 1, k, weight=1.0 / (dt * abs(float(Z[place]))))
+def _term_bounding_theta(
+    place: tuple[Any, ...], sign: float, slope: np.ndarray, first_frame: int, dt: float
+) -> Term:
+    """The term that bounds theta from below (sign 1) or above (-1); place: number of the frame from
+    first_frame on, and axis."""
+    frame, direction = first_frame + int(place[0]), np.zeros(3)
+    direction[place[1]] = sign * np.sign(slope[place])
+    return Term(direction, inf, frame - 1, frame, weight=1.0 / (dt * abs(float(slope[place]))))

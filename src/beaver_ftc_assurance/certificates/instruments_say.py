@@ -1,5 +1,5 @@
 """The alarm of instruments: a reading further from what the others predict than sound ones can be
-(docs/explanation/theory.md, section 9).
+(docs/explanation/instruments.md).
 """
 
 from collections.abc import Iterator, Mapping
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from beaver_ftc.diagnosis import SensorMonitor
-from beaver_ftc.diagnosis.monitors import N_COMPUTED, RPM
+from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_COMPUTED_TESTS, RPM_TEST
 from beaver_ftc.plant import ENGINE_SPEED, SENSORS
 from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.inequality import Document
@@ -16,54 +16,63 @@ TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
     "engine_rpm", "manifold_pressure",
 )  # fmt: skip
-NOT_STATED = "instruments raised it between two rows of the log"
-NOT_COMPUTED = "a sensor raised it that no equation of the diagnosis uses"
-_LEAST = 1e-13  # of the limit: less is rounding
+BECAUSE_BETWEEN_ROWS = "instruments raised it between two rows of the log"
+BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the diagnosis uses"
+ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding
 
 
-def of_alarm(monitor: SensorMonitor) -> Document:
+def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
     """The test that sound instruments would have passed; why there is none where no test was failed.
 
     monitor: at the alarm.
     """
-    number, failed = monitor.largest_test, monitor.share > 1.0
-    if failed and number >= N_COMPUTED:
-        return {"because": NOT_COMPUTED}
+    number, failed = monitor.worst_test, monitor.worst_test_ratio > 1.0
+    if failed and number >= N_COMPUTED_TESTS:
+        return {"because": BECAUSE_NO_EQUATION}
     if failed:
         looks = [look for look in _looks(monitor) if any(look)]
-        value, limit = sum(z - then for z, then, _ in looks), sum(most for *_, most in looks)
+        value, limit = (
+            sum(reading - predicted for reading, predicted, _ in looks),
+            sum(bound for *_, bound in looks),
+        )
         if value < 0.0:  # the other way round
-            looks, value = [[then, z, most] for z, then, most in looks], -value
+            looks, value = [[predicted, reading, bound] for reading, predicted, bound in looks], -value
         if value > limit:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
-    named = monitor.named
-    if named >= 0 and monitor.replaced[named] and not failed:
-        because = f"there was no reading of {sensor_words(SENSORS[named])}, and no column that says so"
-        return {"missing": [named], "because": because}
-    return {"because": NOT_STATED}
+    sensor = monitor.isolated_sensor
+    if sensor >= 0 and monitor.is_replaced[sensor] and not failed:
+        because = f"there was no reading of {sensor_words(SENSORS[sensor])}, and no column that says so"
+        return {"missing": [sensor], "because": because}
+    return {"because": BECAUSE_BETWEEN_ROWS}
 
 
-def as_logged(said: Document, rows: Mapping[str, np.ndarray]) -> Document:
-    """That a reading is missing, where the log says so: one, where sound instruments leave out none."""
+def with_missing_column(said: Document, rows: Mapping[str, np.ndarray]) -> Document:
+    """A statement that a reading is missing, without its reason for doubt if the log has that in its column
+    `watch_missing`. Its sides: number of missing readings, and how many sound instruments leave out."""
     if rows.get("watch_missing", rows["detected"] - 2.0)[said["frame"]] != said["missing"][0]:
         return said
     return {name: value for name, value in said.items() if name != "because"} | {"sides": [1.0, 0.0]}
 
 
 def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
-    """Reading, its prediction, and by how much sound instruments may differ: of the last look; and what the
-    filter and its bound keep of those before."""
-    test, number = monitor.test, monitor.largest_test
-    if number >= RPM:
-        predicted = float(monitor.engine[number - RPM])
-        within = float(monitor.error[ENGINE_SPEED + number - RPM]) + 1e-6
-        yield [predicted + test.residual, predicted, within]
+    """Triples (reading, prediction, largest difference with sound instruments) in the residual's unit: of the
+    last sample; then what the filter and its bound keep of all samples before."""
+    test, number = monitor.test, monitor.worst_test
+    if number >= RPM_TEST:
+        predicted = float(monitor.engine_command[number - RPM_TEST])
+        bound = float(monitor.reading_error_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING
+        yield [predicted + test.residual, predicted, bound]
         return
-    reads = TESTS[number]
-    predicted = float(monitor.predicted[SENSORS.index(reads)]) if reads in SENSORS else 0.0
-    m = int(np.argmax(np.abs(test.filtered) / test.bound))
-    now = float(monitor.step_s * test.rate + test.noise + test.air * monitor.gusts[m])
-    yield [predicted + test.residual, predicted, now]
-    kept = np.array([test.filtered[m] - test.residual, test.bound[m] - now])
-    kept[np.abs(kept) <= _LEAST * np.array([abs(test.filtered[m]), test.bound[m]])] = 0.0
-    yield [float(kept[0]), 0.0, max(float(kept[1]), 0.0)]
+    reading = TESTS[number]
+    predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
+    pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
+    sample_bound = float(
+        monitor.sample_time_s * test.bound_per_s
+        + test.bound_per_sample
+        + test.gust_gain * monitor.gust_change_bound_mps[pole]
+    )
+    yield [predicted + test.residual, predicted, sample_bound]
+    filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]
+    earlier = np.array([filtered - test.residual, bound - sample_bound])
+    earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(filtered), bound])] = 0.0
+    yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

@@ -1,35 +1,33 @@
-"""Exclusions of fault types whose parameter one number is: two frames that no such number explains.
+"""Exclusions of fault types whose parameter is one number: two frames that no such number explains.
 
-Stuck p = c, floating p = 0, a loss p = (1 + theta) u: so is a surface at fault in frames that health does not
-explain. The others are excluded by their course over many frames (courses.py). What an actuator brings back
-by and by is not certified.
+The relation of a type (`FaultType`) says where a surface at fault is, in frames that health does not explain.
+A type whose row names a course is excluded by comparing many frames (courses.py). Where an actuator may bring
+a surface back over several frames, an exclusion is not certified.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from math import inf
 
 import numpy as np
 
-from beaver_ftc.diagnosis.types import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis.types import TYPE_WORDS as WORDS
-from beaver_ftc.diagnosis.types import kind_of
+from beaver_ftc.diagnosis import TYPE_DESCRIPTIONS as WORDS
+from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis import DeflectionRelation
+from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS
 from beaver_ftc_assurance.certificates.inequality import (
     History,
     Hypothesis,
     Term,
-    constant_pair,
-    of_one_frame,
+    constant_theta_tests,
+    single_frame_tests,
 )
 from beaver_ftc_assurance.certificates.tape import Tape
 
-COURSE = "frames of quiet excluded it, or what several say together"
-SWING = "of several instants a frame, a swing that a stop cuts off may keep its sign"
-UNKNOWN = "no certificate is known for this type"
-RETURN = "its actuator may be bringing the surface back"
-CONSTANT_LOSS, STUCK, FLOAT, BIAS = map(kind_of, ("loss_of_effectiveness", "stuck", "float", "bias"))
-VARYING_LOSS = kind_of("loss_of_effectiveness", constant=False)
-BY_FRAMES = (CONSTANT_LOSS, VARYING_LOSS, STUCK, FLOAT)  # what single frames can exclude
+EXCLUDED_BY_MANY_FRAMES = "frames of quiet excluded it, or what several say together"
+OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off may keep its sign"
+UNKNOWN_TYPE = "no certificate is known for this type"
+RETURNING_SURFACE = "its actuator may be bringing the surface back"
+HELD_ANYWHERE = DeflectionRelation(gain=0.0, theta_is_share=False, theta_range=lambda low, high: (low, high))
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
@@ -42,71 +40,108 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
             yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
 
 
-def why_not(tape: Tape, kind: int) -> str | None:
+def reason_not_certified(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm.diagnosis.types_config
-    if TYPES[kind].has_shown is not None and not config.single_instant:
-        return SWING
-    return RETURN if config.returns and TYPES[kind].on_release is not None else None
+    if TYPES[kind].has_shown is not None and not config.is_single_instant:
+        return OSCILLATION_AT_STOP
+    return (
+        RETURNING_SURFACE
+        if config.returns_via_actuator and TYPES[kind].on_possible_release is not None
+        else None
+    )
 
 
-def name_of(surface: str, kind: int) -> str:
+def exclusion_name(surface: str, kind: int) -> str:
     """What is excluded, in words."""
     return f"{surface} {WORDS[kind]}"
 
 
-def column_of(surface: str, kind: int) -> str:
+def exclusion_column(surface: str, kind: int) -> str:
     """The column of the log that says whether it is excluded."""
-    return f"{name_of(surface, kind).replace(' ', '_')}_excluded"
+    return f"{exclusion_name(surface, kind).replace(' ', '_')}_excluded"
 
 
-def row_of(tape: Tape, s: int, kind: int) -> int:
+def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict[str, float]:
+    """What a type says of the surface, by column of the log: of a type that the checker does not define."""
+    row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
+    if WORDS[kind] in {*RELATIONS, *COURSES}:
+        return {}
+    if row.excluding_comparison:
+        return {f"{name}_course_{row.excluding_comparison.replace(' ', '_')}": row.stop_direction}
+    if row.deflection_relation is None:
+        return {}
+    actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
+    low, high = row.deflection_relation.theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+    return {
+        f"{name}_gain": row.deflection_relation.gain,
+        f"{name}_theta_is_share": float(row.deflection_relation.theta_is_share),
+        f"{name}_theta_is_constant": float(row.has_constant_parameter),
+        f"{name}_theta_low": low, f"{name}_theta_high": high,
+    }  # fmt: skip
+
+
+def exclusion_row(tape: Tape, s: int, kind: int) -> int:
     """The row from which on a type that is excluded at the end has been."""
     clear = np.flatnonzero(~(tape.types[:, s, kind] > 0))
     return tape.first + (int(clear[-1]) + 1 if len(clear) else 0)
 
 
-def hypothesis(tape: Tape, s: int, kind: int) -> Hypothesis:
-    """What a fault of this type on surface s adds to the innovation."""
+def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
+    """The effect on the innovation of a fault of this type on a surface."""
+    relation = TYPES[fault_type].deflection_relation
+    assert relation is not None
+    return _effect_of_relation(tape, surface, relation, TYPES[fault_type].has_constant_parameter)
+
+
+def hypothesis_held_anywhere(tape: Tape, surface: int) -> Hypothesis:
+    """The effect on the innovation of a surface held at theta, rad: by it a frame bounds the position."""
+    return _effect_of_relation(tape, surface, HELD_ANYWHERE, True)
+
+
+def _effect_of_relation(
+    tape: Tape, surface: int, relation: DeflectionRelation, theta_is_constant: bool
+) -> Hypothesis:
+    """G (p - u) of a relation; p: position of the surface, u: command in effect, rad."""
     diagnosis = tape.alarm.diagnosis
-    e = diagnosis.layout.position_estimator[s]
+    e = diagnosis.layout.position_estimator[surface]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
-    asked = diagnosis.estimators[e].axes
-    if diagnosis.types_config.block_frames > 1:  # blocks: the axis on which no effect changes its sign
-        asked = (diagnosis.layout.dominant_axis[s],)
-    actuator = diagnosis.surfaces[s].actuator
-    low, high = actuator.travel_low_rad, actuator.travel_high_rad
-    if kind == STUCK:
-        return Hypothesis(tape.first, -Gu, G, spread, low, high, True, True, asked)
-    if kind == FLOAT:
-        neutral = min(max(0.0, low), high)
-        return Hypothesis(tape.first, neutral * G - Gu, 0.0 * G, spread, 0.0, 0.0, True, True, asked)
-    if kind == BIAS:  # away from the stops
-        return Hypothesis(tape.first, 0.0 * G, G, spread, low - high, high - low, True, True, asked)
-    loss = Hypothesis(tape.first, 0.0 * G, Gu, spread, -1.0, 0.0, True, True, asked)
-    return loss if kind == CONSTANT_LOSS else replace(loss, constant=False, shown=False)
+    axes = diagnosis.estimators[e].active_axes
+    if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
+        axes = (diagnosis.layout.dominant_axis[surface],)
+    actuator = diagnosis.surface_fault_types[surface].actuator
+    low, high = relation.theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+    offset, slope = (relation.gain - 1.0) * Gu, Gu if relation.theta_is_share else G
+    if low == high:  # theta is known
+        offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
+    return Hypothesis(
+        tape.first, offset, slope, spread, low, high, theta_is_constant, theta_is_constant, axes
+    )
 
 
-def candidates(of: Hypothesis, history: History, alarm: int, k: int) -> Iterator[list[Term]]:
-    """Inequalities that may exclude it by frame k."""
-    if not of.constant:
-        for frame in (k - 1, k):
-            yield from of_one_frame(frame, of)
+def candidate_inequalities(
+    hypothesis: Hypothesis, history: History, alarm_frame: int, last_frame: int
+) -> Iterator[list[Term]]:
+    """Inequalities that may exclude a hypothesis by frames up to last_frame."""
+    if not hypothesis.theta_is_constant:
+        for frame in (last_frame - 1, last_frame):
+            yield from single_frame_tests(frame, hypothesis)
         return
-    frames = np.arange(alarm, k + 1)
-    frames = frames[wrong(history, frames)]
-    if of.slope.any():
-        yield constant_pair(of, history, frames)
+    frames = np.arange(alarm_frame, last_frame + 1)
+    frames = frames[is_unexplained_by_health(history, frames)]
+    if hypothesis.slope.any():
+        yield constant_theta_tests(hypothesis, history, frames)
     for frame in frames[-3:].tolist():
         yield from ([Term(sign * d, inf, frame - 1, frame)] for d in np.eye(3) for sign in (1.0, -1.0))
 
 
-def wrong(history: History, frames: np.ndarray) -> np.ndarray:
-    """In which frames health explains nothing; of several instants, nor in those beside them."""
-    rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(history.x)))
-    innovation, bound = history.innovation(rows), history.frame_bound(rows)
-    beyond = (np.abs(innovation) > bound).any(axis=1)
-    beside = np.r_[beyond, np.zeros(len(frames) + 2 - len(beyond), bool)]
-    if history.share == 1.0:
-        return np.asarray(beside[1:-1])
-    return np.asarray(beside[:-2] & beside[1:-1] & beside[2:])
+def is_unexplained_by_health(history: History, frames: np.ndarray) -> np.ndarray:
+    """Whether health does not explain each of consecutive frames, (frames,). In frames of several instants,
+    health must not explain the frames before and after either: a fault may begin within a frame."""
+    rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(history.rates_rad_s)))
+    innovation, bound = history.innovation(rows), history.innovation_bound(rows)
+    exceeds = (np.abs(innovation) > bound).any(axis=1)
+    padded = np.r_[exceeds, np.zeros(len(frames) + 2 - len(exceeds), bool)]
+    if history.instant_share == 1.0:
+        return np.asarray(padded[1:-1])
+    return np.asarray(padded[:-2] & padded[1:-1] & padded[2:])

@@ -26,7 +26,7 @@ def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> tupl
     recorder.land()
     document, columns = certificate.certificate(scenario, log, recorder)
     whole = MemoryLog()
-    certificate.copy_with(log, columns, whole)
+    certificate.copy_with_columns(log, columns, whole)
     return whole, document
 
 
@@ -35,7 +35,7 @@ def proof(scenario: Scenario, log: Log) -> Proof:
     than ours diagnosed."""
     document, columns = certificate.certificate(scenario, log)
     whole = Columns()
-    certificate.copy_with(log, columns, whole)
+    certificate.copy_with_columns(log, columns, whole)
     whole.close()
     return Proof(document, dict(whole), to_yaml(scenario))
 
@@ -44,7 +44,7 @@ def write(scenario: Scenario, log: MemoryLog, document: Document, folder: Path) 
     """Write certificate, log and the scenario that declares the bounds into a folder."""
     log.copy_to(folder / "log.parquet")
     (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
-    (folder / certificate.FILE).write_text(certificate.as_text(document), encoding="utf-8")
+    (folder / certificate.FILE_NAME).write_text(certificate.as_text(document), encoding="utf-8")
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
@@ -59,13 +59,13 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         recorder.keep()
         frame = FrameReadout(frames[0])
         diagnosis = frame.diagnosis
-        of_frame = frame.rates_rad_s, frame.model_rad_s2, diagnosis.bound.eta_bar_rad_s2
+        of_frame = frame.rates_rad_s, frame.model_rad_s2, diagnosis.declared_bounds.eta_bar_rad_s2
         if scenario.fdi.statistical:
-            shares = chance.shares(diagnosis, surfaces)
+            shares = chance.likelihood_shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
-            shares |= {"watch_share": monitor.share, "watch_test": monitor.largest_test}
-        values = [frame.alarmed, *diagnosis.excluded, *shares.values()]  # as in a log of ours
+            shares |= {"watch_share": monitor.worst_test_ratio, "watch_test": monitor.worst_test}
+        values = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]  # as in a log of ours
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])
     log.write(np.array(rows))

@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.compiled import direct, kernel
 from beaver_ftc.diagnosis import estimator_names
-from beaver_ftc.diagnosis.detection import N_SLOTS
+from beaver_ftc.diagnosis.detection import N_ONSET_SLOTS
 from beaver_ftc.loop import (
     FrameReadout,
     Loop,
@@ -23,11 +23,11 @@ from beaver_ftc.loop import (
 )
 from beaver_ftc.scenario import Scenario
 
-BEFORE = 40  # frames kept before the alarm: what was before them is in the filters
-BEFORE_CHANCE = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
-AFTER_S = 10.0  # after the last event, where types are excluded one by one
-MOST_AFTER = 1 << 16  # frames kept after the alarm
-_AT_ONCE = 1 << 10  # so many at first
+FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
+STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_ONSET_SLOTS + 2  # with the statistical detector: its oldest onset
+KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
+MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm
+FIRST_ROOM_AFTER_ALARM = 1 << 10  # frames for which there is room at first; doubled when it is used up
 
 
 @dataclass
@@ -66,8 +66,8 @@ class Tape:
         return self.first + self.frames
 
 
-class _Places:
-    """Where in a record quantities stand, as numbers of its words; and what they are again."""
+class _RecordWords:
+    """The places of quantities in a record, as numbers of its words (8 bytes); reads them back from rows."""
 
     def __init__(self, views: dict[str, np.ndarray]) -> None:
         """views: of a record each word of which is its own number."""
@@ -101,13 +101,13 @@ class Recorder:
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
         config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
-        self._always = _Places(recorded_always(numbers[0], n, config.fault_class == "all"))
-        self._early = _Places(recorded_until_alarm(numbers[0], n, config.statistical is not None))
+        self._always = _RecordWords(recorded_always(numbers[0], n, config.fault_class == "all"))
+        self._early = _RecordWords(recorded_until_alarm(numbers[0], n, config.statistical is not None))
         self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
-        ring = 1 + (BEFORE if config.statistical is None else BEFORE_CHANCE)
+        ring = 1 + (FRAMES_BEFORE_ALARM if config.statistical is None else STATISTICAL_FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
-        self._kept = np.empty((ring + _AT_ONCE, len(self._always.words)), np.int64)
+        self._kept = np.empty((ring + FIRST_ROOM_AFTER_ALARM, len(self._always.words)), np.int64)
         self._frames, self._alarm = frames, copy_memory(frames)
         self._take_arguments()
 
@@ -119,11 +119,11 @@ class Recorder:
         words, alarm = _words_of(self._frames), _words_of(self._alarm)
         places = self._always.words, self._early.words
         self._arguments = words, *places, self._kept, self._ring, alarm, self._state
-        self._note = direct(note, *self._arguments)
+        self._keep_frame = direct(keep_frame, *self._arguments)
 
     def keep(self) -> None:
         """Keep what stands in the record."""
-        if self._note(*self._arguments) and len(self._kept) < MOST_AFTER:
+        if self._keep_frame(*self._arguments) and len(self._kept) < MAX_FRAMES_AFTER_ALARM:
             self._kept = np.resize(self._kept, (2 * len(self._kept), self._kept.shape[1]))
             self._take_arguments()
 
@@ -134,7 +134,7 @@ class Recorder:
         ring, raised = len(self._ring), alarm >= 0
         alarm, at_alarm = (alarm, FrameReadout(self._alarm[0])) if raised else (seen - 1, last)
         since, restarted = at_alarm.since, last.since
-        after = round(AFTER_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
+        after = round(KEPT_AFTER_EVENT_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
         first = max(min(events) - ring + 1, alarm - ring + 1, since, clear, 0)
         end = min(max(events) + after, rows, alarm + 1 + len(self._kept) - ring)
         if restarted > alarm:  # another diagnosis began
@@ -151,7 +151,7 @@ class Recorder:
 
 
 @kernel
-def note(record, always, early, kept, ring, alarm, state):
+def keep_frame(record, always, early, kept, ring, alarm, state):
     """Copy the words `always` of a record (words,) and, up to the alarm, the words `early`: up to the alarm
     into a ring of rows, after it into the rows of `kept` behind the ring. At the alarm `alarm` becomes a copy
     of the record.
@@ -185,7 +185,7 @@ def _words_of(frames: np.ndarray) -> np.ndarray:
     return frames.base[: frames.nbytes].view(np.int64)
 
 
-def recorded(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
+def tape_of_flight_again(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
     """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
     recorder = Recorder(scenario)
     fly(scenario, watch=recorder.watch)

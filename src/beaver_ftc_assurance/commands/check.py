@@ -19,8 +19,9 @@ def command(
 ) -> None:
     """Check a run's certificate.
 
-    Computes every statement of certificate.json again from the log and from the bounds that the scenario
-    declares, and prints it in a sentence, or why it is refused. Exit status 0 if all hold, 1 if not.
+    The command computes every statement of certificate.json again, from the log and from the bounds that the
+    scenario declares. It prints each statement as a sentence, or the reason why it refuses the statement.
+    The exit status is 0 if all statements hold, otherwise 1.
 
     Examples:
       beaver-ftc run elevator-partial-loss --certificate

@@ -3,7 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +20,7 @@ from beaver_ftc.cli import (
 from beaver_ftc.commands import declare
 
 if TYPE_CHECKING:
+    from beaver_ftc.results import Judged
     from beaver_ftc_assurance.evidence.plan import EvidencePlan
 
 
@@ -53,18 +54,20 @@ def command(arguments: Arguments) -> None:
     plan: A plan of evidence, or the name of a built-in one.
     out: Folder for the evidence. Default: runs/ and the plan's name.
     replay: Fly only this flight again, as `run` would, and evaluate it.
+    no_report: With --replay: skip report.html and the figures of the flight. The evidence is always written.
     """
     from beaver_ftc_assurance.evidence.plan import load_plan
 
-    def fly() -> dict[str, Any]:
+    def fly() -> "Judged":
         plan = load_plan(arguments.plan)
         return _fly(plan, arguments) if arguments.replay is None else _replay(plan, arguments)
 
     judged(arguments.plan, arguments.format, arguments.junit, fly)
 
 
-def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
-    """Fly and judge all of it; what JUnit XML says of it."""
+def _fly(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
+    """Fly and judge all of it."""
+    from beaver_ftc.results import Judged
     from beaver_ftc.studies.engine import cores
     from beaver_ftc_assurance.evidence.shown import as_expectations, as_text, run_plan
 
@@ -73,25 +76,24 @@ def _fly(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
         document = run_plan(plan, folder.absolute(), arguments.workers or cores(), progress)
     said = document | {"folder": str(folder)}
     answer(arguments.format, said, lambda: as_text(document, str(folder), sys.stdout.isatty()))
-    expectations = as_expectations(document)
-    return {"scenario": plan.file.name, "passed": document["passed"], "expectations": expectations}
+    return Judged(plan.file.name, document["passed"], as_expectations(document))
 
 
-def _replay(plan: "EvidencePlan", arguments: Arguments) -> dict[str, Any]:
-    """Fly one flight into a result folder of its own; what JUnit XML says of it."""
-    from beaver_ftc.results import Metrics, verdict_text
+def _replay(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
+    """Fly one flight into a result folder of its own, and judge it."""
+    from beaver_ftc.results import Judged, Metrics, verdict_text
     from beaver_ftc.results import run_scenario as run
     from beaver_ftc_assurance.evidence.shown import of_flight
 
     scenario, requirements = of_flight(plan, str(arguments.replay))
     out = Path("runs") if arguments.out is None else arguments.out
     document = run(scenario, out, not arguments.no_report)
-    folder, meets = str(out / scenario.name), all(each["passed"] for each in requirements)
-    lines = [f"{each['name']} {each['actual']}" for each in requirements]
+    folder, meets = str(out / scenario.name), all(each.passed for each in requirements)
+    lines = [f"{each.name} {each.actual}" for each in requirements]
     said = document | {"folder": folder, "requirements": lines, "passed": meets}
 
     def text() -> str:
         return "\n".join([verdict_text(Metrics.of(document), folder, sys.stdout.isatty()).rstrip(), *lines])
 
     answer(arguments.format, said, text)
-    return {"scenario": scenario.name, "passed": meets, "expectations": requirements}
+    return Judged(scenario.name, meets, requirements)

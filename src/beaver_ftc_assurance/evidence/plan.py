@@ -60,23 +60,24 @@ Text = Annotated[str, StringConstraints(max_length=2000)]
 
 
 class OfSweep(SweepExpect):
-    """What the statistics of a sweep must show, as its own `expect` says it."""
+    """Conditions that the statistics of a sweep must meet, as in the `expect` of a sweep file."""
 
     type: Literal["sweep"]
 
 
 class OfHandling(Section):
-    """The level of MIL-F-8785C that it must have: where it is trimmed, or where its failure leaves it."""
+    """Required level of handling qualities in MIL-F-8785C, in trim or after the failure of the scenario."""
 
     type: Literal["handling_qualities"]
-    level: Whole = number(1, "1", "the worst level allowed", ge=1, le=3)
+    level: Whole = number(1, "1", "worst level that is allowed; 1 is the best", ge=1, le=3)
 
 
 class OfMargins(Section):
-    """What each surface's loop must have, healthy and with each loss that the default law knows."""
+    """Required stability margins of the loop of each surface: healthy, and after each loss for which the
+    default law is     designed."""
 
     type: Literal["margins"]
-    gain_db: Number = number(6.0, "dB", "gain margin up and down", ge=0, le=100)
+    gain_db: Number = number(6.0, "dB", "gain margin, upwards and downwards", ge=0, le=100)
     phase_deg: Number = number(45.0, "deg", "phase margin", ge=0, le=180)
 
 
@@ -84,15 +85,16 @@ Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
 
 
 class Requirement(Section):
-    """One requirement: what it says, where it comes from, what is flown for it and what must come out.
+    """One requirement: its text, its clause, its flights and its condition (`expect`, `formula` or `bar`).
 
-    id: what it is called: letters, digits, - and _
-    text: what is required, in words
-    clause: of which regulation or standard, and how it is read here
-    over: names of `flights`, built-in scenarios and sweeps, files in the plan's own folder or below it
-    expect: what must come out of each flight, as a scenario's `expect` says it
-    formula: signal temporal logic over log columns, true of each flight
-    bar: what a study must show
+    id: name of the requirement: letters, digits, - and _
+    text: the requirement in words
+    clause: clause of a regulation or standard, and how it is interpreted
+    over: flights of the requirement: names of `flights`, names of built-in scenarios and sweeps, or files in
+    the     folder of the plan or below it
+    expect: conditions that each flight must meet, as in a scenario's `expect`
+    formula: formula of signal temporal logic over columns of the log, which must be true in each flight
+    bar: limit for the result of a study
     """
 
     id: str = entry(..., pattern=NAME_PATTERN, max_length=40, examples=["JAM-1"])
@@ -115,10 +117,10 @@ class Requirement(Section):
 class PlanFile(Section, title="beaver-ftc plan of evidence"):
     """Requirements, and the flights that are flown for them.
 
-    name: of the plan: letters, digits, - and _
-    description: what the plan is for
-    flights: scenarios and sweeps of the plan's own, by name
-    requirements: what must hold
+    name: name of the plan: letters, digits, - and _
+    description: purpose of the plan
+    flights: scenarios and sweeps of this plan, by name
+    requirements: list of the requirements
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["flight-controls"])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import as_json
+from beaver_ftc.results import Expectation, as_json
 from beaver_ftc.studies.engine import Progress, Study, run_study
 from beaver_ftc.studies.present import Heading, Makers, Part, Table, aligned, as_html, number, versions_line
 from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, failed, fly_flight
@@ -227,24 +227,24 @@ def as_text(document: Document, folder: str, colour: bool = False) -> str:
     return "\n\n".join(filter(None, (lines, "\n".join(again), counted(document), f"results: {folder}")))
 
 
-def as_expectations(document: Document) -> list[Document]:
+def as_expectations(document: Document) -> tuple[Expectation, ...]:
     """What JUnit XML says of each requirement, and of one that is not met which command flies it again."""
-    return [
+    return tuple(
         _expectation(
             each["id"], _asked(each["asked"]), each["verdict"], each["worst"], each["worst"]["command"]
         )
         for each in document["requirements"]
-    ]
+    )
 
 
 def _expectation(
     name: str, expected: str, verdict: str, found: Document, again: str | None = None
-) -> Document:
+) -> Expectation:
     actual = f"{verdict}: {_found(found)}" + (f"; again: {again}" if again else "")
-    return {"name": name, "passed": verdict == MET, "expected": expected, "actual": actual}
+    return Expectation(name, verdict == MET, expected, actual)
 
 
-def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[Document]]:
+def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:
     """A flight by name: its scenario, and what each requirement over it says, part by part.
 
     Raises BadInput for a name that the plan does not have.
@@ -257,8 +257,8 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, list[Document]]:
             f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
         )
     found, (source, run) = fly_flight(plan, named[name])["found"], named[name]
-    judged = [
+    judged = tuple(
         _expectation(id, said(one["expected"]), one["verdict"], one)
         for id, parts in found.items() for one in parts
-    ]  # fmt: skip
+    )  # fmt: skip
     return plan.sources[source].scenario(run), judged

@@ -6,13 +6,13 @@ import signal
 import socket
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from multiprocessing.connection import Connection
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import Flight
+from beaver_ftc.results import Flight, LinkMetrics, Metrics
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_links.sitl import PORTS, Protocol, failures, px4
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
@@ -143,40 +143,45 @@ class Endpoint:
 
     def result(self) -> Flight:
         """What the flight has yielded, with a section `link` in its metrics."""
-        sim, options = self.vehicle.flight, self.options
-        landed = sim.land()
-        document = landed.metrics
-        document["flight"]["law"] = NAMES[options.protocol]
-        self._note_end(document)
-        document["tracking"] |= dict.fromkeys(("pre_fault_rms_deg_s", "post_fault_rms_deg_s"))
-        self._note_silence(document)
+        landed = self.vehicle.flight.land()
+        found = self._without_certainty(self._ended_early(Metrics.of(landed.metrics)))
+        found = replace(
+            found,
+            flight=replace(found.flight, law=NAMES[self.options.protocol]),
+            tracking=replace(found.tracking, pre_fault_rms_deg_s=None, post_fault_rms_deg_s=None),
+            link=self._link_metrics(),
+        )
+        return replace(landed, metrics=found.document())
+
+    def _link_metrics(self) -> LinkMetrics:
         self.link.counts["off_rate"] = self.vehicle.off_rate
-        document["link"] = {
-            "protocol": options.protocol.value,
+        return LinkMetrics.of({
+            "protocol": self.options.protocol.value,
             "packets_hz": self.vehicle.packets_hz,
             "frames_hz": self.vehicle.scenario.rate_hz,
             **self.link.document(),
-            "diagnosed_from_s": sim.listens_from_s,
+            "diagnosed_from_s": self.vehicle.flight.listens_from_s,
             "speed": self.pace.speed,
             "late_ms": round(1e3 * self.pace.late_s, 3),
             "said": [text._asdict() for text in self._teller.kept],
-        }
-        return landed
+        })  # fmt: skip
 
-    def _note_end(self, document: dict[str, Any]) -> None:
+    def _ended_early(self, found: Metrics) -> Metrics:
         """A flight that somebody ended before its time has not done what is expected of it."""
-        if self.ended and not self.vehicle.over:
-            at_s = self.vehicle.flight.t_s
-            self._say(f"interrupted at {at_s:.2f} s of {self.vehicle.scenario.duration_s:g} s: not passed")
-            document["interrupted_s"], document["passed"] = at_s, False
+        if not self.ended or self.vehicle.over:
+            return found
+        at_s = self.vehicle.flight.t_s
+        self._say(f"interrupted at {at_s:.2f} s of {self.vehicle.scenario.duration_s:g} s: not passed")
+        return replace(found, interrupted_s=at_s, passed=False)
 
-    def _note_silence(self, document: dict[str, Any]) -> None:
+    def _without_certainty(self, found: Metrics) -> Metrics:
         """No alarm was certain of what broke before the diagnosis began, near the ground."""
-        from_s, fault = self.vehicle.flight.listens_from_s, document["fault"]
+        from_s, fault = self.vehicle.flight.listens_from_s, found.fault
         if from_s is None:
             self._say("the diagnosis never began: near the ground nothing is diagnosed")
-        if from_s is None or (fault and fault["at_s"] < from_s):
-            document["detection"]["guaranteed_delay_s"] = None
+        if from_s is None or (fault and fault.at_s < from_s):
+            return replace(found, detection=replace(found.detection, guaranteed_delay_s=None))
+        return found
 
     def close(self) -> None:
         """Hang up."""

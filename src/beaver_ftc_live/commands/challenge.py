@@ -22,13 +22,13 @@ def new(
 ) -> None:
     """Write a challenge for a class.
 
-    DIR/public is for the students: rules, flights to practise on, a detector and a law to begin with.
-    DIR/teacher has the hidden flights, with seeds drawn again: keep it to yourself.
+    Give DIR/public to the students: rules, practice flights, a detector and a law to begin with. Keep
+    DIR/teacher, which has the hidden flights with new seeds.
 
     Examples:
       beaver-ftc challenge new autumn
 
-    folder: Folder of the challenge, a new one.
+    folder: New folder for the challenge.
     flights: Hidden flights; one in four has no fault.
     """
     from beaver_ftc_live.challenge import folders
@@ -53,12 +53,12 @@ def submit(
 ) -> None:
     """Check a detector or a law, and hand it in.
 
-    It flies one practice flight as it will be graded: in a process of its own, without files, network, the
-    truth and the seed.
+    The command flies one practice flight under the conditions of `grade`: in a process of its own, without
+    access to files, network, truth and seed. A submission never replaces an earlier one.
 
-    file: One Python file with one class that has reset and step; or a folder with one.
-    student: Whose it is; the file's name if left out.
-    to: Folder of the challenge; left out, it is only checked. Submissions are numbered, none is replaced.
+    file: A Python file with one class that has reset and step, or a folder with such a file.
+    student: Name of the student. Default: the name of the file.
+    to: Folder of the challenge. Without it, the file is only checked.
     """
     from beaver_ftc_live.challenge import folders
     from beaver_ftc_live.challenge.grading import tried

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput, suggestion
-from beaver_ftc.scenario import Onset
+from beaver_ftc.results import DeclaredFault, Onset
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc_live.page.messages import Message
 
@@ -86,9 +86,11 @@ class Game:
 
     def _delay_s(self, said: tuple[str, float] | None) -> float | None:
         """From the fault to the right answer, s; None if it was wrong or too early."""
-        if said is None or said[0] != self.fault.get("actuator"):
+        if said is None or self.broken_s is None:
             return None
-        return Onset(self.broken_s).delay_s(said[1])
+        name, time_s = said
+        broken = DeclaredFault(self.fault.get("actuator"), self.fault["type"], self.broken_s)
+        return Onset(self.broken_s).delay_s(time_s) if broken.is_named_by(name) else None
 
     def stop(self) -> None:
         """Give the round up."""

@@ -2,8 +2,8 @@
 
 A link's token becomes a cookie, and only this server's own page may use it. Cookies know no ports: a browser
 would hand one for 127.0.0.1 to whatever else listens there. So each seat has a path that nobody else can
-know, and its cookie is bound to that: a browser may hold several seats, none opens another. The link of
-the pilot's link works once; a guest's works again, since that guest has to come back by it.
+know, and its cookie is bound to that: a browser may hold several seats, none opens another. The
+pilot's link works once; a guest's works again, since that guest has to come back by it.
 
 Host and Origin are checked against the address that the server has, which keeps out pages of other ports and
 names that were made to resolve to this machine.

@@ -13,8 +13,8 @@ from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
 from beaver_ftc.control.engines import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis.monitors import engine_symmetry
-from beaver_ftc.diagnosis.monitors.engine_symmetry import ENGINES
+from beaver_ftc.diagnosis import monitors
+from beaver_ftc.diagnosis.monitors import ENGINE_MONITOR_RECORD
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant
@@ -205,15 +205,15 @@ def test_levers_that_move_as_one_alarm_nobody(jet):
 def judged(jet, missing_n, levers=(0.0, 0.0)):
     """Whether an alarm is raised where engines yaw as a thrust does that the left one does not give, by its
     place in JSBSim's own file."""
-    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINES)[0]
-    engine_symmetry.configure_engine_monitor(of_it["config"], aircraft)
+    aircraft, of_it = read(jet / "aircraft" / "737"), np.zeros(1, ENGINE_MONITOR_RECORD)[0]
+    monitors.configure_engine_monitor(of_it["config"], aircraft)
     names, size = list(aircraft.signals), 11800.0 * aircraft.geometry.wing_area_m2  # N
     y = np.zeros(4 + len(names))
     y[4 + names.index("thrust")] = (60_000.0 - missing_n) / size
     y[4 + names.index("engines_n")] = -missing_n * 193.0 * M_PER_IN / (size * aircraft.geometry.span_m)
     of_it, before = of_it.view(np.recarray), of_it["config"].copy()
-    engine_symmetry.disable_if_differential_thrust(of_it, np.array(levers))
-    alarmed = engine_symmetry.detect_engine_failure(of_it, 1e-6, y)
+    monitors.disable_if_differential_thrust(of_it, np.array(levers))
+    alarmed = monitors.detect_engine_failure(of_it, 1e-6, y)
     assert of_it["config"] == before
     assert of_it["output"]["failed"] == alarmed
     return alarmed
@@ -225,7 +225,7 @@ def test_engines_that_pull_unlike_in_health_are_not_watched(jet, off, known):
     aircraft, boxes, thrust = read(jet / "aircraft" / "737"), [{}, {}], np.array([0.01, 0.1, 0.2])
     of_it = {
         "thrust": thrust,
-        "engines_n": engine_symmetry.mean_arm(aircraft) * thrust + [0.0, off, 0.5 * off],
+        "engines_n": monitors.mean_thrust_arm(aircraft) * thrust + [0.0, off, 0.5 * off],
     }
     set_engines_apart(boxes, aircraft, SimpleNamespace(signals=of_it, box=np.array([0, 1, 1])))
     assert [("engines_apart" in box) for box in boxes] == [known, known]

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 import typer
 
-from beaver_ftc.cli.shared import Format
+from beaver_ftc.cli import Format
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_assurance.commands.evidence import Arguments, command
 

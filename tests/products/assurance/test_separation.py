@@ -290,16 +290,31 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     two readings a frame apart."""
     record = bf.Simulation(ambiguous(substeps=2))._loop.frames
     frame = fill(record.copy()[0], seed=1)
-    frame["fdi"]["bound"]["declared_errors"]["any"], frame["fdi"]["types"]["config"]["length"] = 1, 1
-    bound, design, means = frame["fdi"]["bound"], frame["belief"]["design"], frame["belief"]["means"]
-    x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["belief"]["actuators"]
-    apart(eta_bar=bound["eta_bar"], noise=bound["noise"], inertia=bound["inertia"], G=means["G"], x=x)
+    bound, design, means = (
+        frame["fdi"]["bound"],
+        frame["prediction"]["design"],
+        frame["prediction"]["frame_means"],
+    )
+    bound["declared_errors"]["has_declared_errors"], frame["fdi"]["types"]["config"]["frames_per_block"] = (
+        1,
+        1,
+    )
+    x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["prediction"]["actuators"]
+    apart(
+        eta_bar=bound["eta_bar"],
+        noise=bound["gyro_change_bound"],
+        inertia=bound["inertia_coupling"],
+        G=means["G"],
+        x=x,
+    )
     at = situation_of(SimpleNamespace(last=FrameReadout(frame)), ambiguous(substeps=2), 0.3)
     coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
-    turning = bound["inertia"] * coupling * 0.3**2
-    assert at.bound == pytest.approx(1.1 * (bound["eta_bar"] + turning + 2.0 * bound["noise"] * 100.0))
+    turning = bound["inertia_coupling"] * coupling * 0.3**2
+    assert at.bound == pytest.approx(
+        1.1 * (bound["eta_bar"] + turning + 2.0 * bound["gyro_change_bound"] * 100.0)
+    )
     for found, expected in (
-        (at.G, means["G"]), (at.u, frame["belief"]["u"]), (at.x, x), (at.alpha, y[0]),
+        (at.G, means["G"]), (at.u, frame["prediction"]["u"]), (at.x, x), (at.alpha, y[0]),
         (at.stops, [actuators["low"], actuators["high"]]), (at.step, actuators["step"]),
         (at.approach, actuators["approach"]), (at.alpha_range, (-0.1, 0.28)),
     ):  # fmt: skip

@@ -17,8 +17,7 @@ from typer.testing import CliRunner
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import derived_folder, first_line, read
 from beaver_ftc.cli.main import app
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import design_record
+from beaver_ftc.design.model import DesignFunctions, design_record
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.loop.loop import fly
@@ -32,7 +31,7 @@ from beaver_ftc.scenario.schema import load_text
 from beaver_ftc_aircraft.derive import derivation, first_use
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.derivation import derive, source_of, try_out
-from beaver_ftc_aircraft.derive.fit import errors_of, pursue, signals_of_use
+from beaver_ftc_aircraft.derive.fit import Columns, errors_of, pursue, signals_of_use
 from beaver_ftc_aircraft.derive.outline import not_affine, usual_start
 from beaver_ftc_aircraft.derive.sample import SIDESLIP_RAD, Envelope, places, sample
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
@@ -243,7 +242,7 @@ def test_pursuit_finds_the_terms_that_made_the_data():
     A = rng.normal(size=(400, 12))
     A[:, 7] = 0.0
     b = 2.0 * A[:, 3] - 0.5 * A[:, 9] + 0.1 * A[:, 0]
-    taken, values = pursue(A, b)
+    taken, values = pursue(Columns(A), b)
     assert dict(zip(taken, values, strict=True)) == pytest.approx({3: 2.0, 9: -0.5, 0: 0.1})
 
 

@@ -65,10 +65,10 @@ def test_the_pursuit_as_before(seed, changed):
     A, rng = columns(seed)
     values = 0.5 ** rng.permutation(16)
     b = A @ values + 0.02 * rng.normal(size=300) + 0.3
-    products = fit.Products(A, b)
+    products = fit.Products(fit.Columns(A), b)
     pursued = products.pursued(range(16))
-    few = fit.pursue(A, b, 3)
-    taken, found = fit.pursue(A, b)
+    few = fit.pursue(fit.Columns(A), b, 3)
+    taken, found = fit.pursue(fit.Columns(A), b)
     least = float(np.linalg.lstsq(A[:, taken], b, rcond=None)[1][0])
     assert products.unexplained(taken) == pytest.approx(least, rel=1e-6)
     assert found == pytest.approx(np.linalg.lstsq(A[:, taken], b, rcond=None)[0])
@@ -77,13 +77,13 @@ def test_the_pursuit_as_before(seed, changed):
         "pursued": pursued, "exchanged": products.exchanged(pursued, range(16)), "taken": taken,
         "values": found, "few": few, "left": [products.unexplained(pursued[:k]) for k in range(4)],
         "of use": products.of_use([*pursued, *(k for k in range(16) if k not in pursued)], least * 1.3),
-        "total": [products.total, products.square], "scale": products.scale,
+        "total": [products.total, products.square], "scale": fit.Columns(A).scale,
     })  # fmt: skip
 
 
 def test_columns_are_solved_by_normal_equations_also_if_one_is_there_twice():
     A = np.array([[3.0, 3.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 2.0]])
-    products = fit.Products(A, np.array([6.0, 8.0, 1.0]))
+    products = fit.Products(fit.Columns(A), np.array([6.0, 8.0, 1.0]))
     twice = products.solved([0, 1])
     assert twice.sum() == pytest.approx(10.0)
     assert twice == pytest.approx([5.0, 5.0], rel=0.01), (
@@ -94,14 +94,14 @@ def test_columns_are_solved_by_normal_equations_also_if_one_is_there_twice():
     assert products.unexplained([2]) == pytest.approx(100.0)
     assert products.unexplained([0, 2]) == pytest.approx(0.0, abs=1e-9)
     assert products.total == pytest.approx(26.0)  # about the mean of 5
-    assert fit.Products(A, np.full(3, 2.0)).total == 1.0
+    assert fit.Products(fit.Columns(A), np.full(3, 2.0)).total == 1.0
 
 
 @pytest.mark.parametrize(("share", "terms"), [(1.3e-10, 2), (0.8e-10, 1)])
 def test_what_is_as_little_as_the_turning_earth_is_left(share, terms):
     """1e-10 of the variance."""
     one, other = np.repeat([1.0, -1.0], 50), np.tile([1.0, -1.0], 50)
-    taken, values = fit.pursue(np.column_stack([one, other]), one + np.sqrt(share) * other)
+    taken, values = fit.pursue(fit.Columns(np.column_stack([one, other])), one + np.sqrt(share) * other)
     assert len(taken) == terms
     assert values[0] == pytest.approx(1.0)
 
@@ -111,16 +111,16 @@ def test_a_term_is_taken_for_what_it_explains_of_what_is_left(gain, terms):
     """Orthogonal columns beside a rest that none explains: another needs 3 per mille of what is left."""
     one, other, rest = (np.repeat(np.tile([1.0, -1.0], 2**k), 32 // 2**k) for k in range(3))
     b = one + 0.1 * (np.sqrt(gain) * other + np.sqrt(1.0 - gain) * rest)
-    products = fit.Products(np.column_stack([one, other]), b)
+    products = fit.Products(fit.Columns(np.column_stack([one, other])), b)
     assert products.pursued([0, 1]) == [0, 1][:terms]
     assert products.pursued([1]) == []
-    assert fit.pursue(np.zeros((64, 2)), b)[0] == []
+    assert fit.pursue(fit.Columns(np.zeros((64, 2))), b)[0] == []
 
 
 @pytest.mark.parametrize(("share", "kept_"), [(0.0011, [0, 1]), (0.0009, [0])])
 def test_a_term_stays_if_without_it_a_thousandth_more_is_left(share, kept_):
     one, other, rest = (np.repeat(np.tile([1.0, -1.0], 2**k), 32 // 2**k) for k in range(3))
-    products = fit.Products(np.column_stack([one, other]), one + np.sqrt(share) * other + rest)
+    products = fit.Products(fit.Columns(np.column_stack([one, other])), one + np.sqrt(share) * other + rest)
     assert products.of_use([0, 1], products.unexplained([0, 1])) == kept_
     assert products.of_use([1], products.unexplained([1])) == [1], "not the last one"
 
@@ -128,7 +128,9 @@ def test_a_term_stays_if_without_it_a_thousandth_more_is_left(share, kept_):
 def test_a_column_is_exchanged_for_one_that_leaves_less():
     one, other = np.repeat([1.0, -1.0], 50), np.tile([1.0, -1.0], 50)
     both, rng = one + 0.3 * other, np.random.default_rng(0)
-    products = fit.Products(np.column_stack([one, other, both]), both + 0.01 * rng.normal(size=100))
+    products = fit.Products(
+        fit.Columns(np.column_stack([one, other, both])), both + 0.01 * rng.normal(size=100)
+    )
     assert products.exchanged([0], [0, 1, 2]) == [2]
     assert products.exchanged([2, 1], [0, 1, 2]) == [2, 1]
     assert products.exchanged([0], [0]) == [0]

@@ -9,6 +9,7 @@ import pytest
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim as trimmed
+from beaver_ftc.studies.engine import forks
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.sample import Draw, Envelope, Samples
 from kept import in_short
@@ -90,6 +91,25 @@ def test_samples_of_every_box_share_and_age(plant, trim, changed):
     assert plant.read("velocities/vt-fps") * 0.3048 == pytest.approx(trim.airspeed_mps)
 
 
+@pytest.mark.parametrize("name", ["trainer", "beaver"])
+def test_samples_are_the_same_to_the_bit_whichever_process_looks_at_the_states(name, monkeypatch):
+    monkeypatch.setattr(sampling, "FRAMES", 21)
+    found = []
+    for forked in (True, False):
+        monkeypatch.setattr(forks, "can_fork", lambda forked=forked: forked)
+        plant = Plant(100, aircraft=read(TRAINER) if name == "trainer" else None)
+        level = trimmed(50.0, 1000.0, plant=plant)
+        where, properties = replace(ENVELOPE, of_region=True), {"pressure": "aero/qbar-psf"}
+        samples = sampling.sample(plant, where, level, 60, 3, properties, starts=6)
+        regions = [sampling.Region(where, at) for at in (level, replace(level, airspeed_mps=48.0))]
+        flown = sampling.fly_about_all(plant, regions, 3, properties)
+        plant.run()
+        after = plant.read("accelerations/qdot-rad_sec2")
+        found.append((*vars(samples).values(), *vars(flown).values(), after))
+    with np.printoptions(threshold=np.inf, floatmode="unique"):
+        assert repr(found[0]) == repr(found[1])
+
+
 def test_the_largest_error_is_looked_for_at_corners_and_in_the_middle(plant, trim, monkeypatch):
     """Of errors that a corner, or a corner and the middle, makes largest, all is found; chance finds less."""
     monkeypatch.setattr(sampling, "STARTS_OF_WORST", 4)
@@ -133,13 +153,30 @@ def test_flights_about_trim(plant, trim, changed, monkeypatch):
     assert not changed(held(found))
 
 
-def test_what_is_not_finite_is_left_out():
+def test_a_row_is_what_the_aircraft_does(plant, trim):
+    plant.start(replace(trim, p_rad_s=0.1, q_rad_s=-0.2, beta_rad=0.03))
+    reader = sampling.Reader(plant, PROPERTIES)
+    found = reader.samples([reader.row(3, 2, 1), reader.row()])
+    assert found.x[0] == pytest.approx([0.1, -0.2, 0.0])
+    alpha, beta, V, qdyn = found.y[0]
+    assert (alpha, beta, V) == pytest.approx((trim.alpha_rad, 0.03, trim.airspeed_mps))
+    density_kg_m3 = plant.read("atmosphere/rho-slugs_ft3") * 515.378818
+    assert qdyn == pytest.approx(0.5 * density_kg_m3 * V**2)
+    assert found.signals["thrust"][0] == pytest.approx(trim.settings["thrust_n"])
+    assert found.signals["pressure"][0] * 47.880259 == pytest.approx(qdyn)
+    assert found.u[0] == pytest.approx([trim.surfaces_rad[name] for name in plant.aircraft.surfaces])
+    assert found.rate[0] == pytest.approx([plant.read(f"accelerations/{a}dot-rad_sec2") for a in "pqr"])
+    assert [of.tolist() for of in (found.box, found.level, found.age)] == [[3, 0], [2, 0], [1, 0]]
+
+
+def test_what_is_not_finite_is_left_out(plant):
     def row(k, rate):
-        return ([k, 0, 0], [0, 0, k, 0], [k], [0, 0, k], rate, 1, 2, 0)
+        return [k, 0, 0, 0, 0, k, 0, k, 0, 0, k, *rate, 1, 2, 0]
 
     rows = [row(1.0, [0, 0, 0]), row(2.0, [0, np.nan, 0]), row(3.0, [np.inf, 0, 0]), row(4.0, [1, 2, 3])]
-    found = sampling.as_arrays(rows, ("mach",))
-    assert found.x[:, 0].tolist() == found.y[:, 2].tolist() == found.u[:, 2].tolist() == [1.0, 4.0]
+    found = sampling.finite(sampling.Reader(plant, {"mach": "velocities/mach"}).samples(rows))
+    assert found.x[:, 0].tolist() == found.u[:, 2].tolist() == [1.0, 4.0]
+    assert found.y[:, 2].tolist() == [0.3048, 4 * 0.3048]
     assert found.signals["mach"].tolist() == [1.0, 4.0]
     assert found.rate.tolist() == [[0, 0, 0], [1, 2, 3]]
     assert [of.tolist() for of in (found.box, found.level, found.age)] == [[1, 1], [2, 2], [0, 0]]

@@ -19,13 +19,13 @@ from tools.drawn.reader import doubts
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR
+from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.readout import read_sensor_monitor
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.results import writer
 from beaver_ftc_assurance.certificates import certificate as certificate_module
 from beaver_ftc_assurance.certificates import chance, check_certificate, instruments_say
-from beaver_ftc_assurance.certificates.certificate import as_text, sealed
+from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from beaver_ftc_assurance.certificates.instruments_say import TESTS
 from flying import SINES
@@ -171,12 +171,12 @@ def test_chance_excludes_what_moves_nothing_where_it_raised_the_alarm():
     assert log["fie_elevator_excluded"][said["frame"]] == 1.0
     other = copy.deepcopy(certificate)
     next(one for one in other["statements"] if one["what"] == "elevator")["what"] = "rudder"
-    refused, doubted = refusals("chance", sealed(other))
+    refused, doubted = refusals("chance", with_digest(other))
     assert refused == ["rudder excluded: fie_elevator_excluded is another column than that of this event"]
     assert doubted
     before = copy.deepcopy(certificate)
     before["statements"][0]["frame"] += 1
-    assert all(refusals("chance", sealed(before)))
+    assert all(refusals("chance", with_digest(before)))
 
 
 def looked(name):
@@ -227,9 +227,9 @@ def test_an_alarm_of_instruments_is_that_of_the_log():
         said["looks"][0][0] *= 2.0
         said["sides"][0] += certificate["statements"][0]["looks"][0][0]
         renamed["statements"][0]["test"] = "V"
-        assert refusals(name, sealed(wider))[0] == ["alarm: the log's share is smaller"]
-        assert all(refusals(name, sealed(wider)))
-        assert all(refusals(name, sealed(renamed)))
+        assert refusals(name, with_digest(wider))[0] == ["alarm: the log's share is smaller"]
+        assert all(refusals(name, with_digest(wider)))
+        assert all(refusals(name, with_digest(renamed)))
 
 
 def test_that_a_reading_is_missing_is_what_the_log_says():
@@ -251,9 +251,12 @@ def test_of_several_missing_readings_the_log_says_the_first():
     said = {"frame": 1, "missing": [3, 5], "because": "two", "sides": [2.0, 1.0]}
     logged = {"frame": 1, "missing": [3, 5], "sides": [1.0, 0.0]}
     rows = {"detected": np.array([0.0, 1.0])}
-    assert instruments_say.as_logged(said, rows) == said
+    assert instruments_say.with_missing_column(said, rows) == said
     for readings, expected in (([np.nan, 3.0], logged), ([3.0, 5.0], said)):
-        assert instruments_say.as_logged(said, rows | {"watch_missing": np.array(readings)}) == expected
+        assert (
+            instruments_say.with_missing_column(said, rows | {"watch_missing": np.array(readings)})
+            == expected
+        )
 
 
 def test_in_blocks_a_jam_is_what_a_block_says_in_the_mean():
@@ -298,7 +301,7 @@ def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
 def test_many_constants_are_written_as_one_at_its_worst(monkeypatch):
     """What each takes off the evidence, added up, is what their sum does."""
     certificate, _ = flown("chance")
-    monkeypatch.setattr(chance, "_CONSTANTS", 99)
+    monkeypatch.setattr(chance, "MAX_WRITTEN_CONSTANTS", 99)
     flight = bf.fly({"name": "test", "duration_s": 2.0, "reference": SINES, **FLIGHTS["chance"]})
     summed, one_by_one = certificate["statements"][0], flight.certificate()["statements"][0]
     assert summed["tolerance"] == [1.0]
@@ -317,7 +320,7 @@ def test_in_moving_air_the_axes_that_go_together_are_weighed_together():
     (said,) = (said for said in apart["statements"] if said["what"] is None)
     for its in said["frames"]:
         its["drift"][0][1] = its["drift"][1][0] = 0.0
-    assert all(refusals("chance, in moving air", sealed(apart)))
+    assert all(refusals("chance, in moving air", with_digest(apart)))
 
 
 def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_against_it():
@@ -326,6 +329,21 @@ def test_what_is_stuck_is_neither_floating_nor_lost_and_a_repair_proves_nothing_
         types = {said["what"] for said in certificate["statements"]}
         assert {"aileron float", "aileron loss_of_effectiveness"} <= types
         assert "aileron stuck" not in types
+
+
+def test_a_parameter_that_varies_is_not_held_to_be_one_number():
+    """Frames that contradict each other for every constant loss may be those of a loss that varies."""
+    certificate, _ = flown("any type")
+    of = {said["what"]: said for said in certificate["statements"] if said["what"]}
+    constant, varying = (of[f"aileron loss_of_effectiveness{more}"] for more in ("", " that varies"))
+    assert constant["theta"] == "constant while it shows"
+    assert constant["frame"] <= varying["frame"]
+    event = {name: varying[name] for name in ("what", "column", "frame")}
+    refused, doubted = refusals("any type", with_digest(certificate | {"statements": [constant | event]}))
+    assert refused == [
+        "aileron loss_of_effectiveness that varies excluded: theta of this type is not one number"
+    ]
+    assert doubted
 
 
 def test_a_jam_excludes_every_type_that_moves_otherwise():
@@ -361,7 +379,7 @@ def test_whatever_number_is_altered_the_checker_refuses_it(name):
     for i in rng.choice(len(known), size=min(size, len(known)), replace=False):
         other = altered(certificate, known[i])
         assert refusals(name, other)[0], known[i]
-        assert all(refusals(name, sealed(other))), known[i]
+        assert all(refusals(name, with_digest(other))), known[i]
 
 
 @pytest.mark.parametrize("name", ["gyros", "blocks"])
@@ -378,7 +396,7 @@ def test_the_fault_that_is_there_cannot_be_excluded():
     other = copy.deepcopy(certificate)
     said = next(one for one in other["statements"] if one["what"] == "rudder")
     said |= {"what": "elevator", "column": "fie_elevator_excluded"}
-    why, doubted = refusals("loss", sealed(other))
+    why, doubted = refusals("loss", with_digest(other))
     assert why == [f"elevator excluded: fie_elevator_excluded is not set in row {said['frame']}"]
     assert doubted
 
@@ -387,7 +405,7 @@ def test_a_smaller_declared_bound_is_not_that_of_the_scenario():
     certificate, _ = flown("loss")
     other = copy.deepcopy(certificate)
     other["declared"]["b"] = {}
-    assert refusals("loss", sealed(other))[0] == ["b on p is smaller than the scenario's bound"]
+    assert refusals("loss", with_digest(other))[0] == ["b on p is smaller than the scenario's bound"]
     _, _, scenario = proved("loss")
     assert "SHA-256 of scenario.yaml" in next(failures(certificate, flown("loss")[1], scenario + "\n"))
 
@@ -412,7 +430,7 @@ def test_a_number_of_the_head_that_is_not_the_scenarios_is_refused_by_name(field
     for factor in factors:
         other = copy.deepcopy(certificate)
         reduce(getitem, within, other)[name] *= factor
-        assert refusals("gyros", sealed(other))[0] == [says]
+        assert refusals("gyros", with_digest(other))[0] == [says]
 
 
 COURSES = {
@@ -431,7 +449,7 @@ def test_what_a_course_takes_from_log_and_scenario_is_refused_by_name(kind, fiel
     (said,) = (one for one in other["statements"] if one["what"] == f"aileron {kind}")
     change, says = COURSES[kind, field]
     said[field] = change(said[field])
-    assert refusals("any type", sealed(other))[0] == [f"aileron {kind} excluded: {says}"]
+    assert refusals("any type", with_digest(other))[0] == [f"aileron {kind} excluded: {says}"]
 
 
 def test_a_level_of_chance_is_no_smaller_than_the_declared_rate_of_false_alarms_allows():
@@ -442,7 +460,7 @@ def test_a_level_of_chance_is_no_smaller_than_the_declared_rate_of_false_alarms_
     for level, refused in ((0.9999 * least, True), (1.0001 * least, False)):
         other = copy.deepcopy(certificate)
         other["statements"][0]["level"] = level
-        assert (refusals("chance", sealed(other))[0][0] == too_small) == refused
+        assert (refusals("chance", with_digest(other))[0][0] == too_small) == refused
 
 
 EARLY = 30  # a row before any fault
@@ -491,7 +509,7 @@ def test_a_statement_that_its_own_numbers_make_true_is_refused(road, event):
     alarm = {"what": None, "column": "detected", "frame": int(np.argmax(log["detected"]))}
     said = (early if event == "before any fault" else alarm) | evidence
     said["sides"] = [[9.0, 9.0], [1.0, 1.0]] if "likelihood" in said else [9.0, 1.0]
-    refused, doubted = refusals("gyros", sealed(certificate | more | {"statements": [said]}))
+    refused, doubted = refusals("gyros", with_digest(certificate | more | {"statements": [said]}))
     assert refused
     assert doubted
     assert not any("the stated sides" in why for why in refused)
@@ -509,7 +527,7 @@ def test_the_effect_of_a_fault_is_that_of_the_log():
                 if name in term:
                     term[name] = [2.0 * value + 1.0 for value in term[name]]
                     altered_fields.add(name)
-            assert other == certificate or all(refusals("any type", sealed(other))), (what, name)
+            assert other == certificate or all(refusals("any type", with_digest(other))), (what, name)
     assert {"h", "Z"} <= altered_fields
 
 
@@ -519,7 +537,7 @@ def test_no_field_is_there_that_is_not_known(where):
     other = copy.deepcopy(certificate)
     said = other["statements"][0]
     {"document": other, "statement": said, "term": said["terms"][0]}[where]["comment"] = "true"
-    assert "the field comment is not known" in refusals("loss", sealed(other))[0][0]
+    assert "the field comment is not known" in refusals("loss", with_digest(other))[0][0]
 
 
 def test_the_checker_takes_numpy_and_readers_of_the_files_alone():
@@ -621,21 +639,31 @@ def test_by_the_command_line(tmp_path, monkeypatch, capsys):
 def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned):
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
-    watch = fill(np.zeros(1, SENSOR_MONITOR)[0], seed=2, size=0.3)
-    watch["output"]["largest_test"], watch["output"]["share"] = TESTS.index("alpha"), 1.2
-    step, config = watch["step"], watch["step"]["config"]
-    test = step["test"][TESTS.index("alpha")]
-    test["filtered"], test["bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
+    watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=2, size=0.3)
+    watch["output"]["worst_test"], watch["output"]["worst_test_ratio"] = TESTS.index("alpha"), 1.2
+    redundancy, config = watch["redundancy"], watch["redundancy"]["config"]
+    test = redundancy["test"][TESTS.index("alpha")]
+    test["filtered_residual"], test["filtered_bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)
     test["residual"] = turned * 0.9
-    apart(looked=[config["h"], test["rate"], test["noise"], test["air"], *config["gust_change_bound"]])
-    said = instruments_say.of_alarm(read_sensor_monitor(watch))
+    apart(
+        looked=[
+            config["sample_time_s"],
+            test["bound_per_s"],
+            test["bound_per_sample"],
+            test["gust_gain"],
+            *config["gust_change_bound_mps"],
+        ]
+    )
+    said = instruments_say.instrument_alarm_statement(read_sensor_monitor(watch))
     (now, then, most), (before, nothing, most_before) = said["looks"]
-    foretold = float(step["memory"]["predicted"][SENSORS.index("alpha")])
+    foretold = float(redundancy["memory"]["predicted_reading"][SENSORS.index("alpha")])
     assert said["test"] == "alpha"
     assert sorted([now, then]) == pytest.approx(sorted([foretold + turned * 0.9, foretold]))
     assert now - then == pytest.approx(0.9)
     assert most == pytest.approx(
-        config["h"] * test["rate"] + test["noise"] + test["air"] * config["gust_change_bound"][1]
+        config["sample_time_s"] * test["bound_per_s"]
+        + test["bound_per_sample"]
+        + test["gust_gain"] * config["gust_change_bound_mps"][1]
     )
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)

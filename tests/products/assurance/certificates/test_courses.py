@@ -1,15 +1,19 @@
 """Exclusions by a course, rule by rule, on a surface seen by hand: which frames, compared with what."""
 
 import copy
+import dataclasses
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from beaver_ftc.diagnosis.readout import Actuator, TypesConfig
-from beaver_ftc_assurance.certificates import chance, courses, kinds
-from beaver_ftc_assurance.certificates.courses import Found, Seen
+from beaver_ftc.diagnosis.readout import Actuator, FaultTypesConfig
+from beaver_ftc.diagnosis.types import DeflectionRelation
+from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPE_DESCRIPTIONS, TYPES, type_index_of
+from beaver_ftc_assurance.certificates import chance, check_certificate, courses, kinds
+from beaver_ftc_assurance.certificates.courses import Exclusion, SurfaceBounds
+from fault_kinds import STUCK, VARYING_LOSS
 from telling import numbers
 
 NOTHING = -9.0
@@ -21,55 +25,57 @@ def seen(low, high, wrong=None, ordered=0.1, command=0.0):
     least, most = np.full((n, 3), NOTHING), np.full((n, 3), -NOTHING)
     least[:, 0], most[:, 0] = low, high
     command, room = np.full(n, command), np.zeros((n, 2))
-    return Seen(
+    return SurfaceBounds(
         10, 1, least, most, command, np.tile(command[:, None], 3), room,
         np.ones(n, bool) if wrong is None else np.array(wrong, bool), np.full(n, ordered),
         np.array([-1.0, 1.0]), 2.0,
     )  # fmt: skip
 
 
-ACTUATOR = Actuator(-1.0, 1.0, least_runaway_rad_s=2.0, slowest_step_rad=0.025, approach=0.5)
-CONFIG = TypesConfig(
-    single_instant=True,
-    instants=2,
-    returns=False,
-    half_cycle_frames=2,
-    block_frames=1,
-    block_s=0.05,
+ACTUATOR = Actuator(
+    -1.0, 1.0, min_runaway_rate_rad_s=2.0, min_motion_per_substep_rad=0.025, lag_share_per_substep=0.5
+)
+CONFIG = FaultTypesConfig(
+    is_single_instant=True,
+    n_substeps=2,
+    returns_via_actuator=False,
+    slowest_half_cycle_frames=2,
+    frames_per_block=1,
+    block_duration_s=0.05,
     dt_s=0.5,
 )
 RULES = {
     # What comes nearer by 0.05 rad a frame at least, and more slowly within 0.05 rad of what was ordered.
-    "not nearer at once": (courses._slow, [0.2, 0.5], [0.3, 9.0], Found(
+    "not nearer at once": (courses._exclude_rate_limit, [0.2, 0.5], [0.3, 9.0], Exclusion(
         range(2), 0, [(0.1, 0.0), (0.5, 0.0), (0.5, 0.3), (0.5, 0.15), (1.0, 0.0)],
         {"near": 0.15, "ordered": [0.1] * 2}, 0,
     )),
-    "not nearer in time": (courses._slow, [0.2, 0.25, 0.28], [0.3, 9.0, 9.0], Found(
+    "not nearer in time": (courses._exclude_rate_limit, [0.2, 0.25, 0.28], [0.3, 9.0, 9.0], Exclusion(
         range(3), 0, [(0.1, 0.0), (0.43, 0.0), (0.28, 0.25), (0.28, 0.15), (1.0, 0.0)],
         {"near": 0.15, "ordered": [0.1] * 3, "step": 0.05}, 0,
     )),
-    "slowly nearer": (courses._slow, [0.0, 0.2, 0.16, 0.16], [9.0, 0.22, 0.22, 9.0], None),
-    "two offsets": (courses._bias, [0.1, 0.4, 0.2], [0.5, 0.6, 0.3], Found(
+    "slowly nearer": (courses._exclude_rate_limit, [0.0, 0.2, 0.16, 0.16], [9.0, 0.22, 0.22, 9.0], None),
+    "two offsets": (courses._exclude_offset, [0.1, 0.4, 0.2], [0.5, 0.6, 0.3], Exclusion(
         range(1, 2), 2, [(0.4, 0.3), (0.4, -1.0), (1.0, 0.3)], {"stops": [-1.0, 1.0]},
     )),
-    "one offset": (courses._bias, [0.1, 0.4, 0.2], [0.5, 0.6, 0.4], None),
-    "an offset that shrinks": (courses._growing, [0.4, 0.0], [9.0, 0.2], Found(
+    "one offset": (courses._exclude_offset, [0.1, 0.4, 0.2], [0.5, 0.6, 0.4], None),
+    "an offset that shrinks": (courses._exclude_growing_offset, [0.4, 0.0], [9.0, 0.2], Exclusion(
         range(1), 1, [(0.4, 0.0), (0.4, 0.2), (0.4, -1.0), (1.0, 0.2), (11.0, 10.0)], {"stops": [-1.0, 1.0]},
     )),
     "an offset that shrinks after one of the other sign": (
-        courses._growing, [-0.2, NOTHING, 0.4, NOTHING], [9.0, -0.3, 9.0, 0.2],
-        Found(range(2, 3), 3, [(0.4, 0.0), (0.4, 0.2), (0.4, -1.0), (1.0, 0.2), (13.0, 12.0)],
+        courses._exclude_growing_offset, [-0.2, NOTHING, 0.4, NOTHING], [9.0, -0.3, 9.0, 0.2],
+        Exclusion(range(2, 3), 3, [(0.4, 0.0), (0.4, 0.2), (0.4, -1.0), (1.0, 0.2), (13.0, 12.0)],
               {"stops": [-1.0, 1.0]}),
     ),
-    "an offset that grows": (courses._growing, [0.0, 0.4], [0.2, 9.0], None),
-    "behind its pace": (courses._runaway, [0.2] * 3, [9.0, 9.0, 0.35], Found(
+    "an offset that grows": (courses._exclude_growing_offset, [0.0, 0.4], [0.2, 9.0], None),
+    "behind its pace": (courses._exclude_runaway, [0.2] * 3, [9.0, 9.0, 0.35], Exclusion(
         range(1), 2, [(1.0, 0.35), (12.0, 10.0), (0.4, 0.35)], {"stops": [1.0], "pace_rad_s": 2.0},
     )),
-    "at its pace": (courses._runaway, [0.2] * 3, [9.0, 9.0, 0.41], None),
-    "long on one side": (courses._swing, [0.1] * 4, [9.0] * 4, Found(
+    "at its pace": (courses._exclude_runaway, [0.2] * 3, [9.0, 9.0, 0.41], None),
+    "long on one side": (courses._exclude_oscillation, [0.1] * 4, [9.0] * 4, Exclusion(
         range(4), None, [(3.0, np.pi), (0.1, 0.0), (0.4, 0.0)], {"slowest_rad_s": 2.0}, 0,
     )),
-    "not so long": (courses._swing, [0.1] * 3, [9.0] * 3, None),
+    "not so long": (courses._exclude_oscillation, [0.1] * 3, [9.0] * 3, None),
 }  # fmt: skip
 
 
@@ -81,11 +87,12 @@ def test_a_rule_finds_the_frames_and_says_what_it_compares(name):
         assert found == []
         return
     (found,) = found
-    assert (found.run, found.beside, found.axis) == (expected.run, expected.beside, expected.axis)
-    np.testing.assert_allclose(found.compared, expected.compared)
-    assert found.said.keys() == expected.said.keys()
-    for key, value in expected.said.items():
-        assert found.said[key] == pytest.approx(value), key
+    assert (found.lower_frames, found.upper_frame) == (expected.lower_frames, expected.upper_frame)
+    assert found.axis == expected.axis
+    np.testing.assert_allclose(found.pairs, expected.pairs)
+    assert found.fields.keys() == expected.fields.keys()
+    for key, value in expected.fields.items():
+        assert found.fields[key] == pytest.approx(value), key
 
 
 @pytest.mark.parametrize("rule", courses.RULES.values())
@@ -96,10 +103,10 @@ def test_what_nothing_shows_excludes_nothing(rule):
 
 
 def test_of_several_instants_a_runaway_is_held_against_the_frame_before():
-    several = CONFIG._replace(single_instant=False)
-    assert [*courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
-    (found,) = courses._runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
-    np.testing.assert_allclose(found.compared[-1], (0.3, 0.25))
+    several = CONFIG._replace(is_single_instant=False)
+    assert [*courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
+    (found,) = courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
+    np.testing.assert_allclose(found.pairs[-1], (0.3, 0.25))
 
 
 def tape(travel=(-0.2, 0.7), blocks=1):
@@ -108,13 +115,59 @@ def tape(travel=(-0.2, 0.7), blocks=1):
     actuator = Actuator(*travel, 0.1, 0.2, 0.3)
     diagnosis = SimpleNamespace(
         layout=SimpleNamespace(position_estimator=(0, 2, 3), dominant_axis=(0, 1, 2)),
-        estimators=[SimpleNamespace(axes=(e,)) for e in "abcd"],
-        surfaces=[None, SimpleNamespace(actuator=actuator), None],
-        types_config=CONFIG._replace(block_frames=blocks),
+        estimators=[SimpleNamespace(active_axes=(e,)) for e in "abcd"],
+        surface_fault_types=[None, SimpleNamespace(actuator=actuator), None],
+        types_config=CONFIG._replace(frames_per_block=blocks),
     )
     return SimpleNamespace(
         first=10, offset=offset, slope=slope, spread=spread, alarm=SimpleNamespace(diagnosis=diagnosis)
     )
+
+
+@pytest.mark.parametrize("kind", range(N_TYPES))
+def test_the_checker_defines_every_type_as_its_row_does(kind):
+    """It is written apart from the rows; of the types of the package it takes nothing from the log."""
+    row, words, travel = TYPES[kind], TYPE_DESCRIPTIONS[kind], (-0.2, 0.7)
+    if row.excluding_comparison:
+        assert check_certificate.COURSES[words] == (
+            row.excluding_comparison.replace(" ", "_"),
+            row.stop_direction,
+        )
+        assert row.excluding_comparison in courses.RULES
+    else:
+        expected = (
+            row.deflection_relation.gain,
+            row.deflection_relation.theta_is_share,
+            row.has_constant_parameter,
+        )
+        assert check_certificate.RELATIONS[words](*travel) == (
+            *expected,
+            *row.deflection_relation.theta_range(*travel),
+        )
+    assert kinds.type_definition_columns(tape(), "aileron", 1, kind) == {}
+
+
+@pytest.mark.parametrize(("course", "direction"), [("runaway", -1), ("growing offset", 0), ("", 0)])
+def test_what_a_type_is_that_the_checker_does_not_define_stands_in_the_log(monkeypatch, course, direction):
+    added = dataclasses.replace(
+        TYPES[STUCK], name="creeps", excluding_comparison=course, stop_direction=direction,
+        deflection_relation=None
+        if course
+        else DeflectionRelation(-1.0, True, lambda low, high: (0.5 * low, high)),
+    )  # fmt: skip
+    monkeypatch.setattr(kinds, "TYPES", (added,))
+    monkeypatch.setattr(kinds, "WORDS", ("creeps up",))
+    found = kinds.type_definition_columns(tape(), "left flap", 1, 0)
+    if course:
+        assert found == {f"left_flap_creeps_up_course_{course.replace(' ', '_')}": direction}
+        log = {name: np.array([value, np.nan, value]) for name, value in found.items()}
+        read = check_certificate.course_of("left_flap creeps up", log)
+        assert read == (course.replace(" ", "_"), direction)
+        return
+    log = {name: np.full(3, value) for name, value in found.items()}
+    assert check_certificate.course_of("left_flap creeps up", log) is None
+    read = check_certificate.relation_of("left_flap creeps up", log, -9.0, 9.0)
+    assert read == (-1.0, 1.0, 1.0, pytest.approx(-0.1), 0.7)
 
 
 @pytest.mark.parametrize("travel", [(-0.2, 0.7), (0.1, 0.7), (-0.7, -0.3)])
@@ -131,13 +184,20 @@ def test_what_a_fault_adds_to_the_innovation(travel):
         "bias": (0 * G, G, -wide, wide, True), "loss_of_effectiveness": (0 * G, Gu, -1.0, 0.0, True),
     }  # fmt: skip
     for kind, parts in [*expected.items(), (None, (0 * G, Gu, -1.0, 0.0, False))]:
-        number = kinds.VARYING_LOSS if kind is None else kinds.kind_of(kind)
-        found = kinds.hypothesis(made, 1, number)
-        for value, part in zip((found.offset, found.slope, found.low, found.high), parts, strict=False):
+        number = VARYING_LOSS if kind is None else type_index_of(kind)
+        found = kinds.hypothesis_of_type(made, 1, number)
+        for value, part in zip(
+            (found.offset, found.slope, found.theta_low, found.theta_high), parts, strict=False
+        ):
             np.testing.assert_allclose(value, part, err_msg=str(kind))
-        assert (found.first, found.constant, found.shown, found.asked) == (10, parts[-1], parts[-1], ("c",))
+        assert (found.first_frame, found.theta_is_constant, found.only_where_shown, found.axes) == (
+            10,
+            parts[-1],
+            parts[-1],
+            ("c",),
+        )
         np.testing.assert_array_equal(found.spread, spread)
-    assert kinds.hypothesis(tape(travel, 2), 1, kinds.STUCK).asked == (1,)
+    assert kinds.hypothesis_of_type(tape(travel, 2), 1, STUCK).axes == (1,)
 
 
 def test_what_decides_nothing_is_left_out_of_the_variances(monkeypatch):
@@ -146,18 +206,18 @@ def test_what_decides_nothing_is_left_out_of_the_variances(monkeypatch):
     P, R = [[3.0, 4e-8, 6e-8], [4e-8, 0.5, 7.0], [6e-8, 7.0, 2e-8]], [9e-8, 4.0]
     weights = np.array([[1.0, 1.0, 1.0], [1.0, -1e-8, 0.0], [1.0, 0.0, 1.0]])
     said = {"P": copy.deepcopy(P), "R": list(R)}
-    monkeypatch.setattr(chance, "_frames", lambda said, history: None)
-    monkeypatch.setattr(chance, "_followed", lambda said, frames, P, R: (P, R))
+    monkeypatch.setattr(chance, "_filter_inputs", lambda said, history: None)
+    monkeypatch.setattr(chance, "_run_filter", lambda said, frames, P, R: (P, R))
     monkeypatch.setattr(
         chance,
-        "_weighed",
+        "_evidence_and_limit",
         lambda said, sums: (10 + (weights * sums[0]).sum(), 1.0 + sums[1][0] + 0 * sums[1][1], 0),
     )
-    chance._leave_out_variances(said, None)
+    chance._remove_negligible_variances(said, None)
     assert said == {"P": [[3.0, None, 6e-8], [None, None, None], [6e-8, None, None]], "R": [None, None]}
     monkeypatch.setattr(
         chance,
-        "_weighed",
+        "_evidence_and_limit",
         lambda said, sums: (
             0.0,
             1.0 / sums[1].min(initial=0.5, where=sums[1] > 1) if sums[1].all() else math.nan,
@@ -165,5 +225,5 @@ def test_what_decides_nothing_is_left_out_of_the_variances(monkeypatch):
         ),
     )
     said = {"P": P, "R": R}
-    chance._leave_out_variances(said, None)
+    chance._remove_negligible_variances(said, None)
     assert said["R"] == R  # without it there is no covariance

@@ -76,7 +76,7 @@ def test_each_form_is_accepted_and_what_is_another_is_refused_in_words(changed):
     for statement, place, value in WRONG:
         with pytest.raises(Refused) as refused:
             check_statement_form(altered(statement, place, value))
-        found[f"{check_certificate.kind_of(statement)} {place} {value}"] = str(refused.value)
+        found[f"{check_certificate.evidence_kind(statement)} {place} {value}"] = str(refused.value)
     assert not changed(found)
 
 
@@ -118,7 +118,7 @@ def test_what_a_scenario_does_not_declare_is_refused(place, value, says):
 
 def test_a_constant_error_is_no_larger_than_the_whole_one():
     larger = copy.deepcopy(DECLARED)
-    larger.gyros["p"] = (0.03, 0.04, 0.2)
+    larger.gyro_errors["p"] = (0.03, 0.04, 0.2)
     with pytest.raises(Refused, match="gyro p: the constant error is larger than the whole error"):
         check_declared(altered(ABOUT, "declared.B.p", 0.04), larger)
 
@@ -135,14 +135,14 @@ def test_what_a_scenario_declares_from_a_row_on():
         "fdi": {"bounds": {"sensors": dict.fromkeys("pqr", gyro), "constant_rad_s2": {"p": 0.3},
                            "inertia_coupling": {"q": 0.4}}},
     }  # fmt: skip
-    found = check_certificate.declared_in(scenario, 100)  # the second change is in force from row 101 on
-    assert (found.dt, found.instants, found.from_row) == (0.02, 4, 0)
-    assert (found.constant, found.coupled) == ({"p": 0.3}, {"q": 0.4})
-    assert found.gyros["p"] == pytest.approx((radians(0.1 * 4 + 0.03 + 0.02), radians(0.03), 0.2))
-    changed = check_certificate.declared_in(scenario, 101)
-    assert changed.from_row == 101
-    assert changed.gyros["q"][:2] == pytest.approx((radians(0.4 + 0.5 + 0.02), radians(0.5)))
-    assert check_certificate.declared_in(scenario, 150).from_row == 150
+    found = check_certificate.declared_at_row(scenario, 100)  # the second change is in force from row 101 on
+    assert (found.dt, found.instants, found.start_row) == (0.02, 4, 0)
+    assert (found.constant_bounds, found.inertia_shares) == ({"p": 0.3}, {"q": 0.4})
+    assert found.gyro_errors["p"] == pytest.approx((radians(0.1 * 4 + 0.03 + 0.02), radians(0.03), 0.2))
+    changed = check_certificate.declared_at_row(scenario, 101)
+    assert changed.start_row == 101
+    assert changed.gyro_errors["q"][:2] == pytest.approx((radians(0.4 + 0.5 + 0.02), radians(0.5)))
+    assert check_certificate.declared_at_row(scenario, 150).start_row == 150
 
 
 @pytest.mark.parametrize("pace", [1e-3, 1e9])
@@ -167,8 +167,8 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
         "P": (half @ half.T).tolist(), "Y": numbers(4, 3, seed=10).tolist(),
     }  # fmt: skip
     history = SimpleNamespace(dt=dt, innovation=lambda rows: nu[rows])
-    ours = chance._followed(said, chance._frames(said, history), *chance._variances(said))
-    sums, room = check_certificate.whitened(said, SimpleNamespace(dt=dt, nu=nu))
-    np.testing.assert_allclose(sums, [*ours.of, ours.foreseen], rtol=1e-7)
-    assert room == pytest.approx(min(ours.swings, ours.drifts), rel=1e-6)
-    assert (ours.drifts < ours.swings) == (pace < 1.0)
+    ours = chance._run_filter(said, chance._filter_inputs(said, history), *chance._variances(said))
+    sums, room = check_certificate.whitened_sums(said, SimpleNamespace(dt=dt, innovation_rad_s2=nu))
+    np.testing.assert_allclose(sums, [*ours.totals, ours.calm_prediction], rtol=1e-7)
+    assert room == pytest.approx(min(ours.room_by_swings, ours.room_by_change_rate), rel=1e-6)
+    assert (ours.room_by_change_rate < ours.room_by_swings) == (pace < 1.0)

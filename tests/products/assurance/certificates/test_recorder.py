@@ -31,7 +31,7 @@ def test_the_ring_holds_the_last_frames_before_the_alarm_and_what_follows_it(ala
     kept, ring, at_alarm = (array.astype(np.int64) for array in (kept, ring, at_alarm))
     for k, alarmed in enumerate(alarms):
         record[:] = 10 * k, 0, 10 * k + 2, alarmed, 0, 10 * k + 5
-        tape.note(record, always, early, kept, ring, at_alarm, state)
+        tape.keep_frame(record, always, early, kept, ring, at_alarm, state)
     last_clear = max((k for k, alarmed in enumerate(alarms) if not alarmed), default=-1)
     raised = last_clear + 1 if alarms[-1] else None
     assert state[0] == len(alarms)
@@ -53,8 +53,8 @@ def test_what_is_kept_is_what_the_log_has_to_the_last_frame_of_a_long_flight():
     rows = dict(zip(log.columns, log.rows.T, strict=True))
     alarm = int(np.argmax(rows["detected"] > 0))
     kept = recorder.tape([alarm, len(log.rows) - 1], len(log.rows))
-    assert (kept.first, kept.end) == (alarm - tape.BEFORE, len(log.rows))
-    assert kept.frames > tape.BEFORE + 1024
+    assert (kept.first, kept.end) == (alarm - tape.FRAMES_BEFORE_ALARM, len(log.rows))
+    assert kept.frames > tape.FRAMES_BEFORE_ALARM + 1024
     assert recorder.tape([alarm - 9], len(log.rows)).first == kept.first  # what was before is overwritten
     here = slice(kept.first, kept.end)
     for i, axis in enumerate("pqr"):
@@ -65,7 +65,10 @@ def test_what_is_kept_is_what_the_log_has_to_the_last_frame_of_a_long_flight():
 
 def test_of_chance_more_frames_before_the_alarm_are_kept():
     """An onset may be long before: of the worst case the frames are those that a filter remembers."""
-    for fdi, before in (({}, tape.BEFORE), ({"statistical": {}}, tape.BEFORE_CHANCE)):
+    for fdi, before in (
+        ({}, tape.FRAMES_BEFORE_ALARM),
+        ({"statistical": {}}, tape.STATISTICAL_FRAMES_BEFORE_ALARM),
+    ):
         scenario = bf.load({"name": "x", "fdi": fdi})
         recorder = tape.Recorder(scenario)
         recorder.begin(Loop(scenario).frames)

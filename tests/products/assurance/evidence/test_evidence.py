@@ -61,7 +61,7 @@ def test_a_replayed_flight_says_what_it_violates(tmp_path):
         if flight.startswith("f"):
             scenario, judged = of_flight(plan, flight)
             assert scenario.name == flight
-            assert any(not each["passed"] and each["actual"].startswith("not met: ") for each in judged)
+            assert any(not each.passed and each.actual.startswith("not met: ") for each in judged)
     with pytest.raises(BadInput, match=r"--replay: .*plan.yaml has no flight 'f0-9', did you mean f0-"):
         of_flight(plan, "f0-9")
 

@@ -9,7 +9,7 @@ from tools.autopilots import peers
 from tools.autopilots.small import Small
 
 import beaver_ftc as bf
-from beaver_ftc.design.air import standard_air
+from beaver_ftc.design import standard_air
 from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_links.sitl.ardupilot import Ardupilot

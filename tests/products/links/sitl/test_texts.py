@@ -1,6 +1,7 @@
 """What is said of a flight, and what a MAVLink command breaks in it."""
 
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,8 +13,9 @@ from tools.autopilots.small import Small, Told
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results import Metrics
 from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import failures
 from beaver_ftc_links.sitl.link import COUNTED, Link, Times
@@ -232,9 +234,10 @@ def test_no_delay_is_promised_of_what_broke_before_the_diagnosis_began(from_s, a
     flight = SimpleNamespace(
         vehicle=SimpleNamespace(flight=SimpleNamespace(listens_from_s=from_s)), _say=said.append
     )
-    found = {"fault": None if at_s is None else {"at_s": at_s}, "detection": {"guaranteed_delay_s": 0.4}}
-    Endpoint._note_silence(flight, found)
-    assert found["detection"]["guaranteed_delay_s"] == delay_s
+    fault = None if at_s is None else {"at_s": at_s}
+    found = Metrics.of({"fault": fault, "detection": {"guaranteed_delay_s": 0.4, "axis": "q"}})
+    promised = Endpoint._without_certainty(flight, found)
+    assert promised == replace(found, detection=replace(found.detection, guaranteed_delay_s=delay_s))
     assert said == ["the diagnosis never began: near the ground nothing is diagnosed"] * (from_s is None)
 
 

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.studies.compare.trial import Entry, Result, with_entry
 from beaver_ftc_live.challenge import folders, grading, line, pilot

@@ -138,10 +138,24 @@ def test_before_anything_broke_nobody_is_waited_for():
 
 def test_the_first_answer_counts_and_a_second_does_not():
     game = Game(phase="waiting", due_s=10.0)
-    game.broke({"actuator": "aileron"}, 10.0)
+    game.broke({"type": "stuck", "actuator": "aileron"}, 10.0)
     game.answer("elevator", NAMES, 10.5)
     game.answer("aileron", NAMES, 11.25)
     assert game.yours == ("elevator", 10.5)
     game.named("aileron", 12.5)
     assert game.settle(5.0, 12.75)
     assert game.score == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("fault", "name", "winner"),
+    [
+        ({"type": "damage", "case": "left wingtip"}, "unanticipated", "detector"),
+        ({"type": "damage", "case": "left wingtip"}, "elevator", None),
+        ({"type": "stuck", "actuator": "elevator"}, "unanticipated", None),
+        ({"type": "bias", "sensor": "q"}, "elevator", None),
+    ],
+)
+def test_a_name_is_right_as_everywhere_else(fault, name, winner):
+    game = Game(phase="broken", fault=fault, broken_s=10.0, yours=("nothing", 10.5), detector=(name, 11.0))
+    assert game.winner == winner

@@ -10,7 +10,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.commands import live as live_command
 from beaver_ftc_live.page import messages, reports

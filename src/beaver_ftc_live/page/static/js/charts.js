@@ -60,16 +60,16 @@ class Chart {
   }
 
   title() {
-    const title = document.createElement("h2");
-    title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }));
+    const title = document.createElement("h2"), keys = Object.assign(document.createElement("span"), { className: "keys" });
+    title.append(Object.assign(document.createElement("b"), { textContent: this.plan.title }), keys);
     let kind = "";
     this.plan.names.forEach((name, i) => {
       const [said, of] = this.plan.names.length > COLOURS.length ? shortened(name) : [name, ""];
-      if (of !== kind) title.append(Object.assign(document.createElement("span"), { className: "key", textContent: of }));
+      if (of !== kind) keys.append(Object.assign(document.createElement("span"), { className: "key", textContent: of }));
       kind = of;
       const key = Object.assign(document.createElement("span"), { className: "key", textContent: `${MARKS[i]} ${said}`, title: name });
       key.style.color = COLOURS[i % COLOURS.length];
-      title.append(key);
+      keys.append(key);
     });
     return title;
   }

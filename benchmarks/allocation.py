@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.control import allocation
 from beaver_ftc.control.state import control_dtype
-from beaver_ftc.diagnosis.expectation import belief_dtype
+from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 
@@ -22,9 +22,9 @@ RATE_RAD_S = 1.0
 
 
 @kernel
-def allocate_all(control, belief, demands, G, failed):
+def allocate_all(control, prediction, demands, G, failed):
     """Every frame of a flight; returns how many systems were solved. failed (n,): from which frame."""
-    total, n = 0, belief.u.size
+    total, n = 0, prediction.u.size
     for k in range(demands.shape[0]):
         for i in range(3):
             control.axes.demand[i] = demands[k, i]
@@ -32,10 +32,10 @@ def allocate_all(control, belief, demands, G, failed):
                 control.axes.G[i, s] = G[i, s] if k < failed[s] else 0.0
         effectiveness = control.surfaces.output.effectiveness
         allocation.allocate_generally(
-            control.axes, control.allocation, control.layout, effectiveness, belief, 0.0, 0.0
+            control.axes, control.allocation, control.layout, effectiveness, prediction, 0.0, 0.0
         )
         total += control.allocation.memory.problem.steps
-        belief.u[:] = control.allocation.output.command
+        prediction.u[:] = control.allocation.output.command
     return total
 
 
@@ -49,14 +49,14 @@ def us_a_frame(n: int, rng: np.random.Generator) -> tuple[float, float]:
     best, systems = np.inf, 0.0
     for _ in range(ROUNDS):
         control = np.zeros(1, control_dtype(n)).view(np.recarray)[0]
-        belief = np.zeros(1, belief_dtype(n)).view(np.recarray)[0]
+        prediction = np.zeros(1, prediction_dtype(n)).view(np.recarray)[0]
         layout = control["layout"]
         layout["low"], layout["high"], layout["stand_in"] = -0.4, 0.4, -1
         layout["authority"][:, 0] = 1.0
-        control["surfaces"]["output"]["effectiveness"], belief["share"] = 1.0, 1.0
-        belief["actuators"]["step"] = RATE_RAD_S * DT_S
+        control["surfaces"]["output"]["effectiveness"], prediction["frame_share_per_instant"] = 1.0, 1.0
+        prediction["actuators"]["step"] = RATE_RAD_S * DT_S
         begun = time.perf_counter()
-        systems = allocate_all(control, belief, demands, G, failed) / FRAMES
+        systems = allocate_all(control, prediction, demands, G, failed) / FRAMES
         best = min(best, time.perf_counter() - begun)
     return 1e6 * best / FRAMES, systems
 

@@ -21,8 +21,8 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs import extremes, fitting
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Column, Recording
-from beaver_ftc_logs.samples import Samples, load_flights, sample
+from beaver_ftc_logs.recording import Column, RecordedFlight
+from beaver_ftc_logs.samples import Samples, load_flights_for_fit, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "flights"))
@@ -39,7 +39,7 @@ def flown(vehicle: Vehicle, seed: int, duration_s: float) -> Samples:
     trim, gain = 0.1 * rng.standard_normal(2), float(np.exp(0.05 * rng.standard_normal()))
     log = synthetic.fly(duration_s, seed=seed, trim=tuple(trim), gain=gain)
     columns = {name: Column(log["t_s"], values) for name, values in log.items() if name != "t_s"}
-    return sample(Recording(f"day-{seed}", columns), vehicle)
+    return resample(RecordedFlight(f"day-{seed}", columns), vehicle)
 
 
 def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: int) -> list[str]:
@@ -55,7 +55,7 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
     assert known is not None
     assert known.tail is not None
     assert threshold is not None
-    rate, count = extremes.expected(known.tail, threshold), round(hours * 3600.0 / LENGTH_S)
+    rate, count = extremes.expected_false_alarms(known.tail, threshold), round(hours * 3600.0 / LENGTH_S)
     alarms = sum(
         begun(diagnose(flown(vehicle, 10**6 + 1000 * seed + i, LENGTH_S), model).faulty) for i in range(count)
     )
@@ -68,8 +68,8 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
 
 def identified(flights: list[Samples], vehicle: Vehicle) -> Model:
     """The model of flights, with its threshold."""
-    stretches = fitting.stretches_of(flights)
-    return fitting.trusted(stretches, fitting.fit_model(stretches, vehicle))
+    stretches = fitting.usable_stretches(flights)
+    return fitting.add_validity_range(stretches, fitting.fit_model(stretches, vehicle))
 
 
 def begun(faulty: np.ndarray) -> int:
@@ -81,14 +81,14 @@ def alfa(folder: Path) -> list[list[str]]:
     """A row a flight with a failure, by the model of the healthy ones."""
     vehicle, rows = load_vehicle("alfa"), []
     healthy = sorted(folder.glob("*no_failure"))
-    model = identified(list(load_flights(healthy, vehicle)), vehicle)
-    for one in load_flights(sorted({*folder.iterdir()} - {*healthy}), vehicle):
-        said, begins = diagnose(one, model), min(event.t_s for event in one.events)
+    model = identified(list(load_flights_for_fit(healthy, vehicle)), vehicle)
+    for one in load_flights_for_fit(sorted({*folder.iterdir()} - {*healthy}), vehicle):
+        said, begins = diagnose(one, model), min(event.t_s for event in one.logged_failures)
         after = (said.t_s >= begins) & (said.faulty == 1)
-        names, count = np.unique(said.named[after].astype(str), return_counts=True)
+        names, count = np.unique(said.named_surfaces[after].astype(str), return_counts=True)
         shares = [f"{name} {part / after.sum():.2f}" for name, part in zip(names, count, strict=True)]
         delay = f"{said.t_s[after][0] - begins:.1f}" if after.any() else "never"
-        failed = "+".join(sorted({event.surface for event in one.events}))
+        failed = "+".join(sorted({event.surface for event in one.logged_failures}))
         early = begun(said.faulty[said.t_s < begins])
         rows.append([failed, f"{begins - said.t_s[0]:.0f}", str(early), delay, ", ".join(shares)])
     return rows

@@ -33,16 +33,15 @@ import pandas as pd
 from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
-from beaver_ftc.design.context import DesignFunctions
-from beaver_ftc.design.model import N_Y, design_record
+from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
 from beaver_ftc.results.exports import RECORDINGS
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.by_aircraft import diagnose_as, known
-from beaver_ftc_logs.diagnose import Rows, diagnose
-from beaver_ftc_logs.identification import by_pressure, identify
+from beaver_ftc_logs.by_aircraft import diagnose_by_aircraft, load_aircraft
+from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
+from beaver_ftc_logs.identification import identify, scale_commands_by_pressure
 from beaver_ftc_logs.model import Model, as_text
-from beaver_ftc_logs.samples import load_flights, read_for, sample
+from beaver_ftc_logs.samples import load_flights_for_fit, read_for_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 Document = dict[str, Any]
@@ -161,15 +160,15 @@ def recorded(document: Document, kind: str, folder: Path) -> Log:
     return Log(scenario, place, place / RECORDINGS[kind])
 
 
-Said = tuple[Rows, str | None]
+Said = tuple[DiagnosisRows, str | None]
 """The rows, and the surface that is named in the end."""
 
 
 def by_aircraft(log: Log, of: Campaign) -> Said:
     """As `diagnose --aircraft`."""
     vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
-    told = known(of.aircraft, str(log.folder / "scenario.yaml"))
-    _, rows, verdict = diagnose_as(read_for(log.path, vehicle), vehicle, told)
+    told = load_aircraft(of.aircraft, str(log.folder / "scenario.yaml"))
+    _, rows, verdict = diagnose_by_aircraft(read_for_vehicle(log.path, vehicle), vehicle, told)
     return rows, verdict["isolated"]
 
 
@@ -179,7 +178,7 @@ def identified(of: Campaign, logs: list[Log]) -> Model:
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(update={"faults": faults})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    found = identify(*by_pressure(load_flights(named, vehicle), vehicle))
+    found = identify(*scale_commands_by_pressure(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(as_text(found))
 
 
@@ -224,26 +223,31 @@ def told(log: Log, noise: dict[bool, Whitener]) -> bool:
 
 def by_model(log: Log, model: Model) -> Said:
     """As `diagnose --model`."""
-    rows = diagnose(sample(read_for(log.path, model.vehicle), model.vehicle), model)
-    names, count = np.unique(rows.named[rows.faulty == 1].astype(str), return_counts=True)
+    rows = diagnose(resample(read_for_vehicle(log.path, model.vehicle), model.vehicle), model)
+    names, count = np.unique(rows.named_surfaces[rows.faulty == 1].astype(str), return_counts=True)
     return rows, str(names[count.argmax()]) if len(names) else None
 
 
 def judged(by: str, log: Log, said_of: Said) -> Document:
     """What was right."""
     (rows, isolated), faults = said_of, log.flown.faults
-    truth, actual, began_s = np.ones_like(rows.low), None, np.inf
+    truth, actual, began_s = np.ones_like(rows.effectiveness_low), None, np.inf
     for fault in faults:
         actual, began_s = fault.actuator, fault.at_s
         surface = list(log.flown.airframe.surfaces).index(actual)
         left = 1.0 - fault.magnitude if fault.type == LOSS else np.nan
         truth[rows.t_s >= began_s - 1e-6, surface] = left
-    known = np.isfinite(truth)
-    said = (rows.high - rows.low < 0.999) & known
-    held = (rows.low <= truth + 1e-9) & (truth <= rows.high + 1e-9)
+    has_truth = np.isfinite(truth)
+    said = (rows.effectiveness_high - rows.effectiveness_low < 0.999) & has_truth
+    held = (rows.effectiveness_low <= truth + 1e-9) & (truth <= rows.effectiveness_high + 1e-9)
     lost = said & (truth < 1.0)
     alarmed = rows.t_s[rows.faulty == 1]
-    named = {str(name) for name in rows.named[rows.faulty == 1]} - {"unknown", "unanticipated", "engine", ""}
+    named = {str(name) for name in rows.named_surfaces[rows.faulty == 1]} - {
+        "unknown",
+        "unanticipated",
+        "engine",
+        "",
+    }
     return {
         "by": by,
         "size": _size(faults),
@@ -255,8 +259,8 @@ def judged(by: str, log: Log, said_of: Said) -> Document:
         "said": int(said.sum()),
         "held_lost": int(held[lost].sum()),
         "lost": int(lost.sum()),
-        "samples": int(known.sum()),
-        "width": (rows.high - rows.low)[said],
+        "samples": int(has_truth.sum()),
+        "width": (rows.effectiveness_high - rows.effectiveness_low)[said],
         "credible": float(rows.credible.mean()),
     }
 
@@ -292,8 +296,8 @@ def table(results: list[Document]) -> list[list[str]]:
 
 
 def _told(of: list[Document]) -> str:
-    known = [one["told"] for one in of if one["told"] is not None]
-    return str(sum(known)) if known else ""
+    losses = [one["told"] for one in of if one["told"] is not None]
+    return str(sum(losses)) if losses else ""
 
 
 def _share(part: int, whole: int) -> str:

@@ -95,7 +95,7 @@ def fly(words: dict[str, Any], last: bool = False) -> tuple[str, bool]:
     frame = loop.frames[0]
     said = sensor_finding(frame["fdi"]["sensor_monitor"], float(frame["t"]))
     lost = bool(frame["departed"])
-    if frame["fdi"]["verdict"]["isolated"] >= 0 or (
+    if frame["fdi"]["verdict"]["isolated_estimator"] >= 0 or (
         frame["fdi"]["sensor_monitor"]["output"]["surface_was_isolated"] and not last
     ):
         return "surface", lost

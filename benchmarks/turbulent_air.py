@@ -125,7 +125,11 @@ class Watched:
 
     def _forces(self) -> float:
         """What the views that may raise an alarm by a force show, whatever clears them of a vane's error."""
-        held = [view["peak_score"] for view in self._views if view["surface"] >= 0 and uses_force(view)]
+        held = [
+            view["decaying_peak_score"]
+            for view in self._views
+            if view["orthogonal_to_surface"] >= 0 and uses_force(view)
+        ]
         return float(max(held, default=0.0))
 
     def _note(self, test: str, score: float) -> None:

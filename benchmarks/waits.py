@@ -6,8 +6,9 @@
 Every wait is a whole process of its own, and the processor time is that of the process and of all that it
 starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
 The waits of a flight in a sweep are ratios to JSBSim's frames alone (`flight_cost.py`). `--long` takes also
-what needs minutes or the network (`reproduce`, `make demo` from a fresh clone); `import gtm` needs the user's
-copy of the data base.
+what needs minutes or the network (`matrix`, `power`, rare events, `reproduce`, `make demo` from a fresh
+clone); `import gtm` needs the user's copy of the data base. The processor time of a study leaves out its
+workers, which are no children of the command.
 
 `--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
 of both and of their ratio, which a busy machine changes little.
@@ -30,9 +31,10 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-BODY = "from beaver_ftc.cli.main import main; main()"
+BODY = "from beaver_ftc.cli.begin import main; main()"
 FAULT = "elevator-partial-loss"  # 30 s at 100 Hz
 OTHER_AIRCRAFT, OTHER_KIND = "mission-split-elevator-lost", "elevator-loss-in-turbulence"
+RARE = "elevator-effectiveness"
 HALF_HOUR = """\
 name: half-hour
 duration_s: 1800
@@ -174,14 +176,14 @@ def in_a_sweep(place: Place, kind: str) -> Taken:
 
 @dataclass(frozen=True)
 class Wait:
-    """A row: its name, the bar, how it is measured.
+    """A row: its name, the bar (None: a ratio to an earlier revision alone), how it is measured.
 
     fresh: what compiles is a part of it, so that nothing is warmed up before, and it is measured once.
     long: only when asked for.
     """
 
     name: str
-    bar: float
+    bar: float | None
     measure: Callable[[Place], Taken | None]
     fresh: bool = False
     long: bool = False
@@ -190,6 +192,16 @@ class Wait:
 def command(*words: str) -> Callable[[Place], Taken]:
     """The wait for a command."""
     return lambda place: place.said(*words)
+
+
+def study(*words: str) -> Callable[[Place], Taken]:
+    """The wait for a study that begins anew: it would go on where an earlier one has ended."""
+
+    def measure(place: Place) -> Taken:
+        shutil.rmtree(place.folder / "study", ignore_errors=True)
+        return place.said(*words, "--out", "study")
+
+    return measure
 
 
 def another(scenario: str) -> Callable[[Place], Taken]:
@@ -213,8 +225,10 @@ WAITS = (
     Wait("first flight of another kind", 2.0, another(OTHER_KIND), fresh=True),
     Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), fresh=True),
     Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), fresh=True),
-    Wait("matrix elevator", 60.0, command("matrix", "elevator-partial-loss"), fresh=True, long=True),
-    Wait("reproduce", 60.0, command("reproduce"), fresh=True, long=True),
+    Wait("matrix", None, study("matrix"), fresh=True, long=True),
+    Wait("power", None, study("power"), fresh=True, long=True),
+    Wait("rare events", None, study("sweep", RARE, "--rare", "no_departure"), fresh=True, long=True),
+    Wait("reproduce", 60.0, study("reproduce"), fresh=True, long=True),
     Wait("make demo from a fresh clone", 45.0, demo, fresh=True, long=True),
 )  # fmt: skip
 
@@ -236,7 +250,8 @@ def alone(wait: Wait, place: Place, rounds: int) -> str:
         wait.measure(place)
     found = [wait.measure(place) for _ in range(1 if wait.fresh else rounds)]
     taken = medians([each for each in found if each]) if all(found) else None
-    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{wait.bar:14.2f}"
+    bar = "-" if wait.bar is None else f"{wait.bar:.2f}"
+    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{bar:>14}"
 
 
 def _cell(taken: Taken | None, what: str) -> str:

@@ -1,11 +1,15 @@
 """What was chosen by flights is claimed on others."""
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 from tools.docs.tables.chosen import (
+    BETTER_DRAWS,
     CONSTANT_HEAD,
+    RATIO_DRAWS,
+    TUNED_DRAWS,
     _said,
     choices,
     chosen_constants,
@@ -14,6 +18,7 @@ from tools.docs.tables.chosen import (
     draws_of,
 )
 
+from beaver_ftc.diagnosis.rivals import TUNED_FILE
 from beaver_ftc.studies.reproduce.cases import PUBLISHED, keys_of
 from beaver_ftc.studies.reproduce.choices import scenario
 from beaver_ftc.studies.reproduce.reproduction import SETTINGS
@@ -42,7 +47,20 @@ def test_the_sets_of_the_benchmark_are_read_and_apart():
     tuned = CHOICES[0]
     seeds = [seed for _, seed in sorted(draws_of(tuned["results"]))]
     assert len(seeds) > 15
-    assert {seed for _, seed in draws_of(tuned["flights"])} == {*range(201, 206), *range(211, 217)}
+    sets = {*range(201, 206), *range(211, 217)}
+    flown = {seed + 1000 * draw for seed in sets for draw in TUNED_DRAWS}
+    assert {seed for _, seed in draws_of(tuned["flights"])} == flown
+
+
+def test_the_draws_of_tuned_values_are_listed_and_apart_from_those_of_the_ratio():
+    last = [
+        again["draw"] + again["judged"]
+        for row in json.loads(TUNED_FILE.read_text())["methods"]
+        for again in row.get("again", [])
+    ]
+    assert max(last, default=0) <= max(TUNED_DRAWS)
+    drawn = [*RATIO_DRAWS, *BETTER_DRAWS, *TUNED_DRAWS]
+    assert len({*drawn}) == len(drawn)
 
 
 def test_no_flight_of_the_reproduction_is_one_that_its_gains_were_chosen_on():

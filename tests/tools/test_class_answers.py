@@ -1,11 +1,8 @@
-"""The class: every exercise has its answer, the answers are flown, and the minutes are ninety."""
+"""The class: every exercise has its answer, the minutes are ninety. docs-check flies the answers."""
 
 import re
 from math import exp
 from pathlib import Path
-
-import pytest
-from tools.docs.tables import class_
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/tutorials/class.md").read_text(encoding="utf-8")
 SHEETS, _, ANSWERS = re.sub(r" *\| *", " | ", PAGE).partition("## Answers")
@@ -22,12 +19,6 @@ def test_the_minutes_are_ninety():
     said = [int(minutes) for minutes in re.findall(r"^## \d\. .*\((\d+) minutes\)", SHEETS, re.MULTILINE)]
     assert len(said) == 5
     assert sum(said) == 90
-
-
-@pytest.mark.parametrize("sheet", ["live", "paper", "small", "detector", "sweep"])
-def test_its_answers_are_flown(sheet):
-    rows = getattr(class_, f"_{sheet}")()
-    assert [f"| {' | '.join(row)} |" for row in rows if f"| {' | '.join(row)} |" not in ANSWERS] == []
 
 
 def test_the_threshold_by_hand_is_the_log_s():

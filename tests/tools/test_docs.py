@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from tools.docs import first_figure
 from tools.docs.pictures import lighten
-from tools.docs.properties import as_markdown, meaning_of
+from tools.docs.properties import as_markdown, meaning_of, texts
 
 from beaver_ftc.commands import registered as registered_commands
 from beaver_ftc.documents.errors import BadInput
@@ -44,18 +44,32 @@ def test_every_named_property_of_the_xml_is_on_the_page():
         assert f"`{shown}`" in page, name
 
 
+def test_all_words_of_properties_are_used():
+    names = re.findall(r"^\| `([^`]+)` \|", as_markdown(), re.MULTILINE)
+    assert set(texts()["read"]) <= set(names)
+    assert [ending for ending in texts()["set"] if not any(name.endswith(ending) for name in names)] == []
+
+
+def test_terms_of_the_aircraft_have_their_factors():
+    rows = re.findall(r"^\| `aero/coefficient/(\w+)` \| ([^|]+) \| ([^|]*) \|", as_markdown(), re.MULTILINE)
+    factors = {name: times.strip() for name, _, times in rows}
+    assert factors["CZ_debe2"] == "elevator, beta^2"
+    assert factors["Cm_q"] == "q-hat"
+    assert factors["Cn_0"] == ""
+
+
 def test_property_without_a_meaning_is_refused():
     with pytest.raises(BadInput, match="fcs/no-such-thing"):
         meaning_of("fcs/no-such-thing")
 
 
 HEADLINE = re.compile(
-    r"Of (\d+) testable statements (\d+) hold, (\d+) of them also in (\d+) settings that the paper did not "
-    r"fly\. (\d+) do not hold\. (\d+) hold, but also when .*? Of (\d+) statements .*? (\d+) "
-    r"hold; (\d+) give nothing"
+    r"Of (\d+) testable statements, (\d+) hold, (\d+) do not hold, and (\d+) hold even without .*? "
+    r"(\d+) of the \d+ also hold in every one of (\d+) settings .*? A further (\d+) statements .*? and "
+    r"(\d+) of them are\. A further (\d+) statements contain nothing"
 )
 COUNTED = (
-    "statements", "hold", "elsewhere", "settings", "do not", "unsettled", "built", "built hold", "background",
+    "statements", "hold", "do not", "unsettled", "elsewhere", "settings", "built", "built hold", "background",
 )  # fmt: skip
 
 
@@ -116,3 +130,13 @@ def test_lightened_picture_is_smaller_and_looks_the_same(tmp_path):
     assert (tmp_path / "b.png").stat().st_size < 0.7 * (tmp_path / "a.png").stat().st_size
     before, after = (matplotlib.image.imread(tmp_path / f"{name}.png")[..., :3] for name in "ab")
     assert np.abs(before - after).mean() < 0.01
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/tutorials/start.md", "docs/results/reproduction.md"])
+def test_a_delay_of_one_frame_stands_beside_its_conditions_and_one_with_real_sensors(name):
+    """In the same paragraph: what the flight had, and the delay of a flight with declared errors."""
+    text = (ROOT / name).read_text()
+    (paragraph,) = (part for part in text.split("\n\n") if "<!--=air detection.delay_s" in part)
+    said = paragraph.replace("\n", " ")
+    for words in ("exact", "ideal", "still", "one frame", "tactical-grade sensors", "turbulence"):
+        assert words in said, words

@@ -1,6 +1,11 @@
-"""The measured pages' tables, of made documents: what a cell says, and which rival is said to be better."""
+"""The measured pages' tables, of made documents: what a cell says, and which rival's number is marked."""
 
-from tools.docs.tables import benchmark
+from tools.docs.pages import ROOT
+from tools.docs.tables import benchmark, robustness
+
+from beaver_ftc.diagnosis.rivals import tuned_parameters, tuned_values
+from beaver_ftc.plugins import DETECTORS
+from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry
 
 FOUND = {"detection_rate": 0.9, "isolation_rate": 0.5, "delay_median_s": 0.123, "delay_median_high_s": None}
 ALARMS = {"false_alarms": 1, "healthy_h": 0.5}
@@ -39,19 +44,38 @@ SETS = {
 }
 
 
-def test_cells_of_the_benchmark_hold_one_number_and_rivals_that_are_better_are_named():
+def test_cells_of_the_benchmark_hold_one_number_and_better_ones_of_rivals_are_bold():
     text = benchmark._tables({"sets": SETS})
-    assert "| slow | never | 0.12 |" in text
+    assert "| slow | never | **0.12** |" in text
     assert "| slow | 0 | 5.99 | 4 | 12.6 |" in text  # 0 and 2 in half an hour
     assert "| lqr (passive) | 1.25 | 1.30 |" in text
+    assert "| lqr (passive) | **9.00** | lost |" in text
     assert "| fault-tolerant, no scheme (passive) | 1.75 | 1.76 |" in text
     assert "| oracle |" not in text
     assert "|  | published (4) | air-light (4) |" in text
-    better = "These rivals have a better number than"
-    assert f"{better} `adaptive-estimators`, significant or not: `slow` in `air-light`." in text
-    assert (
-        "These rivals have a better number than `fault-tolerant`, significant or not: `lqr` in `published`."
-        in text
-    )
-    assert "No rival has a better number than `adaptive-estimators` here." in text
     assert "| 4 | 51 to 100 | 30 to 95 | 15 to 85 |" in text
+
+
+def test_the_tables_have_the_statistical_detector_and_every_passive_law():
+    entries = benchmark.everybody()
+    passive = {name for name in benchmark.PASSIVE_LAWS if name != benchmark.ALONE}
+    assert passive == {"nominal", "lqr", "indi"}
+    assert {Entry(STATISTICAL, LAW), Entry("none", LAW), *(Entry(SCHEME, law) for law in passive)} <= {
+        *entries
+    }
+
+
+def test_the_page_names_the_rate_of_false_alarms_that_the_search_chose():
+    chosen = tuned_values(tuned_parameters(), "errors", DETECTORS, STATISTICAL)
+    page = (ROOT / "docs/results/benchmark.md").read_text(encoding="utf-8")
+    named = f"{chosen['fdi.statistical.false_alarms_per_h']:.0f} false alarms per hour"
+    assert page.count(named) == 2  # in the answer, and where false alarms are explained
+
+
+def test_the_probe_of_the_power_has_the_alarm_level_of_every_scheme(monkeypatch):
+    """It moves with the parameters of most schemes; shares of few flights do not."""
+    levels = [{"turbulence": "light", "scheme": name, "level": 0.12345678} for name in ("slow", "quick")]
+    monkeypatch.setattr(robustness, "run_power", lambda *_: {"levels": levels})
+    monkeypatch.setattr(robustness, "_power_of", lambda document: "tables")
+    lines = robustness.robustness_power_probe().splitlines()
+    assert lines == ["tables", "light, slow: 0.123457", "light, quick: 0.123457"]

@@ -185,12 +185,20 @@ def altered(metrics, **sections):
         ({"isolation": {"fault": "rudder"}}, "wrong name"),
         ({"isolation": {"fault": "unanticipated"}}, "excluded"),
         ({"isolation": {"fault": None, "isolated": False, "candidates": ["rudder"]}}, "excluded"),
+        ({"detection": {"delay_s": 0.02}}, "verdict"),
+        ({"isolation": {"delay_s": 0.03}}, "verdict"),
+        ({"isolation": {"correct": False}}, "verdict"),
     ],
 )
 def test_a_broken_promise_is_seen(published, sections, kind):
     assert list(broken(published.scenario, published.metrics, True)) == []
     found = broken(published.scenario, altered(published.metrics, **sections), True)
     assert kind in {line.partition(":")[0] for line in found}
+
+
+def test_a_false_alarm_that_is_none_is_seen(published):
+    (line,) = broken(published.scenario, published.metrics | {"false_alarm": True}, False)
+    assert line.startswith("verdict: false_alarm True")
 
 
 def test_an_alarm_is_held_against_the_diagnosis_that_raised_it(published):

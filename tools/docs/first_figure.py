@@ -18,7 +18,7 @@ VIEW = View(
             (
                 Trace("q_threshold_rad_s", "± threshold", "bound"),
                 Trace("q_threshold_rad_s", "", "bound", -1.0),
-                Trace("q_residual_rad_s", "residual", "actual"),
+                Trace("q_residual_rad_s", "residual", "residual"),
             ),
         ),
         Panel(

@@ -45,7 +45,7 @@ def slim(notebook: Any) -> Any:
     """Without what differs each time it runs, and with small pictures."""
     for number, cell in enumerate((cell for cell in notebook.cells if cell.cell_type == "code"), 1):
         cell.execution_count, cell.metadata = number, {}
-        cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
+        cell.outputs = _without_notices(cell.outputs)
         for output in cell.outputs:
             if "execution_count" in output:
                 output.execution_count = number
@@ -55,6 +55,19 @@ def slim(notebook: Any) -> Any:
             if "image/png" in output.get("data", {}):
                 output.data["image/png"] = _reduced(output.data["image/png"])
     return notebook
+
+
+def _without_notices(outputs: list[Any]) -> list[Any]:
+    """Without standard error, such as the notice that code is compiled; what it has parted is one text."""
+    kept: list[Any] = []
+    for output in outputs:
+        if output.get("name") == "stderr":
+            continue
+        if kept and output.output_type == "stream" and kept[-1].get("name") == output.name:
+            kept[-1].text += output.text
+        else:
+            kept.append(output)
+    return kept
 
 
 def _reduced(picture: str) -> str:

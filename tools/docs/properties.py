@@ -1,8 +1,12 @@
-"""The aircraft's properties as a page, read from its XML."""
+"""The aircraft's properties as a page: names and values from its XML, words from properties.yaml."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
 from xml.etree.ElementTree import Element
+
+import yaml
 
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.documents.errors import BadInput
@@ -13,41 +17,40 @@ _XML = "aircraft/beaver/beaver.xml"
 _OPERATIONS = ("product", "sum", "max", "ifthen")
 _SURFACE = re.compile(rf"({'|'.join(SURFACES)})")
 
-# The XML has no place for what a plain property means: here it is, by the end of its name.
-MEANINGS = {
-    "cmd-rad": "commanded deflection; JSBSim's own `fcs/<s>-cmd-norm` adds to it, scaled to the travel",
-    "position-min-rad": "lower stop",
-    "position-max-rad": "upper stop",
-    "bandwidth-rad_sec": "first-order lag of the actuator; 0 is none",
-    "rate-limit-rad_sec": "rate limit of the actuator; 0 is none",
-    "runaway-rate-rad_sec": "rate of a runaway or slowed actuator that has no rate limit of its own",
-    "effectiveness": "1 healthy, 0 no control output; 1 + theta of the fault class",
-    "stuck": "1 freezes the surface at `stuck-at-rad`",
-    "stuck-at-rad": "where a jammed surface stands",
-    "hardover": "-1 or 1: the surface runs at its rate limit to that stop",
-    "float": "1: the surface trails and gives no moment",
-    "bias-rad": "added to the actuator output",
-    "rate-scale": "scales the rate limit: a slow actuator is below 1",
-    "oscillation-amplitude-rad": "oscillatory failure: amplitude",
-    "oscillation-frequency-rad_sec": "oscillatory failure: angular frequency",
-    "manifold-pressure-inhg": "engine setting: manifold pressure",
-    "speed-rpm": "engine setting: engine speed",
-    "ground/present": "1: there is a ground, with wheels upon it and thrust at rest; 0: none anywhere",
-    "Cm-alpha3": "extra pitching moment coefficient on alpha cubed; the published case is 10",
-    "inertia-coupling/p": "relative error theta_p of Pqr",
-    "inertia-coupling/q": "relative error theta_q of Qpr",
-    "inertia-coupling/r": "relative error theta_r of Rpq",
-    "amplitude-rad_sec2": "sinusoidal angular acceleration: amplitude",
-    "frequency-rad_sec": "sinusoidal angular acceleration: angular frequency",
-}
+_TEXTS = Path(__file__).with_suffix(".yaml")
 
 _HEAD = """# Properties of the aircraft
 
-Which properties of JSBSim does the aircraft have, and what do they mean? They are read from
-[aircraft/beaver/beaver.xml](../aircraft/beaver/beaver.xml). `<s>` is one of aileron, elevator, rudder,
-flap. A name ends with its unit; a name without one is dimensionless. Keys in brackets point to
-[sources](../REFERENCES.md). Plain JSBSim and its scripts can set and read all of them; scenarios set them
-by `faults:`, `uncertainty:` and `actuators:` ([scenarios](reference/scenarios.md))."""
+Which JSBSim properties does the Beaver have, and what does each mean? Read this page if you fly the model
+in plain JSBSim, or read a property in Python, for example `sim["aero/dpt"]` of a
+[simulation](reference/python.md). A scenario file needs no property names: its sections `faults`,
+`uncertainty` and `actuators` set these properties ([scenarios](reference/scenarios.md)).
+
+The names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of the files of its
+actuators.
+
+- `<s>` stands for one of the surfaces aileron, elevator, rudder and flap.
+- A name ends with its unit: `rad_sec` is rad/s, `rad_sec2` is rad/s², `mps` is m/s, `lbs` is pound-force,
+  `lbsft` is pound-force times foot. A name without a unit is dimensionless.
+- The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
+  them, Cl, Cm and Cn those of the moments in roll, pitch and yaw.
+- In formulas, p, q and r are the body rates in rad/s, b is the span in m, c the chord in m, n the engine
+  speed in rpm, pz the manifold pressure in inHg. P is the power in kW, V the airspeed in m/s, rho the
+  density in kg/m3. Ix, Iy, Iz and Jxz are the [moments of inertia](reference/beaver.md), and a name with
+  `dot` is a derivative with respect to time.
+- A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
+_SOURCE = "[TM88] "  # of every term
+_TERMS = """Each coefficient is the sum of its terms. A term is the product of three factors: its value, the
+quantities in the column "times", and its scale `uncertainty/<term>-scale`. The scale is 1 by default and
+can be set. Angles and positions are in rad. The position of a surface is `fcs/<s>-effective-rad`. The
+values are those of [TM88].
+
+*Example.* `{name}` is {value} times {times} times `uncertainty/{term}-scale`."""
+_EXAMPLE = "aero/coefficient/CX_dfa"
+_NEXT = """## Next
+
+The [data sheet](reference/beaver.md) has mass, travel and trim of the Beaver. [Other
+tools](how-to/other-tools.md) shows how to fly the model in plain JSBSim."""
 
 
 def as_markdown() -> str:
@@ -58,13 +61,16 @@ def as_markdown() -> str:
     others = [element for element in functions if not _is_term(element)]
     return "\n\n".join([
         _HEAD,
-        "## What can be set",
+        "## Properties that can be set",
+        "The defaults are the values after the model is loaded. With them, a surface follows its command.",
         _table(("property", "default", "meaning"), _input_rows(inputs)),
-        "## What can be read",
+        "## Properties that JSBSim computes",
+        "These properties can be read. JSBSim computes them in each step.",
         _table(("property", "meaning"), _output_rows(others)),
         "## Aerodynamic terms",
-        "Each can be read, with its multiplier, and scaled: `uncertainty/<term>-scale`, 1 by default.",
-        _table(("term", "value", "meaning"), [_term_row(element) for element in terms]),
+        _example(next(element for element in terms if element.get("name") == _EXAMPLE)),
+        _table(("term", "value", "times", "meaning"), [_term_row(element) for element in terms]),
+        _NEXT,
     ]) + "\n"  # fmt: skip
 
 
@@ -75,7 +81,12 @@ def _inputs(root: Element) -> list[tuple[str, float]]:
         for element in root.iter("property")
         if "value" in element.attrib
     ]
-    return [(name, value) for name, value in found if not name.endswith("-scale") or "/rate-" in name]
+    return [(name, value) for name, value in found if not _is_scale(name)]
+
+
+def _is_scale(name: str) -> bool:
+    """Whether a property is the scale of a term."""
+    return name.startswith("uncertainty/") and name.endswith("-scale")
 
 
 def _functions(root: Element) -> list[Element]:
@@ -112,22 +123,48 @@ def _default(values: dict[str, float]) -> str:
     return ", ".join(f"{surface} {value:g}" for surface, value in values.items())
 
 
+@cache
+def texts() -> Mapping[str, Mapping[str, str]]:
+    """Words of properties that can be set, by the end of the name, and of others, by name."""
+    return yaml.safe_load(_TEXTS.read_text(encoding="utf-8"))
+
+
 def meaning_of(name: str) -> str:
-    """What a property that can be set means. BadInput for one that MEANINGS lacks."""
-    endings = [ending for ending in MEANINGS if name.endswith(ending)]
+    """What a property that can be set means. BadInput for one without words."""
+    meanings = texts()["set"]
+    endings = [ending for ending in meanings if name.endswith(ending)]
     if not endings:
-        raise BadInput(f"{name}: what it means is missing in tools/docs/properties.py")
-    return MEANINGS[max(endings, key=len)]
+        raise BadInput(f"{name}: what it means is missing in tools/docs/{_TEXTS.name}")
+    return meanings[max(endings, key=len)]
 
 
 def _output_rows(elements: Sequence[Element]) -> list[tuple[str, ...]]:
     rows = {_shared(e.get("name", "")): _description(e) for e in elements}
-    return [(f"`{name}`", meaning) for name, meaning in rows.items()]
+    return [(f"`{name}`", texts()["read"].get(name, meaning)) for name, meaning in rows.items()]
 
 
 def _term_row(element: Element) -> tuple[str, ...]:
-    value = next((_text(part) for part in element.iter("value")), "")
-    return f"`{element.get('name')}`", value, _description(element)
+    meaning = _description(element).removeprefix(_SOURCE)
+    return f"`{element.get('name')}`", _value(element), ", ".join(_factors(element)), meaning
+
+
+def _example(element: Element) -> str:
+    name = element.get("name", "")
+    times = " times ".join(_factors(element))
+    return _TERMS.format(name=name, value=_value(element), times=times, term=name.rpartition("/")[2])
+
+
+def _value(element: Element) -> str:
+    return next((_text(part) for part in element.iter("value")), "")
+
+
+def _factors(element: Element) -> list[str]:
+    """What a term multiplies, each once with its power: `alpha^2`, `dpt`."""
+    names = [_text(part) for part in element.iter("property")]
+    found = [
+        re.sub("-effective-rad|-rad$", "", name.rpartition("/")[2]) for name in names if not _is_scale(name)
+    ]
+    return [f"{name}^{n}" if (n := found.count(name)) > 1 else name for name in dict.fromkeys(found)]
 
 
 def _description(element: Element) -> str:

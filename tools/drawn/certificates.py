@@ -24,13 +24,13 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates.certificate import (
-    Evidence,
+    EvidenceColumns,
     as_text,
     certificate,
-    copy_with,
-    events_of,
-    logged,
-    sealed,
+    copy_with_columns,
+    event_rows,
+    logged_columns,
+    with_digest,
 )
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from beaver_ftc_assurance.certificates.tape import Recorder
@@ -70,7 +70,7 @@ def main() -> None:
             count["altered"] += 1
             other = altered(written, place)
             count["accepted"] += not [*failures(other, log, scenario)]
-            resealed = sealed(other)
+            resealed = with_digest(other)
             accepts = not [*failures(resealed, log, scenario)]
             if accepts == bool([*doubts(resealed, log, scenario)]):
                 count["readers disagree"] += 1
@@ -107,7 +107,7 @@ def certified(
             continue
         document, evidence = timed(flight, ms)
         log = Columns()
-        copy_with(flight._kept(), evidence, log)
+        copy_with_columns(flight._kept(), evidence, log)
         log.close()
         yield drawn.index, json.loads(as_text(document)), dict(log), to_yaml(flight.scenario)
         found += 1
@@ -115,11 +115,11 @@ def certified(
             return
 
 
-def timed(flight: bf.Flight, ms: Times) -> tuple[Document, Evidence]:
+def timed(flight: bf.Flight, ms: Times) -> tuple[Document, EvidenceColumns]:
     """A flight's certificate and the columns that prove it; ms: of the processor, what keeping its frames
     adds, and to write it."""
-    rows, scenario = logged(flight._kept()), flight.scenario
-    if not events_of(rows):
+    rows, scenario = logged_columns(flight._kept()), flight.scenario
+    if not event_rows(rows):
         return certificate(scenario, flight._kept())
     recorder, began = Recorder(scenario), process_time()
     fly(scenario)

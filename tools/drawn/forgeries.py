@@ -22,7 +22,7 @@ import numpy as np
 import beaver_ftc as bf
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
-from beaver_ftc_assurance.certificates.certificate import as_text, sealed
+from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
 from tools.drawn.certificates import certified
 from tools.drawn.reader import doubts
 
@@ -100,7 +100,7 @@ def forgeries(
             with suppress(TypeError):  # a road after one that left a field of another type
                 ROADS[name](rng, forged, said, log)
         restate(forged, said, log)
-        yield sealed(json.loads(json.dumps(forged))), chosen
+        yield with_digest(json.loads(json.dumps(forged))), chosen
         n -= 1
 
 
@@ -114,7 +114,7 @@ def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tu
         k, kind = int(rng.integers(1, rows)), rng.integers(3)
         surface = str(rng.choice(surfaces))
         what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
-        column = checker.column_of(what, log)
+        column = checker.event_column(what, log)
         columns = [column, f"fie_{surface}_excluded", "detected", "t_s"]
         column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
         if (what, k) not in excluded and not _is_event(what, k, log):
@@ -134,7 +134,7 @@ def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tu
 
 def _is_event(what: str | None, k: int, log: Log) -> bool:
     """Whether the log has this event in this row."""
-    column = log.get(checker.column_of(what, log))
+    column = log.get(checker.event_column(what, log))
     return column is not None and bool(column[k:].all() and (k == 0 or not column[k - 1]))
 
 
@@ -173,14 +173,14 @@ def restate(forged: Document, said: Document, log: Log) -> None:
         frames = checker.Frames(forged, log, declared, said.get("block"))
         for term in said.get("terms", ()):
             rows = slice(term["first"], term["frame"] + 1)
-            term["rest"] = (np.array(term["eta_bar"]) - frames.published[rows]).tolist()
+            term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
         pairs = [(1.0, 0.0)]
         if "terms" in said:
             pairs = [_sum(said, frames)]
         elif "looks" in said:
             pairs = [(sum(z - o for z, o, _ in said["looks"]), sum(most for *_, most in said["looks"]))]
         elif "likelihood" in said:
-            pairs = checker.likelihood(said, frames, declared)
+            pairs = checker.likelihood_pairs(said, frames, declared)
         sides = np.array(pairs, float).T
         said["sides"] = sides.tolist() if "likelihood" in said else sides[:, 0].tolist()
     except Exception:  # numbers that no sum can be made of are left as they are
@@ -191,7 +191,7 @@ class _Any:
     """A scenario that declares whatever the forged certificate says."""
 
     def __init__(self, forged: Document, log: Log) -> None:
-        self.dt, self.instants, self.from_row = forged.get("dt_s", 0.01), forged.get("instants", 1), 0
+        self.dt, self.instants, self.start_row = forged.get("dt_s", 0.01), forged.get("instants", 1), 0
         self.scenario = {"fdi": {"statistical": {"false_alarms_per_h": 1e3}}}
 
 
@@ -203,10 +203,10 @@ def _sum(said: Document, frames: Any) -> tuple[float, float]:
         a = np.exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
         since = term.get("since", k - 1)
         past = np.arange(since + 1, k + 1)
-        left, noise = a ** (k - past.astype(float)), frames.n @ abs(d)
-        value += term["weight"] * (left @ (dt * frames.nu[past] @ d))
+        left, noise = a ** (k - past.astype(float)), frames.gyro_change_rad_s @ abs(d)
+        value += term["weight"] * (left @ (dt * frames.innovation_rad_s2[past] @ d))
         limit += term["weight"] * (
-            left @ (dt * frames.eta_bar[past] @ abs(d) + (1 - a) * noise[past - 1])
+            left @ (dt * frames.eta_bar_rad_s2[past] @ abs(d) + (1 - a) * noise[past - 1])
             + a * left[0] * noise[since]
             + noise[k] + a ** (k + 1.0 - first) * term.get("fault", 0.0)
         )  # fmt: skip

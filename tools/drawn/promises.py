@@ -3,8 +3,9 @@
 `broken` looks at the metrics alone; `told_alike` at log and verdict; `saved_alike` at a result folder and its
 page; `flown_again` at the numbers of the same scenario read back from its text.
 
-`broken` is an oracle: it works out false alarms, delays and names by a second road, with a tolerance of its
-own, and does not ask `beaver_ftc.scenario.judgement`, so that an error there shows here.
+Whether an alarm is false, a detection late or a name right is asked of `beaver_ftc.results.metrics`, as
+everywhere. `_judged_otherwise` works the same out by a second road, with a tolerance of its own, so that an
+error there shows here.
 """
 
 import json
@@ -17,6 +18,7 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.results import Metrics, verdict
+from beaver_ftc.results.metrics import DeclaredFault, Truth, is_late
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.faults import UNANTICIPATED
@@ -34,6 +36,7 @@ DEFAULT_LIMIT_DEG_S = 60.0
 def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator[str]:
     """A line for each promise that the flight breaks. declared: whether every error of the truth is."""
     yield from _sane(scenario, metrics)
+    yield from _judged_otherwise(scenario, metrics)
     if declared:
         yield from _false_alarms(scenario, metrics)
         yield from _late(scenario, metrics)
@@ -59,6 +62,51 @@ def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
         yield "supervisor: modes out of order"
 
 
+def _judged_otherwise(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
+    """Where the metrics judge alarm, delay or name otherwise than the times and places of the faults do."""
+    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
+    alarms_s = [time_s for time_s, _ in _alarms(scenario, metrics) if time_s is not None]
+    if metrics["false_alarm"] != any(time_s < first_s - DUST_S for time_s in alarms_s):
+        yield f"verdict: false_alarm {metrics['false_alarm']}, alarms {alarms_s}, faults from {first_s:g} s"
+    # of several places the delay of a name counts from the fault that it means
+    judged = ("detection", "isolation") if len(_places(scenario)) < 2 else ("detection",)
+    for what in judged:
+        delay_s = metrics[what]["delay_s"]
+        by_time_s = _since_fault_s(scenario, first_s, metrics[what]["time_s"])
+        if not _is_near(delay_s, by_time_s):
+            yield f"verdict: {what} {delay_s} s after the fault, by its time {by_time_s} s"
+    isolation, right = metrics["isolation"], _right_names(scenario)
+    if right is not None and isolation["fault"] is not None:
+        correct = isolation["fault"] in right and isolation["time_s"] >= first_s - DUST_S
+        if isolation["correct"] != correct:
+            yield f"verdict: {isolation['fault']} correct {isolation['correct']}, broken {sorted(right)}"
+
+
+def _since_fault_s(scenario: bf.Scenario, first_s: float, time_s: float | None) -> float | None:
+    """From the first frame with a fault to an event; None of one before."""
+    if time_s is None or time_s < first_s - DUST_S:
+        return None
+    return max(time_s - math.ceil((first_s - DUST_S) * scenario.rate_hz) / scenario.rate_hz, 0.0)
+
+
+def _is_near(one: float | None, other: float | None) -> bool:
+    return one is other if one is None or other is None else abs(one - other) < DUST_S
+
+
+def _places(scenario: bf.Scenario) -> set[tuple[str | None, str | None]]:
+    """What is broken: (surface, sensor), both None of the aerodynamics."""
+    return {(_surface(fault), _sensor(fault)) for fault in scenario.faults}
+
+
+def _right_names(scenario: bf.Scenario) -> set[str] | None:
+    """The right names where one surface or one instrument is broken; None elsewhere."""
+    places = _places(scenario)
+    surface, sensor = places.pop() if len(places) == 1 else (None, None)
+    if sensor:
+        return {f"sensor {sensor}", UNANTICIPATED}
+    return {surface} if surface else None
+
+
 def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | None, str]]:
     """(when or None, whose alarm) of each diagnosis of a flight in turn, that of its end last."""
     scheme = scenario.fdi.scheme
@@ -77,9 +125,9 @@ def _began_s(metrics: Document) -> float:
 
 def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """An alarm before there is a fault."""
-    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
+    onset = Truth.of(scenario).onset
     for time_s, scheme in _alarms(scenario, metrics):
-        if time_s is not None and time_s < first_s - DUST_S and scheme == OURS:
+        if time_s is not None and onset.is_false(time_s) and scheme == OURS:
             yield f"false alarm: at {time_s:g} s"
 
 
@@ -93,7 +141,7 @@ def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     delay_s = metrics["detection"]["delay_s"]
     if delay_s is None:
         yield f"late: certain after {certain_s:g} s, and no alarm"
-    elif delay_s > certain_s + 1.0 / scenario.rate_hz + DUST_S:
+    elif is_late(delay_s, certain_s, 1.0 / scenario.rate_hz):
         yield f"late: certain after {certain_s:g} s, alarm after {delay_s:g} s"
 
 
@@ -133,7 +181,7 @@ def _instrument(
     watched = scenario.fdi.sensor_monitor != "never" and _began_s(metrics) < fault.at_s
     if surfaces or len(sensors) > 1 or not watched:
         return
-    if named not in (None, UNANTICIPATED, f"sensor {fault.sensor}"):
+    if named is not None and not DeclaredFault.of(fault).is_named_by(named):
         yield f"wrong name: {named}, broken is sensor {fault.sensor}"
 
 
@@ -161,7 +209,7 @@ def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) ->
     if scenario.fdi.fault_profile == "abrupt" and len(faults) > 1:
         return
     kinds = _kinds(faults)
-    if named not in (None, surface):
+    if named is not None and not DeclaredFault.of(faults[0]).is_named_by(named):
         yield f"{'excluded' if named == UNANTICIPATED else 'wrong name'}: {named}, broken is {surface}"
     elif named is None and scenario.fdi.pairs:
         yield from _left_of_pair(isolation, {surface: kinds})

@@ -1,4 +1,5 @@
-"""A second reader of certificates, written from theory.md alone: its recursions, frame by frame.
+"""A second reader of certificates, written from docs/explanation alone: the recursions of detection.md and
+isolation.md, frame by frame.
 
 It shares no code with tools/check_certificate.py, which sums what is left of each frame; the two must agree.
 What a fault does and which events there are it takes from the log too; what was declared, from the scenario.
@@ -368,6 +369,8 @@ def _followed(one: Document, said: Document, flight: Flight) -> tuple[float, flo
     if one.get("fault", 0.0) < earlier * (1.0 - 1e-9) - 1e-15:
         raise Doubtful("the fault has done more before")
     if said["theta"] == "constant while it shows":
+        if fault.kind.endswith("that varies"):
+            raise Doubtful("the parameter of this type is not one number")
         beside = range(last - 1, last + 2) if flight.instants > 1 else range(last, last + 1)
         if not all(flight.unhealthy(k) for k in beside if k < flight.rows):
             raise Doubtful("health explains a frame")

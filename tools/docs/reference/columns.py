@@ -76,7 +76,7 @@ def _mismatch_frames() -> Columns:
 
 def _diagnosis() -> Columns:
     kinds = {"faulty": FLAG, "named": TEXT}
-    return {name: kinds.get(name, NUMBER) for name in pages.columns_of(["SURFACE"])}
+    return {name: kinds.get(name, NUMBER) for name in pages.diagnosis_column_names(["SURFACE"])}
 
 
 TABLES: dict[str, Callable[[], Columns]] = {
@@ -91,13 +91,23 @@ TABLES: dict[str, Callable[[], Columns]] = {
 }
 
 
+_SAYS = """Which columns do the log of a flight and the tables of studies have? Read this page if you
+evaluate results with your own program.
+
+The name of a column with a unit ends with the unit. In this page a word in capitals stands for several
+names: AXIS is p, q and r; SURFACE each control surface; ESTIMATOR each isolation estimator, named after its
+surface; SIGNAL a signal of the aircraft; SOURCE a source of the mismatch; WITHIN a number of seconds. The
+unit 1 is a pure number."""
+_NEXT = """## Next
+
+[Open a flight in other tools](how-to/other-tools.md) shows how to read the files. The
+[nomenclature](reference/nomenclature.md) has the symbol of each quantity."""
+
+
 def page() -> str:
     """The page."""
-    says = (
-        "Which columns do the log and the tables have? `AXIS` is p, q and r, `SURFACE` each control surface."
-    )
     texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
-    return "\n\n".join(["# Columns", says, *(_table(name, texts[name]) for name in TABLES)]) + "\n"
+    return "\n\n".join(["# Columns", _SAYS, *(_table(name, texts[name]) for name in TABLES), _NEXT]) + "\n"
 
 
 def _table(name: str, text: Mapping[str, str]) -> str:

@@ -14,37 +14,50 @@ from beaver_ftc.scenario.sweeps import sweep_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_assurance.evidence.plan import plan_json_schema
 from beaver_ftc_logs.vehicle import Vehicle
-from tools.docs.reference.schema import Key, Node, Place, Section, Sections, dotted
+from tools.docs.reference.schema import Key, Node, Path, Place, Section, Sections, dotted
 
 HEAD = ("key", "what it is", "type", "unit", "range", "default", "example")
 _TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number", "number": "number"}
-_HOLDING = ("array", "items", "list of"), ("object", "additionalProperties", "mapping of names to")
-_PLURALS = {"text": "texts", "choice": "choices", "whole number": "whole numbers", "number": "numbers"}
+_PLURALS = {one: f"{one}s" for one in ("text", "choice", "whole number", "number", "value", "section")}
 
 
 class Kind(NamedTuple):
-    """A kind of file: the schema of what loads it, and what to say first."""
+    """A kind of file: the schema of what loads it, what to say first, and where to go next."""
 
     schema: Callable[[], Node]
     title: str
     says: str
+    next: str
     more: Callable[[], Iterator[str]] = lambda: iter(())
 
 
 def page(kind: Kind) -> str:
     """The page of a kind of file."""
     parts = (_section(section) for section in Sections(kind.schema()))
-    return "\n\n".join([f"# {kind.title}", kind.says, _READ, *parts, *kind.more()]) + "\n"
+    return (
+        "\n\n".join([f"# {kind.title}", kind.says, _READ, *parts, *kind.more(), f"## Next\n\n{kind.next}"])
+        + "\n"
+    )
 
 
-_READ = """Each section has a table of its keys, and each key an example that loads. In a heading `[]` is
-an item of a list, `NAME` a name of your own. Unit 1 is a pure number. *Left out*: no value by itself."""
+_READ = """The file is YAML. Each section of the file has a table below, with a row for each key:
+
+- *what it is*: meaning of the key. Text after "left out:" says what applies if the key is not in the file.
+- *type*: kind of value. A link leads to the table of a section below this key. A mapping of names to
+  numbers is written `{aileron: 0.1, rudder: 0.2}`.
+- *unit*: unit of a number. 1 is a pure number; a share of 1 is a fraction, so that 0.4 is 40 %.
+- *range*: allowed values. A key of the type "choice" has one of the listed values.
+- *default*: value if the key is not in the file. "required": the key must be in the file; "left out": there
+  is no value; "none": empty; "see section": the keys of the section have their own defaults.
+- *example*: the key with a value that is accepted.
+
+In a heading, `[]` is an item of a list, and `NAME` is a name that you choose or that the aircraft has."""
 
 
 def _section(section: Section) -> str:
     parts = [f'<a id="{_anchor(section.title)}"></a>\n\n## {_heading(section)}']
     if elsewhere := _elsewhere(section):
-        parts.append(f"The same: {elsewhere}.")
+        parts.append(f"The same keys are also allowed {elsewhere}.")
     if section.says:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
     parts.append(markdown_table(HEAD, [_row(key, section.places) for key in section.keys]))
@@ -62,23 +75,39 @@ def _heading(section: Section) -> str:
     beside = [place.path for place in section.places if place.path[:-1] == first[:-1]]
     kind = next((key.choices[0] for key in section.keys if key.name == "type"), "")
     of = " of a sensor" if any(key.name == "sensor" for key in section.keys) else ""
-    return ", ".join(f"`{dotted(path)}`" for path in beside) + (f", type `{kind}`{of}" if kind else "")
+    return _named(beside) + (f", type `{kind}`{of}" if kind else "")
+
+
+def _named(beside: list[Path]) -> str:
+    """Paths side by side; of more than one, what they share stands once."""
+    above = beside[0][:-1]
+    if len(beside) == 1 or not above:
+        return ", ".join(f"`{dotted(path)}`" for path in beside)
+    return f"`{dotted(above)}`: " + ", ".join(f"`{path[-1]}`" for path in beside)
 
 
 def _elsewhere(section: Section) -> str:
     """Where else it stands."""
     first = section.places[0].path[:-1]
     others = dict.fromkeys(place.path[:-1] for place in section.places)
-    return ", ".join(f"below `{dotted(path)}`" if path else "of the file" for path in others if path != first)
+    below = [f"`{dotted(path)}`" for path in others if path and path != first]
+    top = ["at the top of the file"] if () in others and first else []
+    return " and ".join([*([f"below {', '.join(below)}"] if below else []), *top])
 
 
 def _row(key: Key, places: list[Place]) -> tuple[str, ...]:
     units = list(dict.fromkeys(key.unit(place) for place in places)) if key.number else []
     wanted = ", ".join(f"`{name}: {in_a_line(value)}`" for name, value in key.needs.items())
-    says = key.says + (f"; the example goes with {wanted}" if wanted else "")
+    says = _without_unit(key.says, units) + (f"; the example also needs {wanted}" if wanted else "")
     example = "" if key.example is None else f"`{key.name}: {in_a_line(key.example)}`"
     unit = ", ".join(filter(None, units)) or ("1" if key.number else "")
     return f"`{key.name}`", says, _type(key), unit, _range(key), _default(key), example
+
+
+def _without_unit(says: str, units: list[str]) -> str:
+    """The text in one line and without the unit at its end, for which the table has a column."""
+    says = " ".join(says.split())
+    return next((says.removesuffix(end) for unit in units if says.endswith(end := f", {unit or 1}")), says)
 
 
 def _type(key: Key) -> str:
@@ -93,7 +122,7 @@ def _type(key: Key) -> str:
 
 def _called(title: str) -> str:
     """The title of a section as words."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title).lower()
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title).lower().removeprefix("of ")
 
 
 def _type_of(form: Node) -> str:
@@ -105,15 +134,21 @@ def _type_of(form: Node) -> str:
         return f"list of {len(form['prefixItems'])} numbers"
     for kind, inside, words in (
         ("array", "items", "list of"),
-        ("object", "additionalProperties", "names to"),
+        ("object", "additionalProperties", "mapping of names to"),
     ):
         if form.get("type") == kind:
             of = form.get(inside)
             inner = (
                 dict.fromkeys(map(_type_of, of["anyOf"])) if isinstance(of, Mapping) and of else ["values"]
             )
-            return f"{words} " + " or ".join(_PLURALS.get(one, one) for one in inner)
+            return f"{words} " + " or ".join(map(_plural, inner))
     return _TYPES.get(form.get("type", ""), "value")
+
+
+def _plural(kind: str) -> str:
+    """A kind of value, of several."""
+    first, of, rest = kind.partition(" of ")
+    return f"{first}s{of}{rest}" if of else _PLURALS.get(kind, kind)
 
 
 def _range(key: Key) -> str:
@@ -135,9 +170,14 @@ def _default(key: Key) -> str:
     default = key.node.get("default")
     if default is None and "default" in key.node:
         return "*left out*"
-    if key.sections or default is None:
-        return "its own" if key.sections else "none"
-    return "none" if default in ("", [], {}) else f"`{in_a_line(default)}`"
+    if default is None and any(
+        form.get("type") == "object" and "properties" not in form for form in key.forms
+    ):
+        return "none"
+    if default in ("", [], {}) or (default is None and not key.sections):
+        return "none"
+    flat = not isinstance(default, Mapping) or not any(isinstance(one, Mapping) for one in default.values())
+    return "see section" if default is None or not flat else f"`{in_a_line(default)}`"
 
 
 def in_a_line(value: Any) -> str:
@@ -159,6 +199,7 @@ def _of_scenarios() -> Iterator[str]:
     """What a scenario may name: schemes and laws with their options, presets."""
     for group, what, where in ((DETECTORS, "schemes", "fdi"), (LAWS, "laws", "control")):
         yield f"## {what.capitalize()}, and their `{where}.options`"
+        yield f"`{where}.{what[:-1]}` has one of these names, and `{where}.options` sets the options below."
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
         yield markdown_table((what, "what it is"), [(f"`{one.name}`", one.description()) for one in entries])
         rows = [
@@ -169,8 +210,9 @@ def _of_scenarios() -> Iterator[str]:
         yield markdown_table(("of", "option", "range", "default", "what it is"), rows)
     for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
         yield f"## Presets of `{what}`"
+        yield f"A preset is a name for these values: `{what}: NAME` replaces the section with the values."
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
-        yield markdown_table(("preset", "of", "is"), rows)
+        yield markdown_table(("preset", "of", "values"), rows)
 
 
 def _option_range(of: Mapping[str, Any]) -> str:
@@ -189,28 +231,48 @@ def _preset(of: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield ", ".join(f"`{name}`" for name in names), f"`{text}`"
 
 
-_AS_SCHEMA = "`beaver-ftc schema{}` prints the same as JSON Schema, for an editor."
+_AS_SCHEMA = (
+    "`beaver-ftc schema{}` prints the same keys as JSON Schema, "
+    "with which an editor completes and checks the file."
+)
 KINDS = {
     "scenario-keys": Kind(
         json_schema,
         "Scenario keys",
-        f"Which keys does a scenario file have? {_AS_SCHEMA.format('')}",
+        "Which keys can a scenario file have? Use this page to look up a key. "
+        "[Scenarios](reference/scenarios.md) "
+        f"explains the sections with examples. {_AS_SCHEMA.format('')}",
+        "[Sweep keys](reference/sweep-keys.md) has the keys of a file with many flights, and "
+        "[columns](reference/columns.md) the results of a flight.",
         _of_scenarios,
     ),
     "sweep-keys": Kind(
-        sweep_json_schema, "Sweep keys", f"Which keys does a sweep file have? {_AS_SCHEMA.format(' --sweep')}"
+        sweep_json_schema,
+        "Sweep keys",
+        "Which keys can a sweep file have? A sweep flies one scenario many times with varied values "
+        f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
+        "[Results of a sweep](reference/sweep-results.md) has the files and statistics that a sweep writes.",
     ),
     "plan-keys": Kind(
         plan_json_schema,
         "Plan keys",
-        f"Which keys does a plan of evidence have? {_AS_SCHEMA.format(' --plan')}",
+        "Which keys can a plan of evidence have? A plan lists requirements and the flights that test them "
+        f"([how to write one](how-to/evidence.md)). {_AS_SCHEMA.format(' --plan')}",
+        "[Write evidence](how-to/evidence.md) explains the verdicts of a plan with an example.",
     ),
     "aircraft-keys": Kind(
-        AircraftFile.model_json_schema, "Aircraft file keys", "Which keys does an `aircraft.yaml` have?"
+        AircraftFile.model_json_schema,
+        "Aircraft file keys",
+        "Which keys can an `aircraft.yaml` have? The file describes an aircraft for diagnosis and law: "
+        "its surfaces, mass, the terms of the design model, and limits. `derive` writes it "
+        "([your own aircraft](tutorials/own-aircraft.md)); look up a key here to read or change it.",
+        "[Derived aircraft](explanation/derived-aircraft.md) explains how terms and errors are found.",
     ),
     "vehicle-keys": Kind(
         Vehicle.model_json_schema,
         "Vehicle file keys",
-        "Which keys does the file have that says what the columns of a log are?",
+        "Which keys can a vehicle file have? The file says which column of a flight log is which quantity "
+        "([prepare a log](how-to/flight-logs.md)). `identify --check` proposes a first version of it.",
+        "[Diagnose a flight log](tutorials/flight-log.md) uses such a file.",
     ),
 }

@@ -128,8 +128,9 @@ def _read_flown(name: str, healthy: str, alarms: str, losses: str, *counts: str)
     return (
         f"The first row reads: the {name} flew {healthy} without a fault, with {alarms} false alarms. "
         f"In {losses} further flights a random surface lost effectiveness. The diagnosis detected {detected} "
-        f"of these losses; it named {named} correctly and {wrong} wrongly, and excluded the true cause of "
-        f"{left_out}. G3 guarantees the detection of {certain} of them; {late} of these were late."
+        f"of these losses. It gave the correct name to {named} and a wrong name to {wrong}. "
+        f"For {left_out} losses it excluded the true cause. G3 guarantees the detection of {certain} losses; "
+        f"{late} of these were late."
     )
 
 

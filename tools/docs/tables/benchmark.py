@@ -1,9 +1,11 @@
-"""The tables of benchmark.md: what schemes find, how laws track, and in what a rival does better."""
+"""The tables of benchmark.md: what schemes find and how laws track; better numbers of rivals are bold."""
 
+import json
 from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
+from beaver_ftc.diagnosis.rivals import TUNED_FILE
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import (
@@ -17,6 +19,7 @@ from beaver_ftc.studies.compare.trial import (
     fly_case,
     of_set,
 )
+from beaver_ftc.studies.compare.tune import is_adopted
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
@@ -31,9 +34,11 @@ HIDDEN = (
     "fault-tolerant-published",
     "oracle-published",
 )  # the yardsticks, and parts of ours
-PROBED = ("published", "air-light")
+PROBED = ("published", "realism", "air-light")  # one of each grade that is tuned
 NO_SCHEME = "none"
 _RATIO = "Tracking error divided by the oracle's in the same flight, median; below 1: better than the oracle"
+_RATIO_90 = "Tracking error divided by the oracle's, not exceeded in 90 % of the flights"
+_LOWER, _UPPER = "Lower 95 % limit of the median {}", "Upper 95 % limit of the median {}"
 ALONE = f"{LAW}, no scheme"  # our law without any diagnosis
 PASSIVE_LAWS = (PASSIVE, "lqr", "indi", ALONE)  # fixed gains, and nothing from a diagnosis
 
@@ -44,22 +49,60 @@ def benchmark() -> str:
 
 
 def benchmark_probe() -> str:
-    """One flight of each sweep of two sets: a change of any number of theirs shows here first."""
+    """One flight of each sweep of a set of each grade: a change of any number of theirs shows here first."""
     return _tables(_compared(PROBED, most=1))
 
 
+GAIN_COLUMNS = (
+    "method", "grade", "draw", "judged on", "flights", "cost, shipped", "cost, tuned again", "gain, %",
+    "from, %", "to, %", "adopted",
+)  # fmt: skip
+
+
+def benchmark_gains() -> str:
+    """By how much the cost of a method falls that is tuned again, on flights of its own: of every search that
+    finds other values, as tuned.json has it."""
+    rows = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["methods"]
+    found = [(row, again) for row in rows for again in row["again"] if again.get("gain")]
+    last = [row["again"][-1] for row in rows]
+    kept = sum(again.get("gain") == 0.0 for again in last)
+    none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
+    largest = max(again.get("gain", 0.0) for again in last)
+    says = [
+        f"For {kept} of {len(rows)} pairs of method and grade the last search finds no values that cost 5 % "
+        "less: the gain is 0.",
+        f"No values are admissible: {', '.join(none)}.",
+        f"The largest gain of a last search is {100.0 * largest:.1f} %.",
+    ]
+    return f"{markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])}\n\n{' '.join(says)}"
+
+
+def _gain(row: Document, again: Document) -> tuple[str, ...]:
+    costs = (f"{again[key]:.3f}" for key in ("built_in", "retuned"))
+    shares = (f"{100.0 * again[key]:.1f}" for key in ("gain", "gain_low", "gain_high"))
+    adopted = "yes" if is_adopted(again) else "no"
+    judged = f"{again['draw'] + 1} to {again['draw'] + again['judged']}"
+    flown = row["name"], row["grade"], str(again["draw"]), judged, str(again["flights"])
+    return *flown, *costs, *shares, adopted
+
+
 def _compared(names: Iterable[str], most: int | None = None) -> Document:
-    """Schemes with our law, laws with our scheme, our law without any scheme, as tuned.json has them."""
+    """Everybody on these sets, as tuned.json has them."""
     cases: list[SetFlight] = [case for name in names for case in of_set(name, most)]
-    schemes = [name for name in (*registered(DETECTORS), STATISTICAL) if name not in HIDDEN]
-    laws = [name for name in registered(LAWS) if name not in HIDDEN]
-    entries = [*entries_of(schemes, laws), Entry(NO_SCHEME, LAW)]
+    entries = everybody()
     trials = fly_all(partial(fly_case, entries=entries, trade_off=False), cases, 2)
     return document_of(trials, entries)
 
 
+def everybody() -> list[Entry]:
+    """Each scheme with our law, each law with our scheme, and our law without any scheme."""
+    schemes = [name for name in (*registered(DETECTORS), STATISTICAL) if name not in HIDDEN]
+    laws = [name for name in registered(LAWS) if name not in HIDDEN]
+    return [*entries_of(schemes, laws), Entry(NO_SCHEME, LAW)]
+
+
 def _tables(document: Document) -> str:
-    """The tables of the page, each followed by what a rival does better in it."""
+    """The tables of the page."""
     sets = {name: document["sets"][name] for name in SHOWN if name in document["sets"]}
     faulted = {name: part for name, part in sets.items() if part["lines"][0]["faults"]}
     schemes, laws = _schemes(faulted), _laws(faulted)
@@ -68,12 +111,12 @@ def _tables(document: Document) -> str:
         _block(3, "Faults named correctly at the end, %", schemes, "isolation_rate", _percent, more=True),
         _rates(4, faulted),
         _block(5, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
-        _block(6, "Upper 95 % limit of that median, s", schemes, "delay_median_high_s", _seconds, None),
+        _block(6, _UPPER.format("delay of Table 5, s"), schemes, "delay_median_high_s", _seconds, None),
         _alarms(7, _schemes(sets)),
         _block(8, _RATIO, laws, "ratio_median", _ratio, more=False),
-        _block(9, "Lower 95 % limit of that median", laws, "ratio_median_low", _ratio, None),
-        _block(10, "Upper 95 % limit of that median", laws, "ratio_median_high", _ratio, None),
-        _block(11, "The same ratio, not exceeded in 90 % of flights", laws, "ratio_90", _ratio, more=False),
+        _block(9, _LOWER.format("ratio of Table 8"), laws, "ratio_median_low", _ratio, None),
+        _block(10, _UPPER.format("ratio of Table 8"), laws, "ratio_median_high", _ratio, None),
+        _block(11, _RATIO_90, laws, "ratio_90", _ratio, more=False),
     ])  # fmt: skip
 
 
@@ -103,16 +146,21 @@ def _alone(lines: list[Document]) -> Document:
 def _block(
     number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool | None
 ) -> str:
-    """A caption, a table of one number a cell, and what a rival does better. more: whether more is better;
-    None of limits, which are compared with nothing."""
+    """A caption and a table of one number a cell. more: whether more is better; None of limits, which are
+    compared with nothing."""
     counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
     head = ("", *(f"{name} ({count})" for name, count in counts.items()))
-    names = list(next(iter(rows.values())))
-    body = [(_label(name), *(cell(of[name].get(key)) for of in rows.values())) for name in names]
-    said = [] if more is None else [_better(rows, key, more)]
-    return "\n\n".join(
-        [_caption(number, f"{title}; in brackets: faulted flights"), markdown_table(head, body), *said]
-    )
+    ours = SCHEME if SCHEME in next(iter(rows.values())) else LAW
+
+    def shown(name: str, of: dict[str, Document]) -> str:
+        theirs, is_rival = of[name].get(key), name not in (ours, STATISTICAL, ALONE)
+        is_better = more is not None and is_rival and _less(of[ours].get(key), theirs, more)
+        return f"**{cell(theirs)}**" if is_better else cell(theirs)
+
+    body = [(_label(name), *(shown(name, of) for of in rows.values())) for name in next(iter(rows.values()))]
+    marked = "" if more is None else f"; bold: a rival's number is better than that of `{ours}`"
+    caption = _caption(number, f"{title}; in brackets: faulted flights{marked}")
+    return f"{caption}\n\n{markdown_table(head, body)}"
 
 
 def _caption(number: int, title: str) -> str:
@@ -133,25 +181,6 @@ def _seconds(delay_s: float | None) -> str:
 
 def _ratio(ratio: float | None) -> str:
     return "lost" if ratio is None else f"{ratio:.2f}"
-
-
-def _better(rows: Rows, key: str, more: bool) -> str:
-    """In which sets which rivals have the better number; ours are what users of ours fly."""
-    ours = SCHEME if SCHEME in next(iter(rows.values())) else LAW
-    beside = (ours, STATISTICAL, ALONE)
-    rivals = [name for name in next(iter(rows.values())) if name not in beside]
-    found = []
-    for rival in rivals:
-        where = [
-            f"`{name}`" for name, of in rows.items() if _less(of[ours].get(key), of[rival].get(key), more)
-        ]
-        if where:
-            found.append(f"`{rival}` in {', '.join(where)}")
-    return (
-        f"These rivals have a better number than `{ours}`, significant or not: {'; '.join(found)}."
-        if found
-        else f"No rival has a better number than `{ours}` here."
-    )
 
 
 def _less(ours: float | None, theirs: float | None, more: bool) -> bool:

@@ -40,7 +40,14 @@ def certificate_example() -> str:
 
 
 def _line(of: dict[str, Any], *names: str) -> str:
-    return "  " + ", ".join(f'"{name}": {json.dumps(of[name])}' for name in names) + ","
+    return "  " + ", ".join(f'"{name}": {json.dumps(_rounded(of[name]))}' for name in names) + ","
+
+
+def _rounded(value: Any) -> Any:
+    """To 12 digits, in which processors agree."""
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
+    return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
 def certificate_by_hand() -> str:

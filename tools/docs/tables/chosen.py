@@ -1,19 +1,31 @@
 """Tables of docs/results/choices.md: constants chosen by flights, those flights, and those of the results."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
+from math import exp
 from pathlib import Path
+from statistics import fmean
 from typing import Any
+from unittest.mock import patch
 
+import numpy as np
+
+from beaver_ftc.control.laws import rejecting
+from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 from beaver_ftc.documents.document import parse
-from beaver_ftc.studies.compare.trial import CALIBRATION
+from beaver_ftc.plugins import LAWS
+from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, flown, least_margins
+from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
+from beaver_ftc.studies.compare.trial import CALIBRATION, DRAW, LAW, SCHEME, Entry
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
+TUNED_DRAWS = range(61)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-CONSTANT_HEAD = ("row", "constant", "sets", "file", "chosen by")
+CONSTANT_HEAD = ("row", "constant", "determines", "file", "chosen by")
 FLIGHT_HEAD = ("row", "flights that chose the constant", "their seeds")
 RESULT_HEAD = ("row", "page", "flights of the results", "their seeds")
 
@@ -31,6 +43,84 @@ def chosen_flights() -> str:
 def chosen_results() -> str:
     """Of each row, the results that depend on the constant, and their flights."""
     return _table(RESULT_HEAD, lambda choice: _result(choice["results"]))
+
+
+RATIOS, RATIO_DRAWS = (3.0, 4.5, 6.5, 9.0, 13.0, 20.0), (101, 102)
+
+
+def chosen_ratio() -> str:
+    """Error of the default law over the oracle's, by RATIO of its observer, on flights that chose nothing."""
+    return _of_ratios(None)
+
+
+def chosen_ratio_probe() -> str:
+    """The same of one flight of each sweep."""
+    return _of_ratios(1)
+
+
+def _of_ratios(most: int | None) -> str:
+    costs = {grade: _costs(grade, most, RATIO_DRAWS) for grade in FLIGHT_GRADES}
+    rows = [
+        (f"{ratio:g}", *(f"{exp(fmean(_parts(of, ratio))):.2f}" for of in costs.values())) for ratio in RATIOS
+    ]
+    return markdown_table(("RATIO", *(f"`{grade}`" for grade in FLIGHT_GRADES)), rows)
+
+
+BETTER_RATIO, BETTER_DRAWS = 9.0, (103, 104, 105, 106)
+BETTER_HEAD = (
+    "grade", "gain, %", "from, %", "to, %", "flights", "surface rate", "gain margin, dB", "phase margin, deg",
+)  # fmt: skip
+
+
+def chosen_ratio_gain() -> str:
+    """What the default law gains by another RATIO, on draws that neither chose it nor are in the table above;
+    how fast its surfaces then move, over how fast they do now; and its margins."""
+    return markdown_table(BETTER_HEAD, [_of_better(grade, None) for grade in FLIGHT_GRADES])
+
+
+def chosen_ratio_gain_probe() -> str:
+    """The same of one flight of each sweep."""
+    return markdown_table(BETTER_HEAD, [_of_better(grade, 1) for grade in FLIGHT_GRADES])
+
+
+def _of_better(grade: str, most: int | None) -> tuple[str, ...]:
+    costs, ratios = _costs(grade, most, BETTER_DRAWS), (rejecting.RATIO, BETTER_RATIO)
+    built_in, better = (np.array(_parts(costs, ratio)) for ratio in ratios)
+    gain = relative_gain(built_in, better, geometric_mean)
+    shares = (f"{100.0 * share:.1f}" for share in (gain.value, gain.low, gain.high))
+    before, after = (_effort(grade, most, ratio) for ratio in ratios)
+    with _observer_ratio(BETTER_RATIO):
+        gain_db, phase_deg = least_margins(costs[0].margins({}))
+    kept = f"{after / before:.2f}", f"{gain_db:.1f}", f"{phase_deg:.0f}"
+    return f"`{grade}`", *shares, str(len(better)), *kept
+
+
+def _costs(grade: str, most: int | None, draws: Sequence[int]) -> list[LawCost]:
+    return [LawCost(LAW, grade, most, draw) for draw in draws]
+
+
+def _parts(costs: list[LawCost], ratio: float) -> list[float]:
+    """Logarithm of the law's error over the oracle's, which keeps its own RATIO, in each flight."""
+    with _observer_ratio(ratio):
+        return [part for cost in costs for part in cost.parts({})]
+
+
+def _effort(grade: str, most: int | None, ratio: float) -> float:
+    """RMS rate of all surfaces over the same flights, deg/s."""
+    cases = [case for draw in BETTER_DRAWS for case in flights(grade, most, draw) if case.scenario.faults]
+    with _observer_ratio(ratio):
+        return effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
+
+
+@contextmanager
+def _observer_ratio(ratio: float) -> Iterator[None]:
+    """RATIO of the default law, for the flights inside."""
+    try:
+        with patch.object(rejecting, "RATIO", ratio):
+            rejecting.candidates.cache_clear()
+            yield
+    finally:
+        rejecting.candidates.cache_clear()
 
 
 def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) -> str:
@@ -54,12 +144,18 @@ def choices() -> list[Document]:
 def draws_of(flights: Document) -> set[tuple[str, int]]:
     """Every (generator, seed) of some flights."""
     if "sets" in flights:
-        return {("benchmark", seed) for seed in _of_sets(flights["sets"])}
-    seeds = flights.get("seeds", [])
-    if isinstance(seeds, str):
-        module, name = seeds.split(":")
-        seeds = getattr(import_module(module), name)
-    return {(flights["drawn_by"], seed) for seed in seeds}
+        seeds, draws = _of_sets(flights["sets"]), _given(flights.get("draws", [0]))
+        return {("benchmark", seed + DRAW * draw) for seed in seeds for draw in draws}
+    return {(flights["drawn_by"], seed) for seed in _given(flights.get("seeds", []))}
+
+
+def _given(numbers: Sequence[int] | str) -> Sequence[int]:
+    """Numbers of the file, or those that it names as MODULE:NAME."""
+    if not isinstance(numbers, str):
+        return numbers
+    module, name = numbers.split(":")
+    found: Sequence[int] = getattr(import_module(module), name)
+    return found
 
 
 def _of_sets(sets: list[str] | str) -> list[int]:
@@ -71,8 +167,8 @@ def _of_sets(sets: list[str] | str) -> list[int]:
 
 
 def _said(flights: Document) -> str:
-    """Seeds in order, runs of them shortened."""
-    seeds, runs = sorted(seed for _, seed in draws_of(flights)), []
+    """Seeds in order, runs of them shortened; of several draws of a set, those of its file."""
+    seeds, runs = sorted(seed for _, seed in draws_of({**flights, "draws": [0]})), []
     for seed in seeds:
         if runs and seed == runs[-1][1] + 1:
             runs[-1][1] = seed

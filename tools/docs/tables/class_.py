@@ -20,9 +20,10 @@ def _live() -> list[tuple[str, str]]:
     weak, jam, trailing = (bf.fly(name, log=False) for name in names)
     modes = " → ".join(change["mode"] for change in weak.metrics["supervisor"])
     found, left = weak.detection, ", ".join(trailing.metrics["isolation"]["candidates"])
+    typed = f"{jam.isolation.type} after {jam.metrics['isolation']['type_delay_s']:.2f} s"
     return [
         ("1a", f"on {found.axis}, after {found.delay_s:.2f} s; {weak.isolation.fault}; {modes}"),
-        ("1b", f"{jam.isolation.fault}, {jam.isolation.type}, after {jam.isolation.delay_s:.2f} s"),
+        ("1b", f"{jam.isolation.fault} after {jam.isolation.delay_s:.2f} s; {typed}"),
         ("1c", f"{trailing.isolation.fault}; remaining types: {left or trailing.isolation.type}"),
     ]
 

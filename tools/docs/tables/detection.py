@@ -51,7 +51,10 @@ class Frames:
         effect = np.where(self.t > 1e-6, -LOSS * np.nan_to_num(self.regressor), 0.0)
         a = np.exp(-pole_per_s * self.dt)
         made = (lfilter([self.dt], [1.0, -a], of) for of in (self.innovation, self.bound, effect))
-        return Filtered(f"filter with the pole {pole_per_s:g} 1/s", *made)
+        says = (
+            "one frame alone" if pole_per_s == DEADBEAT_PER_S else f"filter with the pole {pole_per_s:g} 1/s"
+        )
+        return Filtered(says, *made)
 
     def sets(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest loss that is consistent with each frame, share of 1."""
@@ -119,7 +122,7 @@ def _draw_filter(axis: Axes, made: Filtered, t: np.ndarray, shown: np.ndarray) -
     axis.axvline(0.0, color=GREY, lw=0.9)
     axis.text(-0.003, 0.92, "fault", color=GREY, ha="right", transform=axis.get_xaxis_transform())
     axis.set_title(made.says, loc="left", fontsize=9)
-    axis.set_ylabel("pitch rate, 1e-3 rad/s")
+    axis.set_ylabel("pitch, 1e-3 rad/s")
     axis.set_ylim(0.0, 1.05 * E[shown].max())
     axis.set_xlim(-BEFORE_S, AFTER_S)
 
@@ -149,7 +152,7 @@ def feasible_set() -> str:
         axis.fill_between(t, 100 * least, 100 * largest, color=ORANGE, alpha=0.55, step="mid", lw=0)
         axis.axhline(100 * LOSS, color=GREEN, dashes=(6, 3), lw=1.4)
         axis.text(0.02, 23, "grey: one frame alone", color="#5a5a5a")
-        axis.text(0.02, 26, "orange: all frames since the fault", color="#8a5f00")
+        axis.text(0.02, 26, "orange: all frames since the alarm", color="#8a5f00")
         axis.text(0.02, 29, f"dashed: true loss, {LOSS:.0%}", color=GREEN)
         axis.set_xlabel("time since the fault, s")
         axis.set_ylabel("loss of effectiveness, %")

@@ -9,11 +9,13 @@ import pandas as pd
 
 import beaver_ftc as bf
 from beaver_ftc.results.flight import Flight
-from beaver_ftc.results.style import BLACK, LOOKS, VERMILION
+from beaver_ftc.results.style import BLACK, GREY, LOOKS, VERMILION
 from beaver_ftc.studies.present.tables import markdown_table
 
-_WIDTH, _HEIGHT, _MARGIN = 220, 104, 4  # of a thumbnail, px
-_UPPER, _LOWER = (6, 46), (56, 98)  # y of the two panels: from, to
+_WIDTH, _HEIGHT = 260, 150  # of a thumbnail, px
+_LEFT, _RIGHT = 30, 254  # x of the panels: from, to
+_UPPER, _LOWER = (18, 62), (84, 128)  # y of the two panels: from, to
+_SENSORS = {"p": "roll gyro", "V": "airspeed sensor", "alpha": "angle-of-attack vane"}  # of the gallery
 _BINS = 110  # points of a curve: two pixels each
 _HIGHEST = 2.0  # residual over threshold that is drawn
 _GROUPS = {  # heading: what the names begin with
@@ -64,7 +66,8 @@ def _outcome(flight: Flight) -> str:
     if not detection.detected:
         return "not detected"
     found = f"detected after {detection.delay_s:.2f} s" if detection.delay_s is not None else "false alarm"
-    named = f"named {isolation.fault}" if isolation.fault else "not named"
+    fault = isolation.fault or ""
+    named = f"named {_SENSORS.get(fault.removeprefix('sensor '), fault)}" if fault else "not named"
     return f"{found}, {named}" + (", aircraft lost" if flight.departure else "")
 
 
@@ -76,13 +79,18 @@ def _thumbnail(flight: Flight) -> str:
     look = LOOKS[f"surface {list(aircraft.surfaces).index(surface)}"]
     deflection = np.degrees(_binned(log[f"{surface}_effective_rad"].to_numpy(), np.mean))
     share = np.clip(_binned(_share(log), np.max), 0.0, _HIGHEST)
-    threshold = _LOWER[1] - (_LOWER[1] - _LOWER[0]) / _HIGHEST
+    middle = (_LOWER[0] + _LOWER[1]) / 2  # of the lower panel: its threshold
     parts = [
-        _line(_scaled(deflection, _UPPER), look.colour),
+        *_axes(f"{surface.replace('_', ' ')}, deg", _UPPER, _span(deflection), look.colour),
+        *_axes("largest residual / threshold, cut at 2", _LOWER, (0.0, _HIGHEST), "#333333"),
+        _text(_LEFT - 4, middle + 3, "1", "end"),
+        _line(_scaled(deflection, _UPPER, _span(deflection)), look.colour),
+        _line(np.full(2, middle), GREY, ' stroke-dasharray="4 3"'),
         _line(_scaled(share, _LOWER, (0.0, _HIGHEST)), "#333333"),
-        _line(np.full(2, threshold), VERMILION, ' stroke-dasharray="4 3"'),
-        *(_upright(at, log, VERMILION, _MARGIN) for at in _faults(flight)),
+        *(_upright(at, log, VERMILION, _UPPER[0]) for at in _faults(flight)),
         *([_upright(flight.detection.time_s, log, BLACK, _LOWER[0])] if flight.detection.detected else []),
+        _text(_LEFT, _HEIGHT - 8, "0", "middle"),
+        _text(_RIGHT, _HEIGHT - 8, f"{float(log['t_s'].iloc[-1]):.0f} s", "end"),
     ]
     size = f'width="{_WIDTH}" height="{_HEIGHT}"'
     return (
@@ -112,20 +120,40 @@ def _binned(values: np.ndarray, of) -> np.ndarray:
     return np.array([of(part) for part in np.array_split(np.nan_to_num(values), _BINS)])
 
 
-def _scaled(
-    values: np.ndarray, panel: tuple[int, int], span: tuple[float, float] | None = None
-) -> np.ndarray:
-    low, high = span or (values.min(), max(values.max(), values.min() + 0.5))
+def _span(values: np.ndarray) -> tuple[float, float]:
+    """Whole degrees below and above all values."""
+    low = float(np.floor(values.min()))
+    return low, max(float(np.ceil(values.max())), low + 1.0)
+
+
+def _axes(title: str, panel: tuple[int, int], span: tuple[float, float], colour: str) -> list[str]:
+    """Frame, title and the two ends of the scale of a panel."""
+    top, bottom = panel
+    width, height = _RIGHT - _LEFT, bottom - top
+    return [
+        f'<rect x="{_LEFT}" y="{top}" width="{width}" height="{height}" stroke="#ddd" stroke-width="1"/>',
+        _text(_LEFT, top - 5, title, "start", colour),
+        *(_text(_LEFT - 4, y + 3, f"{end:g}", "end") for y, end in zip((bottom, top), span, strict=True)),
+    ]
+
+
+def _text(x: float, y: float, says: str, anchor: str, colour: str = "#444") -> str:
+    look = f'font-family="Arial, sans-serif" font-size="9" stroke="none" fill="{colour}"'
+    return f'<text x="{x:.0f}" y="{y:.0f}" text-anchor="{anchor}" {look}>{says}</text>'
+
+
+def _scaled(values: np.ndarray, panel: tuple[int, int], span: tuple[float, float]) -> np.ndarray:
+    low, high = span
     top, bottom = panel
     return bottom - (bottom - top) * (values - low) / (high - low)
 
 
 def _line(y: np.ndarray, colour: str, how: str = "") -> str:
-    x = np.linspace(_MARGIN, _WIDTH - _MARGIN, len(y))
+    x = np.linspace(_LEFT, _RIGHT, len(y))
     points = " ".join(f"{a:.0f},{b:.1f}" for a, b in zip(x, y, strict=True))
     return f'<polyline points="{points}" stroke="{colour}"{how}/>'
 
 
 def _upright(at_s: float, log: pd.DataFrame, colour: str, top: int) -> str:
-    x = _MARGIN + (_WIDTH - 2 * _MARGIN) * at_s / float(log["t_s"].iloc[-1])
-    return f'<path d="M{x:.1f} {top}V{_HEIGHT - _MARGIN}" stroke="{colour}"/>'
+    x = _LEFT + (_RIGHT - _LEFT) * at_s / float(log["t_s"].iloc[-1])
+    return f'<path d="M{x:.1f} {top}V{_LOWER[1]}" stroke="{colour}"/>'

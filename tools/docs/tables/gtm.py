@@ -31,10 +31,10 @@ ALPHAS_DEG = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16)
 BETWEEN_DEG = (3.0, 5.0, 7.0, 8.5, 9.5, 10.5, 11.5)
 DRAWN = 500
 _SHOWN = (
-    ("V, ft/s", None, 1.0),
-    ("p, deg/s", 3, 57.2958),
-    ("q, deg/s", 4, 57.2958),
-    ("r, deg/s", 5, 57.2958),
+    ("airspeed V, m/s", None, 0.3048),
+    ("roll rate p, deg/s", 3, 57.2958),
+    ("pitch rate q, deg/s", 4, 57.2958),
+    ("yaw rate r, deg/s", 5, 57.2958),
 )
 
 
@@ -105,17 +105,19 @@ def _draw() -> None:
                 (mine, {"lw": 3.2, "color": "#9ec9e8", "label": "specification"}),
                 (fine, {"lw": 0.9, "color": "#10304d", "label": "JSBSim at 1 kHz"}),
             ):
-                values = np.linalg.norm(of[:, :3], axis=1) if column is None else factor * of[:, column]
-                axis.plot(t, values, **style)
+                values = np.linalg.norm(of[:, :3], axis=1) if column is None else of[:, column]
+                axis.plot(t, factor * values, **style)
+            if name in flights.CASES:
+                axis.axvline(flights.Manoeuvre.onset_s, color="#d55e00", lw=1.0, ls="--", label="damage")
             axis.tick_params(labelsize=7)
             axis.grid(alpha=0.3)
-        row[0].set_ylabel(name.replace("-", " ").replace("left outboard", "left outb."), fontsize=7)
+        row[0].set_ylabel(name.replace("-flap-off", "-\nflap-off"), fontsize=7)
     for axis, (says, *_) in zip(axes[0], _SHOWN, strict=True):
         axis.set_title(says, fontsize=9)
     for axis in axes[-1]:
         axis.set_xlabel("time, s", fontsize=8)
     figure.legend(
-        *axes[0, 0].get_legend_handles_labels(), loc="upper center", ncols=2, fontsize=9, frameon=False
+        *axes[-1, 0].get_legend_handles_labels(), loc="upper center", ncols=3, fontsize=9, frameon=False
     )
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.98))
     Path("images").mkdir(exist_ok=True)

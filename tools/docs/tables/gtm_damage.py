@@ -95,12 +95,12 @@ def _draw(of: dict[str, list[Turn]]) -> None:
                 axis.text(
                     BANKS_DEG[j], SPEEDS_KT[i], "x", ha="center", va="center", color="white", fontsize=8
                 )
-        says = "any" if asked == 1 else f"{len(SIDESLIPS_DEG)} sideslips"
-        axis.set_title(f"{name.replace('left-outboard-', '').replace('left-', '')}\n{says}", fontsize=8)
+        says = "sideslip not prescribed" if asked == 1 else f"{len(SIDESLIPS_DEG)} sideslips"
+        axis.set_title(f"{name.replace('left-', 'left-' + chr(10), 1)}\n{says}", fontsize=7)
         axis.set_xlabel("bank, deg", fontsize=8)
         axis.set_xticks((-45, 0, 45))
         axis.tick_params(labelsize=7)
-    axes[0].set_ylabel("speed, kt", fontsize=8)
+    axes[0].set_ylabel("airspeed, kt", fontsize=8)
     bar = figure.colorbar(drawn, ax=axes, fraction=0.015, pad=0.01)
     bar.set_label("share of the sideslips\nin which the turn is held\n(x: none)", fontsize=8)
     bar.ax.tick_params(labelsize=7)

@@ -52,7 +52,7 @@ def performance_waits() -> str:
     """Each wait as `make waits` prints it: whole processes by the wall and the processor, and their bars."""
     _, *lines = _printed("waits.py", "--rounds", "3").splitlines()
     found = [re.fullmatch(r"(.+?)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.]+)", line) for line in lines]
-    rows = [row.groups() for row in found if row and not row[1].endswith(PER_FRAMES)]
+    rows = [row.groups() for row in found if row and PER_FRAMES not in row[1]]
     return markdown_table(WAITS, rows)
 
 

@@ -10,7 +10,7 @@ from benchmarks import own_logs as own
 
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.recorded.benchmark import FIGURES, KINDS, files_of, run_benchmark
+from beaver_ftc_logs.recorded.benchmark import SCORE_TITLES, SURFACE_KINDS, result_files, run_benchmark
 from tools.docs.tables import shared
 
 Document = dict[str, Any]
@@ -34,7 +34,7 @@ def recorded_alfa() -> str:
     """Failures of the ALFA flights: what each method finds, how late, and what else it finds."""
     document = _benchmark()
     Path("images").mkdir(exist_ok=True)
-    picture = files_of(document)["flights.png"]
+    picture = result_files(document)["flights.png"]
     write_files(Path("images"), {Path(PICTURE).name: picture})
     return _alfa(document)
 
@@ -64,7 +64,7 @@ def own_logs_probe() -> str:
         model = own.identified(of, logs)
         quiet = next(one for one in own.scenarios(of) if one["sensors"] == "ideal")  # as those two are
         rows, _ = own.by_model(own.recorded(quiet, "table", Path(folder)), model)
-    return f"{rows.probability[-1]:.2g} {rows.low[-1]} {rows.high[-1]}"
+    return f"{rows.fault_probability[-1]:.2g} {rows.effectiveness_low[-1]} {rows.effectiveness_high[-1]}"
 
 
 def _part(document: Document, name: str) -> Document:
@@ -73,7 +73,7 @@ def _part(document: Document, name: str) -> Document:
 
 def _alfa(document: Document) -> str:
     part = _part(document, "alfa")
-    head = ("method", "precision/recall/accuracy", *(f"{kind}, s" for kind in KINDS),
+    head = ("method", "precision/recall/accuracy", *(f"{kind}, s" for kind in SURFACE_KINDS),
             "within 5 s", "false alarms/h (95 %)", "healthy flights alarmed")  # fmt: skip
     return markdown_table(head, [_event_row(row) for row in (*part["rows"], *part["published"])])
 
@@ -81,10 +81,10 @@ def _alfa(document: Document) -> str:
 def _event_row(row: Document) -> list[str]:
     """Delays are means, of so many of so many failures."""
     cells = [row["method"], "/".join(f"{row[key]:.2f}" for key in ("precision", "recall", "accuracy"))]
-    cells += [_delay(row["delay_s"].get(kind, {})) for kind in KINDS]
+    cells += [_delay(row["delay_s"].get(kind, {})) for kind in SURFACE_KINDS]
     if "false_alarms_per_hour" not in row:
         return [*cells, "", "", ""]
-    lateral = [row["delay_s"][kind] for kind in KINDS[:2]]
+    lateral = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
     soon, failures = (sum(of[key] for of in lateral) for key in ("within_5_s", "failures"))
     alarms = row["false_alarms_per_hour"]
     return [
@@ -102,7 +102,7 @@ def _delay(of: Document) -> str:
 
 def _enac(document: Document) -> str:
     part = _part(document, "enac")
-    return markdown_table(("method", *(FIGURES[key] for key in SHOWN)), [
+    return markdown_table(("method", *(SCORE_TITLES[key] for key in SHOWN)), [
         (row["method"], *_shares(row, SHOWN)) for row in (*part["rows"], *part["published"])
     ])  # fmt: skip
 

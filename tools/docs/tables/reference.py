@@ -20,7 +20,7 @@ _SENSE = {  # moment that a surface gives first, and the movement of a positive 
 def scenario_defaults() -> str:
     """What a scenario with nothing but a name flies."""
     scenario = bf.load({"name": "nothing-but-a-name"})
-    rows = [(question, answer, f"`{key}`") for question, answer, key in _answers(scenario)]
+    rows = [(question, answer, f"`{keys}`") for question, answer, keys in _answers(scenario)]
     return markdown_table(("question", "answer", "key"), rows)
 
 
@@ -41,7 +41,7 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
         "initial.altitude_m",
     )
     power = f"{initial.engine_rpm:g} rpm, {initial.manifold_pressure_inhg:g} inHg, constant"
-    yield "with which power?", power, "initial.engine_rpm"
+    yield "with which power?", power, "initial.engine_rpm`, `initial.manifold_pressure_inhg"
     yield "with how much flap?", f"{initial.flap_deg:g} deg", "initial.flap_deg"
     yield "which manoeuvre?", _none(scenario.reference.p, "none: all commanded body rates are 0"), "reference"
     yield "which flight path?", _none(scenario.autopilot, "none: only body rates are controlled"), "autopilot"

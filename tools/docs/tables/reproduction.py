@@ -18,7 +18,6 @@ from beaver_ftc.studies.reproduce.words import (
     measured,
     number,
     ours,
-    without,
 )
 from tools.docs.tables import shared
 
@@ -54,12 +53,19 @@ def reproduction_stronger() -> str:
 
 
 def _stronger(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "without"), [
-        (claim["where"], claim["statement"].rstrip("."),
-         number(claim["number"], claim["unit"], claim["none"]), without(claim))
+    return markdown_table(("published", "statement", "ours", "removed", "ours without it"), [
+        (claim["where"], claim["statement"].rstrip("."), *_both(claim))
         for claim in measured(document)
         if claim["verdict"] == STRONGER and claim["where"].startswith("Fig.") and not claim["construction"]
     ])  # fmt: skip
+
+
+def _both(claim: Document) -> tuple[str, str, str]:
+    """The number as published, what is removed, and the number then."""
+    as_flown, without = (
+        number(claim[key], claim["unit"], claim["none"]) for key in ("number", "number_without")
+    )
+    return as_flown, claim["without"], without
 
 
 def reproduction_not_everywhere() -> str:
@@ -89,9 +95,8 @@ def reproduction_unsettled() -> str:
 
 
 def _unsettled(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "without"), [
-        (claim["where"], claim["statement"].rstrip("."),
-         number(claim["number"], claim["unit"], claim["none"]), without(claim))
+    return markdown_table(("published", "statement", "ours", "removed", "ours without it"), [
+        (claim["where"], claim["statement"].rstrip("."), *_both(claim))
         for claim in measured(document) if claim["verdict"] == CANNOT_BE_JUDGED
     ])  # fmt: skip
 

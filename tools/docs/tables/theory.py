@@ -4,38 +4,69 @@ import numpy as np
 
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.detection import likelihood, noise_model, parity, statistical
+from beaver_ftc.diagnosis.detection import likelihood, parity, statistical
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.scenario.diagnosis import Bounds, FdiConfig, Statistical
 from beaver_ftc.studies.present.tables import markdown_table
 
+DERIVED_IN = {
+    2: "explanation/detection.md#the-bound-on-the-model-error",
+    3: "explanation/detection.md#a-bank-of-poles",
+    4: "explanation/isolation.md",
+    7: "explanation/statistical.md",
+    9: "explanation/instruments.md",
+}  # section of the page: where it is derived
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
-    (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s2"),
+    (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
     (2, "limit of instrument noise, in standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
     (2, "limit of gusts, in standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
-    (2, "bound where the error of a derived model was not measured", bounds, "UNKNOWN_RAD_S2", "rad/s2"),
-    (3, "delays for which poles are chosen", bounds, "DESIGN_DELAYS_S", "s"),
-    (7, "number of onsets that are tested together", likelihood, "N_SLOTS", ""),
-    (7, "sum of the magnitudes of a transient over its sum", likelihood, "RINGING", ""),
-    (7, "share of the level reserved for noise", noise_model, "CHANCE", ""),
-    (7, "rate of the signature of a growing loss", noise_model, "GROWTH_PER_S", "1/s"),
-    (7, "least share of the best ratio that a constant loss explains", statistical, "MIN_CONSTANT_SHARE", ""),
-    (7, "number of frequencies of the oscillation tests", parity, "N_TONES", ""),
-    (7, "range of these frequencies", parity, "FREQUENCIES_RAD_S", "rad/s"),
-    (7, "memory of the oscillation tests", parity, "MEMORY_S", "s"),
-    (9, "poles of the filters", redundancy, "POLES_PER_S", "1/s"),
-    (9, "rotation and curvature of the Earth", redundancy, "EARTH_TURN_RAD_S", "rad/s"),
+    (
+        2,
+        "bound outside the map of a derived model: so large that no conclusion is possible",
+        bounds,
+        "UNMAPPED_ERROR_RAD_S2",
+        "rad/s²",
+    ),
+    (3, "delays for which poles are chosen", bounds, "POLE_DESIGN_DELAYS_S", "s"),
+    (7, "number of onsets that are tested together", likelihood, "N_ONSET_SLOTS", ""),
+    (
+        7,
+        "factor in room, because a transient swings below zero",
+        likelihood,
+        "RINGING_FACTOR",
+        "",
+    ),
+    (
+        7,
+        "share of the alarm level kept for noise beside a model error",
+        statistical,
+        "NOISE_SHARE_OF_ALARM_LEVEL",
+        "",
+    ),
+    (7, "rate of the signature of a growing loss", statistical, "LOSS_GROWTH_RATE_PER_S", "1/s"),
+    (
+        7,
+        "share of the best ratio, below which a loss may be excluded",
+        statistical,
+        "MIN_LLR_SHARE_OF_CONSTANT_LOSS",
+        "",
+    ),
+    (7, "number of frequencies of the oscillation tests", parity, "N_TONE_FREQUENCIES", ""),
+    (7, "range of these frequencies", parity, "TONE_FREQUENCIES_RAD_S", "rad/s"),
+    (7, "memory of the oscillation tests", parity, "TONE_MEMORY_S", "s"),
+    (9, "poles of the filters", redundancy, "FILTER_POLES_PER_S", "1/s"),
+    (9, "rotation and curvature of the Earth", redundancy, "EARTH_RATE_BOUND_RAD_S", "rad/s"),
     (
         9,
         "Coriolis and centrifugal acceleration, change of gravity",
         redundancy,
-        "EARTH_ACCELERATION_M_S2",
-        "m/s2",
+        "EARTH_ACCELERATION_BOUND_M_S2",
+        "m/s²",
     ),
     (9, "height in which density falls by a factor e", redundancy, "DENSITY_SCALE_HEIGHT_M", "m"),
-    (9, "largest pitch attitude of the attitude tests", redundancy, "STEEPEST_RAD", "rad"),
+    (9, "largest pitch attitude of the attitude tests", redundancy, "MAX_PITCH_RAD", "rad"),
 )
 SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, unit)
     (3, "pole of the published filter", "detection_pole_per_s", FdiConfig(), "1/s"),
@@ -56,7 +87,7 @@ def theory_constants() -> str:
     return markdown_table(
         ("section", "constant", "name", "value", "unit"),
         [
-            (str(at), meaning, f"`{name}`", _said(value), unit)
+            (f"[{at}]({DERIVED_IN[at]})", meaning, f"`{name}`", _said(value), unit)
             for at, meaning, name, value, unit in sorted(rows, key=lambda row: row[0])
         ],
     )

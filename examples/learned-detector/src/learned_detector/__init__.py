@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 
 VARIABLE = "LEARNED_DETECTOR"  # names the file of a trained network, if it is not learned.npz in this folder
 CLASSES = ("none", "aileron", "elevator", "rudder")

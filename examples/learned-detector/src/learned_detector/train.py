@@ -8,7 +8,7 @@ from math import ceil
 
 import numpy as np
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare import of_sweep
 from learned_detector import CLASSES, Features, Network

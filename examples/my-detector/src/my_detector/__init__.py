@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.diagnosis.base import Verdict
+from beaver_ftc.diagnosis import Verdict
 
 SURFACE_OF_AXIS = {"p": "aileron", "q": "elevator", "r": "rudder"}
 

@@ -17,7 +17,7 @@ FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(w
 
 # Kernels on plain arrays, without a compiler: to compile each by itself takes ten times as long as to try it.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
-  $(addprefix tests/diagnosis/,belief/test_coarse_frames.py isolation/test_membership.py detection/test_noise_numbers.py test_short_flights.py types/test_types_verdict.py) \
+  $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py detection/test_noise_numbers.py test_short_flights.py types/test_types_verdict.py) \
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
 

@@ -8,7 +8,6 @@ import yaml
 
 from beaver_ftc_live.challenge import folders, grading
 from beaver_ftc_logs import sample_logs
-from products.logs.synthetic import fly, write_csv
 
 from .documents import files_of_pages, python_blocks, yaml_blocks
 from .installation import ROOT, Installation
@@ -67,10 +66,10 @@ def _shown_scenario(name: str):
 
 def _my_sweep(folder: Path) -> None:
     """The sweep of docs/how-to/sweeps.md with two flights."""
-    text = _shown("docs/how-to/sweeps.md", "elevator-effectiveness")
-    assert "runs: 2000" in text
+    text = _shown("docs/how-to/sweeps.md", "losses-and-laws")
+    assert "runs: 200\n" in text
     for name in ("my-sweep.yaml", "my.sweep.yaml"):
-        (folder / name).write_text(text.replace("runs: 2000", "runs: 2"))
+        (folder / name).write_text(text.replace("runs: 200\n", "runs: 2\n"))
 
 
 def _my_plan(folder: Path) -> None:
@@ -94,13 +93,6 @@ def _mine(folder: Path) -> None:
     (folder / "mine.yaml").write_text(_shown("docs/reference/plugins.md", "mine"))
 
 
-def _recorded_flights(folder: Path) -> None:
-    """A healthy flight and one with half of the right elevon lost, of a wing made of known equations."""
-    shutil.copy(ROOT / "examples/recorded-flights/flying-wing.yaml", folder)
-    write_csv(folder / "healthy.csv", fly())
-    write_csv(folder / "suspect.csv", fly(seed=2, parts=[(60.0, 120.0, 0.5, 1.0)]))
-
-
 def _sample_logs(folder: Path) -> None:
     """The logs that the page's command before writes."""
     (folder / "my-logs").mkdir()
@@ -110,13 +102,7 @@ def _sample_logs(folder: Path) -> None:
 
 def _identified(folder: Path, installation: Installation) -> None:
     """The model that the page's command before makes."""
-    sample = (folder / "my-logs").exists()
-    logs = (
-        "my-logs/healthy.csv --vehicle my-logs/vehicle.yaml"
-        if sample
-        else "healthy.csv --vehicle flying-wing.yaml"
-    )
-    given = f"identify {logs} --out wing.json"
+    given = "identify my-logs/healthy.csv --vehicle my-logs/vehicle.yaml --out wing.json"
     assert installation.beaver(*given.split(), cwd=folder).returncode == 0
 
 
@@ -166,7 +152,6 @@ _MATERIALS = {
     r"\bmy-plan\b": _my_plan,
     r"\bscenarios/": _scenarios,
     r"\bbrief\.yaml\b|^pytest$": _brief,
-    r"(?<!/)\b(healthy|suspect)\.csv\b": _recorded_flights,
     r"\bmy-logs/": _sample_logs,
     r"\bmine[:.]": _mine,
     r"\bnavion": _examples("own-aircraft"),

@@ -189,7 +189,7 @@ def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
 
 @dataclass(frozen=True)
 class Decay(StudyCommand):
-    """Measure how verdicts degrade when errors exceed the declared bounds.
+    """Measure how verdicts degrade beyond declared bounds.
 
     Each error that `fdi.bounds` can declare is flown at 1, 1.5, 2 and 4 times its declared size, alone and
     with all others. The command reports false alarms, detection, right and wrong names and tracking, each

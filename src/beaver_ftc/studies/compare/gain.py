@@ -62,10 +62,11 @@ def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate
         none = np.where(second > 0.0, -np.inf, 0.0)
         return np.where(first > 0.0, 1.0 - second / np.where(first > 0.0, first, 1.0), none)
 
-    drawn = bootstrap(
-        (before, after), gain, paired=True, n_resamples=RESAMPLES, confidence_level=CONFIDENCE,
-        method="percentile", rng=1,
-    )  # fmt: skip
+    with np.errstate(invalid="ignore"):  # scipy's standard error of gains of -inf, which is not used here
+        drawn = bootstrap(
+            (before, after), gain, paired=True, n_resamples=RESAMPLES, confidence_level=CONFIDENCE,
+            method="percentile", rng=1,
+        )  # fmt: skip
     limits = drawn.confidence_interval
     return Estimate(float(gain(before, after)), float(limits.low), float(limits.high))
 

@@ -101,9 +101,16 @@ class Travel:
 
 @dataclass(frozen=True, eq=False)
 class Aircraft:
-    """One aircraft: its file's data, and the folder with its JSBSim model.
+    """One aircraft: the data of its file, and the folder with its JSBSim model.
 
-    Two are equal only if they are one object: `load` gives the same one for the same unchanged file.
+    - `file`: the content of aircraft.yaml.
+    - `folder`: path of the folder.
+
+    `surfaces` is a tuple with the names of the surfaces, in the order of every array and log column. `travel`
+    is a mapping from surface to its limits, `min_rad` and `max_rad`.
+
+    Two aircraft are equal only if they are the same object. `load` returns the same object while the file is
+    unchanged.
     """
 
     file: AircraftFile
@@ -276,8 +283,12 @@ class Aircraft:
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
 
     def separated_by_force(self, force: str) -> tuple[int, ...]:
-        """Numbers of the surfaces that a force distinguishes and the rates do not: CZ those that
-        lead pitch, by their lift, CY the others; none if there is only one."""
+        """Indices of the surfaces that a measured force distinguishes, although the body rates do not.
+
+        - `force`: `CZ` selects the surfaces that lead pitch, which differ in lift. `CY` selects the others.
+
+        The tuple is empty if it would contain only one surface.
+        """
         moved = {term.surface for term in self.measurable_forces if term.coefficient == force}
         lead = enumerate(zip(self.surfaces, self.dominant_axis, strict=True))
         found = tuple(s for s, (name, axis) in lead if (axis == 1) == (force == "CZ") and name in moved)
@@ -295,9 +306,13 @@ class Aircraft:
         return MappingProxyType({t.name: t for t in (*self.forces, *self.moments) if t.name in named})
 
     def coefficient(self, name: str, of: Mapping[str, Any], scale: Mapping[str, float] | None = None) -> Any:
-        """One coefficient as the sum of its terms; `of` has a value for every signal and surface.
+        """The value of one aerodynamic coefficient: the sum of its terms in the aircraft file.
 
-        A plain sum, for occasional use; `scale` multiplies single terms.
+        - `name`: e.g. `Cm`.
+        - `of`: value of every signal and of every surface, by name.
+        - `scale`: factors on single terms, by name of the term.
+
+        The function is a plain Python sum, for occasional use.
         """
         scale = scale or {}
         terms = self._terms_of[name]
@@ -431,10 +446,13 @@ def _root() -> Path:
 
 
 def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
-    """Load the aircraft of a scenario from its file; `beside` is the folder of the scenario.
+    """Load an aircraft from its file.
 
-    Raises UnknownAircraft for an unknown name, NotDerived for an aircraft that has not been derived yet, and
-    ScenarioError with one line for each mistake in its file.
+    - `reference`: built-in name, `jsbsim:NAME` for a derived aircraft, or `./FOLDER`.
+    - `beside`: the folder that contains FOLDER.
+
+    Raises UnknownAircraft for an unknown name, and NotDerived for an aircraft that has not been derived yet.
+    Raises ScenarioError with one line for each mistake in the file.
     """
     if not isinstance(reference, str):
         raise UnknownAircraft(f"{reference!r:.60} is no aircraft, allowed: {_ALLOWED}")

@@ -60,10 +60,11 @@ def flown_by(file: str) -> list[str]:
 
 
 class Reference(NamedTuple):
-    """The reference of one frame, for each axis (p, q, r).
+    """The reference of one frame, for p, q and r.
 
-    commanded (3,) rad/s: rates that the scenario commands. rate (3,) rad/s and acceleration (3,) rad/s2: the
-    response of the reference model, with which tracking errors are computed.
+    - `commanded` (3,) rad/s: body rates that the scenario commands.
+    - `rate` (3,) rad/s, `acceleration` (3,) rad/s²: response of the reference model. Tracking errors are
+      measured against `rate`.
     """
 
     commanded: np.ndarray
@@ -73,17 +74,22 @@ class Reference(NamedTuple):
 
 @runtime_checkable
 class Law(Protocol):
-    """A control law. Its class needs no arguments; its first docstring line is what `list` shows.
+    """A control law. Write a class with these two methods.
 
-    A class attribute `fault_tolerant = True` says that it uses the verdict: the supervisor then reports
-    `adaptive` or `unanticipated` after an alarm, and `nominal` throughout without it.
+    The class takes no arguments. The first line of its docstring is its text in `beaver-ftc list`.
+
+    With the class attribute `fault_tolerant = True` the law declares that it uses the verdict. After an alarm
+    the supervisor then reports the mode `adaptive` or `unanticipated`. Without the attribute the mode stays
+    `nominal`.
     """
 
     def reset(self, context: "Context") -> None:
-        """Called once before a flight."""
+        """Prepare the law for a flight. The loop calls it once before the flight."""
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Called every frame; returns the command (surfaces,) rad, which the loop limits to the travel."""
+        """Return the command (surfaces,) rad. The loop calls it once for each frame, and limits the command
+        to the travel.
+        """
 
 
 class CompiledLaw(NamedTuple):

@@ -88,12 +88,19 @@ Declared = DeclaredErrors  # the name that plug-ins know
 class Context:
     """The data that a plug-in receives before the flight. The arrays are copies.
 
-    dt_s: length of a frame. substeps: JSBSim steps in it. model: the design model. trim_x (3,) rad/s, trim_y
-    (4 + signals,), trim_rad (surfaces,): the flight condition at the start. travel_rad (2, surfaces): lower
-    and upper stops. constant_rad_s2 (3,), inertia_coupling (3,): declared bounds of the uncertainty. seed:
-    seed of the scenario. options: `fdi.options` or `control.options` of the scenario. declared: the other
-    sections of `fdi.bounds`, and the actuators. surfaces: names of the surfaces. leading: indices in
-    it of the main surfaces of roll, pitch and yaw; `leaders` has their names.
+    - `dt_s`: length of a frame, s.
+    - `substeps`: number of JSBSim steps in a frame.
+    - `model`: the design model, with functions for f and G.
+    - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and surfaces in
+      the trim at the start. `trim_y` has the order and units of `Measured.y`.
+    - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.
+    - `constant_rad_s2` (3,) rad/s², `inertia_coupling` (3,): declared bounds on the constant error and on the
+      share of the inertia coupling that is uncertain.
+    - `seed`: seed of the scenario.
+    - `options`: the mapping `fdi.options` for a detector, `control.options` for a law.
+    - `surfaces`: names of the surfaces.
+    - `leading`: indices of the main surfaces of roll, pitch and yaw. `leaders` contains their names.
+    - `declared`: the other errors that `fdi.bounds` declares, and the actuators.
     """
 
     dt_s: float

@@ -36,15 +36,19 @@ else:
 
 
 class Measured(NamedTuple):
-    """The measurements of one frame. The arrays are copies, so you can keep them.
+    """The measurements of one frame. Each array is a copy, so you can keep it.
 
-    t_s: time. x (3,) rad/s: p, q, r. y (4 + signals,): alpha rad, beta rad, airspeed m/s, dynamic pressure
-    Pa, then the signals that the aircraft declares (the Beaver: dpt).
+    - `t_s`: time of the frame, s.
+    - `x` (3,) rad/s: measured p, q and r.
+    - `y` (4 + signals,): angle of attack rad, sideslip rad, airspeed m/s, dynamic pressure Pa, and the
+      signals that the aircraft declares. The Beaver declares one, `dpt`.
 
-    The other fields are means over the frame that has just elapsed, and zero in the first frame.
-    acceleration (3,) rad/s2: f + G u of the design model; x - x_before - dt acceleration is therefore the
-    innovation times dt. contribution (3, surfaces) rad/s2: part of this acceleration that each commanded
-    surface causes. eta_bar (3,) rad/s2: declared bound on the error of this acceleration.
+    The other fields are means over the frame that ends at `t_s`. In the first frame they are zero.
+
+    - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. The innovation is
+      therefore (x - x_before) / dt - acceleration.
+    - `contribution` (3, surfaces) rad/s²: the part G u of each commanded surface.
+    - `eta_bar` (3,) rad/s²: declared bound on the error of `acceleration`.
     """
 
     t_s: float
@@ -56,13 +60,18 @@ class Measured(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The result of a detector so far. The first alarm stays on.
+    """The result of a detector so far. The loop keeps the first alarm.
 
-    axis: axis of the alarm: p, q or r. isolated: name of a surface, unanticipated, or None.
-    type: type of the isolated fault. estimate: its parameter, theta in [-1, 0] for a loss of effectiveness.
-    effectiveness (surfaces,): of every surface, 1 if healthy, if the detector estimates it; the adaptive laws
-    use it. statistic: above 1 there is an alarm. Compute it in every frame, also after the alarm, because
-    `compare` tries other alarm levels.
+    - `detected`: True if the detector raises the alarm.
+    - `axis`: axis of the alarm: `p`, `q` or `r`.
+    - `isolated`: name of the faulty surface, or `unanticipated`; None if no fault is isolated.
+    - `type`: fault type of the isolated fault.
+    - `estimate`: size of the fault; for a loss of effectiveness theta from -1 to 0, otherwise an angle, rad.
+    - `effectiveness` (surfaces,): estimated effectiveness of every surface, 1 if it is healthy. The adaptive
+      laws use it. None if the detector does not estimate it.
+    - `statistic`: number that exceeds 1 when the alarm is raised. Compute it in every frame, also after the
+      alarm: `compare` evaluates other alarm levels with it.
+    - `candidates`: names that are not excluded.
     """
 
     detected: bool = False
@@ -77,10 +86,17 @@ class Verdict(NamedTuple):
 
 @runtime_checkable
 class Detector(Protocol):
-    """A diagnosis scheme. Its class needs no arguments; its first docstring line is what `list` shows."""
+    """A diagnosis scheme. Write a class with these two methods.
+
+    The class takes no arguments. The first line of its docstring is its text in `beaver-ftc list`.
+    """
 
     def reset(self, context: "Context") -> None:
-        """Called once before a flight."""
+        """Prepare the detector for a flight. The loop calls it once before the flight."""
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
-        """Called every frame, with the command (surfaces,) rad that the surfaces follow at this instant."""
+        """Return the verdict so far. The loop calls it once for each frame.
+
+        - `measured`: the measurements of the frame.
+        - `command` (surfaces,) rad: the command that the surfaces follow at this instant.
+        """

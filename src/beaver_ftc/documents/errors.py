@@ -19,13 +19,13 @@ class BeaverFtcError(Exception):
 
 
 class BadInput(BeaverFtcError):
-    """The user's input cannot be used: wrong file, key, value, unit, or a flight that cannot be trimmed."""
+    """The input of the user cannot be used: a wrong file, key, value or unit, or a flight without a trim."""
 
     exit_code = 2
 
 
 class SimulationFailed(BeaverFtcError):
-    """The simulation could not be completed: a non-finite value, a folder that cannot be written."""
+    """The simulation could not be completed: a value is infinite or NaN, or a folder cannot be written."""
 
     exit_code = 3
 

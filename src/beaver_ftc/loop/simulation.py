@@ -72,9 +72,11 @@ class Stepping:
         self._make_ready()
 
     def reset(self, *, seed: int | None = None) -> None:
-        """Start the same scenario again, in trim, without faults and with an empty log; `seed` is a new seed.
+        """Start the same scenario again in trim, without injected faults and with an empty log.
 
-        The aircraft is not loaded again, and flies as a newly loaded one, to the bit.
+        - `seed`: seed of the new flight; None keeps the seed.
+
+        The flight after a reset has exactly the numbers of a new `Simulation`.
         """
         if seed is not None:
             self._given = self._given.with_({"seed": seed})
@@ -82,7 +84,7 @@ class Stepping:
         self._make_ready()
 
     def release(self) -> None:
-        """Give aircraft and memory back for another flight. This flight cannot be used any more."""
+        """Release aircraft and memory for another flight. Afterwards this simulation cannot be used."""
         with ONE_FLIES:
             self._loop.release()
 
@@ -196,11 +198,15 @@ class Stepping:
     def step(
         self, command: ArrayLike | None = None, *, frames: int = 1, stick: ArrayLike | None = None
     ) -> None:
-        """Fly one frame, or `frames` frames.
+        """Fly one frame, or several.
 
-        command (surfaces,) rad: replaces the command of the law in these frames, limited to the travel.
-        stick (3,) rad/s: added to the scenario's reference in these frames. Raises BadInput for a wrong shape
-        and after the end of the flight, SimulationFailed if a value is not finite.
+        - `command` (surfaces,) rad: replaces the command of the law in these frames. It is limited to the
+          travel.
+        - `frames`: number of frames.
+        - `stick` (3,) rad/s: is added to the reference of the scenario in these frames.
+
+        Raises BadInput for a wrong shape and after the end of the flight. Raises SimulationFailed if a value
+        becomes infinite or NaN.
         """
         if self.done:
             raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
@@ -220,9 +226,12 @@ class Stepping:
         self._fly_to(min(self._next + frames, self._loop.n_frames), rate_deg_s)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
-        """Inject a fault from the next frame on: a fault of a scenario file without `at_s`.
+        """Inject a fault that begins in the next frame.
 
-        The same fault cannot be injected twice. Raises BadInput that names the key.
+        - `fault`: the keys of a fault in a scenario file, without `at_s`.
+
+        If the same fault is already present, the call has no effect. Raises BadInput with the key that is
+        wrong.
         """
         with checked_against(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
@@ -234,9 +243,12 @@ class Stepping:
         self._declare((*self._faults, new))
 
     def repair(self, actuator: str | None = None) -> None:
-        """End the faults of a surface, a sensor or the aerodynamics (`unanticipated`), or all faults.
+        """End faults that have begun.
 
-        Faults that have not begun yet stay in the scenario. Raises BadInput for a name that no fault can
+        - `actuator`: name of a surface or sensor; `unanticipated` for a fault of the aerodynamics; `damage`
+          for a structural damage of an aircraft that declares one; None for all faults.
+
+        A fault that has not begun yet stays in the scenario. Raises BadInput for a name that no fault can
         have.
         """
         with checked_against(self._loop.aircraft):
@@ -258,9 +270,11 @@ class Stepping:
         return tuple(fault for fault in self._faults if is_there(fault, self._next, self.rate_hz))
 
     def blow(self, gust: Mapping[str, Any]) -> None:
-        """Start a gust in the next frame: an entry of `environment.gust` without `at_s`.
+        """Start a gust in the next frame.
 
-        Raises BadInput for a wrong key, which it names, and if another gust is still blowing.
+        - `gust`: the keys of an entry of `environment.gust`, without `at_s`.
+
+        Raises BadInput with the key that is wrong, and while another gust is active.
         """
         self._begin()
         self._scenario = interventions.with_gust(self._scenario, gust, self._now_s)
@@ -269,10 +283,12 @@ class Stepping:
         self._loop.gust, self._turn_at = GustSchedule(gusts, self._loop.plant, self.rate_hz), self._next
 
     def change(self, change: Mapping[str, Any]) -> None:
-        """Change law, diagnosis or sensors from the next frame on: an entry of `changes` without `at_s`.
+        """Change law, diagnosis or sensors from the next frame on.
 
-        A changed diagnosis restarts; the log keeps its columns. Raises BadInput that names the key; the
-        flight then continues unchanged.
+        - `change`: the keys of an entry of `changes`, without `at_s`.
+
+        A changed diagnosis restarts. The log keeps its columns. Raises BadInput with the key that is wrong;
+        the flight then continues unchanged.
         """
         self._begin()
         scenario = interventions.with_change(self._scenario, change, self._now_s)
@@ -281,14 +297,24 @@ class Stepping:
         self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
-        """Give the autopilot new values from now on, `{"altitude_m": 1900}`. Raises BadInput with the key."""
+        """Set new targets of the autopilot from now on.
+
+        - `targets`: target to value, e.g. `{"altitude_m": 1900}`.
+
+        Raises BadInput with the key that is wrong.
+        """
         self._begin()
         self._scenario = interventions.with_targets(self._scenario, targets, self._now_s)
         set_up_profile(self._loop.frames["autopilot"][0], self._scenario)
         self._note_asked("aim", targets=dict(targets))
 
     def read(self, name: str) -> float:
-        """The value of a JSBSim property, in the unit of its name. Raises BadInput for an unknown one."""
+        """The value of a JSBSim property, in the unit that its name states.
+
+        - `name`: e.g. `velocities/q-rad_sec`.
+
+        `sim[name]` is the same call. Raises BadInput for an unknown property.
+        """
         try:
             return self._loop.plant.read(name)
         except UnknownProperty:
@@ -319,12 +345,12 @@ class Stepping:
                 do(frames=some, **each.given)
 
     def scenario_flown(self) -> Scenario:
-        """The scenario that flies the same flight again, to the bit.
+        """A scenario that repeats this flight with exactly the same numbers.
 
-        Its faults begin and end at the frames at which they were injected and repaired. The rates of the
-        stick are tables, and the duration is the time flown.
+        Its faults begin and end at the frames of `inject` and `repair`. Its reference contains the stick as
+        tables. Its duration is the time flown.
 
-        Raises BadInput for a flight with your own surface commands, because no scenario can contain them.
+        Raises BadInput for a flight with your own surface commands, because a scenario cannot contain them.
         """
         if self._by_hand:
             raise BadInput(

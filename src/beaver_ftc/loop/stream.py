@@ -28,17 +28,21 @@ _START = ("rates_rad_s", "signals", "command_rad")
 
 
 class Diagnosis:
-    """The built-in diagnosis of an aircraft, one sample at a time.
+    """The built-in diagnosis of an aircraft without a simulation: one call of `step` for each sample.
 
         diagnosis = Diagnosis(aircraft("beaver"), rate_hz=100, fdi={"bounds": {"inertia": 0.05}})
         verdict = diagnosis.step(rates_rad_s, signals, command_rad)
 
-    aircraft: the aircraft with its surfaces and stops. rate_hz: number of evenly spaced samples in a second.
-    fdi, actuators, design_model: as in a scenario file. start: rates, signals and surfaces in trim, which
-    linear and statistical parts need; left out: the first sample. Raises BadInput that names the key. Its
-    whole memory is one record of fixed size.
+    - `aircraft`: the aircraft, which states its surfaces and their travel.
+    - `rate_hz`: number of samples in a second. The samples are evenly spaced.
+    - `fdi`, `actuators`, `design_model`: the sections of the same name in a scenario file.
+    - `start`: rates (3,) rad/s, signals and surfaces (surfaces,) rad in trim. The linearised design model and
+      the statistical detector need them. By default they are taken from the first sample.
 
-    declared: the declarations of `fdi.bounds`, and the parts that use them.
+    Attributes: `declared` lists the errors that `fdi.bounds` declares, and the parts that use them. `t_s` is
+    the time of the last sample since the first, s. `config` is the section `fdi` with all defaults.
+
+    All memory of the diagnosis is one record of fixed size. Raises BadInput with the key that is wrong.
     """
 
     def __init__(
@@ -72,7 +76,7 @@ class Diagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Delete the memory: the next sample is the first of a flight."""
+        """Delete the memory. The next sample is then the first sample of a flight."""
         stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
         travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
         self._frames = configure_design(self._scenario, travel)
@@ -105,14 +109,19 @@ class Diagnosis:
         attitude_rad: ArrayLike | None = None,
         altitude_m: float | None = None,
     ) -> Verdict:
-        """Diagnose with one further sample.
+        """Diagnose one further sample, and return the verdict so far.
 
-        rates_rad_s (3,): p, q, r. signals: alpha rad, beta rad, airspeed m/s, dynamic pressure Pa, then the
-        aircraft's own (of the Beaver dpt). command_rad (surfaces,): command since the previous sample; for
-        the first sample, the surfaces in trim. attitude_rad (3,): roll, pitch, yaw; needed only if
-        `fdi.bounds` declares turbulence. altitude_m: measured altitude above sea level, on which declared
-        turbulence near the ground depends; left out: the altitude before, at first 1828.8 m. Raises BadInput
-        for a wrong shape or a value that is not finite; such a sample is ignored.
+        - `rates_rad_s` (3,) rad/s: measured p, q and r.
+        - `signals` (4 + signals,): angle of attack rad, sideslip rad, airspeed m/s, dynamic pressure Pa, and
+          the signals that the aircraft declares. The Beaver declares one, `dpt`.
+        - `command_rad` (surfaces,) rad: command since the previous sample; at the first sample the surfaces
+          in trim.
+        - `attitude_rad` (3,) rad: roll, pitch and yaw angle. It is required if `fdi.bounds` declares
+          turbulence.
+        - `altitude_m`: measured altitude above sea level, m, on which declared turbulence near the ground
+          depends. By default the previous altitude is used, and 1828.8 m before the first value.
+
+        Raises BadInput for a wrong shape, and for a value that is infinite or NaN. Such a sample is ignored.
         """
         _put("rates_rad_s", rates_rad_s, self._x)
         _put("signals", signals, self._signals)
@@ -143,13 +152,17 @@ class Diagnosis:
         return self._scenario.fdi
 
     def surprise(self) -> tuple[Vector, Vector, Vector]:
-        """The former name of `innovation`."""
+        """The former name of `innovation`. A call prints a deprecation warning."""
         warnings.warn("Diagnosis.surprise is now Diagnosis.innovation", DeprecationWarning, stacklevel=2)
         return self.innovation()
 
     def innovation(self) -> tuple[Vector, Vector, Vector]:
-        """For the frame that ended with the last sample: the innovation (3,), its declared bound (3,), and
-        the predicted effect of each surface (3, surfaces), rad/s2."""
+        """Three arrays of the last frame, rad/s²: innovation (3,), its bound (3,), effect of each surface (3,
+        surfaces).
+
+        The last frame ends with the last sample. The bound follows from the declared errors. The effects are
+        those that the design model predicts.
+        """
         innovation, bound = (
             self._fdi["bank"]["output"]["innovation"],
             self._fdi["bound"]["frame_innovation_bound"],
@@ -157,13 +170,14 @@ class Diagnosis:
         return innovation.copy(), bound.copy(), self._frame["prediction"]["frame_means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:
-        """The design model at the last sample: f (3,) rad/s2 and G (3, surfaces) rad/s2 per rad, of
-        xdot = f + G u."""
+        """The design model xdot = f + G u at the last sample: f (3,) rad/s², and G (3, surfaces) rad/s² per
+        rad.
+        """
         prediction = self._frame["prediction"]
         return prediction["f"].copy(), prediction["G"].copy()
 
     def inside(self) -> tuple[np.ndarray, Scenario]:
-        """Its memory since the last reset, a structured array (1,), and the scenario that it represents."""
+        """The memory of the diagnosis as a structured array (1,), and the scenario that it represents."""
         return self._frames, self._scenario
 
     def _estimate(self) -> float | None:

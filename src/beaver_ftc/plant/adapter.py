@@ -91,7 +91,7 @@ class FlightState:
         raise AttributeError(name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything by its own name: states, `<surface>_rad`, settings."""
+        """All attributes by name: states, `<surface>_rad` and engine settings."""
         flat: dict[str, Any] = {}
         for each in fields(self):
             value = getattr(self, each.name)

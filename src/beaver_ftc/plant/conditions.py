@@ -100,19 +100,23 @@ def _files_of(model: Path) -> tuple[str, ...]:
 
 
 def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
-    """Steady straight flight, wings level, on the scenario's truth with its errors.
+    """Trim the truth of a scenario, with its errors, in steady straight flight with wings level.
 
-    scenario: a name, a path, a mapping or a Scenario; left out: the defaults. initial: keys that replace
-    those of its section `initial`, e.g. airspeed_mps=40, altitude_m=300, flap_deg=10. Raises BadInput that
-    names the key, and if there is no trim.
+    - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`. By default a scenario with
+      all defaults is used.
+    - `initial`: keys of the section `initial` that replace those of the scenario, e.g. `airspeed_mps=40,
+      altitude_m=300, flap_deg=10`.
+
+    Raises BadInput with the key that is wrong, and if no trim exists.
     """
     return trimmed(_condition(scenario, initial))[1]
 
 
 def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "LinearModel":
-    """Linear model of the truth at the trim of `trim`: xdot = A x + B u, with ten states and the surfaces.
+    """Linear model xdot = A x + B u of the truth of a scenario at its trim.
 
-    `.state_space()` returns it for python-control. Raises BadInput as `trim` does.
+    The ten states and the surfaces are named in `states` and `inputs` of the result. Arguments and errors are
+    those of `trim`. The method `state_space` returns the model for python-control.
     """
     from beaver_ftc.plant.linear import differences
 

@@ -67,7 +67,11 @@ _THRUSTER = '<direct name="nothing"> </direct>'
 
 @dataclass(frozen=True)
 class LinearModel:
-    """xdot = A x + B u about a flight condition, SI and rad; states (n,) and inputs (m,) name the axes."""
+    """Linear model xdot = A x + B u about a flight condition, in SI units and rad.
+
+    - `A` (n, n), `B` (n, m): the matrices.
+    - `states` (n,), `inputs` (m,): names of the states and of the surfaces, in the order of `A` and `B`.
+    """
 
     A: np.ndarray
     B: np.ndarray
@@ -75,14 +79,15 @@ class LinearModel:
     inputs: tuple[str, ...]
 
     def of(self, states: tuple[str, ...]) -> "LinearModel":
-        """The same model with these states only, the others held, in this order."""
+        """The model with only these states, in this order. All other states keep their trim values."""
         rows = [self.states.index(name) for name in states]
         return LinearModel(self.A[np.ix_(rows, rows)], self.B[rows], states, self.inputs)
 
     def state_space(self) -> "StateSpace":
-        """The model as a state space of python-control, with every state as an output and units in the names.
+        """The model as a `StateSpace` of python-control.
 
-        Needs the extra `control`; raises BadInput if it is not installed.
+        Every state is an output. Names of states, inputs and outputs end with the unit. Raises BadInput if
+        the extra `control` is not installed.
         """
         try:
             import control

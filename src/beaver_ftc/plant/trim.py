@@ -56,10 +56,11 @@ Look = Callable[[Vector], Vector]
 
 @dataclass(frozen=True, init=False)
 class TrimPoint(FlightState):
-    """A trimmed flight condition.
+    """A flight condition in trim: states, `<surface>_rad` and engine settings as attributes.
 
-    gamma_rad: flight-path angle, positive climbing. residual: the six remaining accelerations, (udot, vdot,
-    wdot) m/s2 and (pdot, qdot, rdot) rad/s2. envelope_valid: inside the flight-validated envelope.
+    - `gamma_rad`: flight path angle, rad, positive in a climb.
+    - `residual`: six remaining accelerations: (udot, vdot, wdot) m/s² and (pdot, qdot, rdot) rad/s².
+    - `envelope_valid`: True inside the validated envelope.
     """
 
     gamma_rad: float = 0.0

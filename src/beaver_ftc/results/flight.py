@@ -40,8 +40,16 @@ class Proof(NamedTuple):
 class Flight:
     """A finished flight.
 
-    scenario: the scenario that was flown. metrics: the document of metrics.json. Its typed parts are
-    attributes: fault, detection, isolation, tracking, supervisor, departure, expectations, passed.
+    - `scenario`: the scenario that was flown.
+    - `metrics`: the content of metrics.json.
+    - `name`: the scenario's name, which is also the name of the result folder.
+    - `log`: a DataFrame with one row for each frame and the columns of log.parquet. Its `attrs` contain
+      scenario, seed, verdict and units. Raises BadInput for a flight without a log.
+    - `fault`, `detection`, `isolation`, `tracking`, `supervisor`, `departure`, `expectations`: the sections
+      of `metrics` as records. `supervisor` is a tuple of `ModeChange`, and `expectations` a tuple of
+      `Expectation`. `fault` is None without a fault. `departure` is None if the aircraft was not lost.
+    - `false_alarm`: True if an alarm was raised before any fault.
+    - `passed`: True if every expectation was met.
     """
 
     scenario: Scenario
@@ -124,11 +132,14 @@ class Flight:
     def plot(
         self, view: str = "tracking", *, closeup: bool = False, style: Literal["screen", "paper"] = "screen"
     ) -> "Figure":
-        """One view as a matplotlib Figure.
+        """Draw one view of the flight and return it as a matplotlib Figure.
 
-        closeup: show only the time around the fault. style: "paper" is 8.4 cm wide, with letters of at most 8
-        points, and 300 dots per inch if it is not a vector graphic. Raises BadInput for an unknown view or
-        style.
+        - `view`: a name from `views()`.
+        - `closeup`: True shows only the time around the fault.
+        - `style`: "screen" or "paper". A "paper" figure is 8.4 cm wide. Its letters have at most 8 points. A
+          bitmap of it has 300 dots per inch.
+
+        Raises BadInput for an unknown view or style.
         """
         from beaver_ftc.results.figures import STYLES, draw
         from beaver_ftc.results.style import closeup_window, marks
@@ -145,23 +156,30 @@ class Flight:
         return draw(known[view], series, instants, self.name, style)
 
     def certificate(self) -> Document:
-        """The document of certificate.json: alarm and exclusions, each with the inequality that proves it.
+        """The content of certificate.json: the alarm and the exclusions, each with the inequality that proves
+        it.
 
-        The scenario is flown again for it. Raises BadInput for a flight without a log, or with another
-        scheme.
+        The call flies the scenario again, because the certificate needs further columns of the log. Raises
+        BadInput for a flight without a log, and for a scheme that has no certificate.
         """
         return self.proof().certificate
 
     def proof(self) -> Proof:
-        """The certificate together with the data for its check: the log of the flight, with further columns,
-        and the text of the scenario."""
+        """The certificate together with the data for its check.
+
+        The `Proof` contains `certificate`, the `log` with further columns, and `scenario`, the text of
+        scenario.yaml.
+        """
         found: Proof = required("proof", "certificate")(self.scenario, self._kept())
         return found
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
-        """Write `out/<name>/` as `beaver-ftc run` does, completely or not at all; return this folder.
+        """Write the result folder `out/<name>/` as `beaver-ftc run` does, and return its path.
 
-        report: also write report.html and the figures. Raises BadInput for a flight without a log,
+        - `out`: the folder that contains the result folders.
+        - `report`: True also writes report.html and the figures.
+
+        If writing fails, no partial folder remains. Raises BadInput for a flight without a log, and
         SimulationFailed if the folder cannot be written.
         """
         from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
@@ -214,11 +232,16 @@ def fly(
     law: "Law | None" = None,
     progress: Callable[[float], None] | None = None,
 ) -> Flight:
-    """Fly a scenario: a name, a path, a mapping or a Scenario.
+    """Fly a scenario to its end and return the finished flight.
 
-    log: keep one row for each frame in memory, 0.8 kB each. detector, law: plug-in objects that replace those
-    of the scenario. progress: called with the share flown, 0 to 1. Raises BadInput if the flight cannot be
-    trimmed or a name does not exist, SimulationFailed if a value is not finite.
+    - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
+    - `log`: True keeps one row of the log for each frame in memory, 0.8 kB a row.
+    - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
+    - `progress`: a function that is called during the flight. Its argument is the share of the flight that
+      has been flown, from 0 to 1.
+
+    Raises BadInput if the flight cannot be trimmed or if a name does not exist. Raises SimulationFailed if a
+    value becomes infinite or NaN.
     """
     from beaver_ftc.loop.loop import fly as fly_loop
 
@@ -229,9 +252,12 @@ def fly(
 
 
 def open_run(folder: str | PathLike[str]) -> Flight:
-    """Open the flight in a result folder, `runs/<name>`. Its log is read at the first use.
+    """Open the flight in a result folder.
 
-    Raises BadInput for a folder that is not the result of a run.
+    - `folder`: the path of the folder, such as `runs/<name>`.
+
+    The log is read from the file when `log` is first used. Raises BadInput if the folder is not the result of
+    a run.
     """
     if not isinstance(folder, str | PathLike):
         raise BadInput(f"{folder!r:.60} is no folder, allowed: the result folder of a run")

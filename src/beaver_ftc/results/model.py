@@ -106,8 +106,13 @@ class Condition(Part):
 
 @dataclass(frozen=True)
 class Fault(Part):
-    """The first fault of the scenario; actuator is None for an unanticipated fault, and for the fault of an
-    instrument, which has `sensor`."""
+    """The first fault of the scenario.
+
+    - `actuator`: name of the surface; None for an unanticipated fault and for a fault of an instrument.
+    - `type`: fault type, as in a scenario file.
+    - `at_s`: time at which the fault begins, s.
+    - `sensor`: name of the instrument for a fault of an instrument; otherwise None.
+    """
 
     actuator: str | None
     sensor: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
@@ -126,8 +131,12 @@ class DeclaredFault(Fault):
 
 @dataclass(frozen=True)
 class Statistical(Part):
-    """The statistical detector: when it would have raised the alarm; its level, in standard deviations; the
-    largest share of it reached in healthy flight."""
+    """The alarm of the statistical detector.
+
+    - `time_s`: time of its alarm, s; None without an alarm.
+    - `alarm_level`: level that its log likelihood ratio must exceed, in standard deviations.
+    - `closest_approach`: largest share of the alarm level that it reached before a fault.
+    """
 
     time_s: float | None
     alarm_level: float
@@ -136,8 +145,12 @@ class Statistical(Part):
 
 @dataclass(frozen=True)
 class Inconclusive(Part):
-    """The frames in which the built-in diagnosis can conclude nothing: their share, when the first was, and
-    why."""
+    """The frames in which the built-in diagnosis can conclude nothing.
+
+    - `share`: these frames as a share of all frames, 0 to 1.
+    - `from_s`: time of the first of these frames, s.
+    - `reasons`: the reasons, one mapping each.
+    """
 
     share: float
     from_s: float
@@ -146,7 +159,16 @@ class Inconclusive(Part):
 
 @dataclass(frozen=True)
 class Detection(Part):
-    """The alarm. guaranteed_delay_s: time from the fault to the instant from which an alarm was certain."""
+    """The alarm of a flight. Fields without a value are None.
+
+    - `detected`: True if an alarm was raised.
+    - `time_s`: time of the alarm, s.
+    - `delay_s`: time from the first frame with the fault to the alarm, s.
+    - `axis`: axis of the alarm, `p`, `q` or `r`.
+    - `guaranteed_delay_s`: time from the fault to the instant at which an alarm became certain, s.
+    - `statistical`: alarm of the statistical detector.
+    - `inconclusive`: frames in which the diagnosis can conclude nothing.
+    """
 
     detected: bool
     time_s: float | None
@@ -159,10 +181,23 @@ class Detection(Part):
 
 @dataclass(frozen=True)
 class Named(Part):
-    """A fault that is named; `fault` is None where a question is open between the candidates. estimate: theta
-    in [-1, 0] for a loss of effectiveness, else rad; candidates: the fault types (or surfaces) still
-    possible. so_far: a surface named by exclusion, which data may yet exclude. premature: named before the
-    fault began."""
+    """A fault that the diagnosis named. Fields without a value are None.
+
+    - `fault`: name of the surface or sensor, or `unanticipated`; None while several candidates remain.
+    - `type`: fault type.
+    - `time_s`, `delay_s`: time of the name, and time from the fault to the name, s.
+    - `correct`: True if the name is the true one and was not given before the fault began.
+    - `candidates`: names or fault types that are not excluded.
+    - `type_correct`: True if the fault type is the true one.
+    - `type_delay_s`: time from the fault to the fault type, s.
+    - `estimate`: size of the fault: theta from -1 to 0 for a loss of effectiveness, otherwise an angle, rad.
+    - `estimate_deg`: the same size as an angle, deg.
+    - `estimate_interval`: lower and upper end of the set that contains the size, in the unit of `estimate`.
+    - `frequency_rad_s`: frequency of an oscillating fault, rad/s.
+    - `so_far`: True if the name follows from the exclusion of all other candidates. Later data can exclude
+      this name, too.
+    - `premature`: True if the name was given before the fault began.
+    """
 
     fault: str | None
     type: str | None
@@ -182,7 +217,11 @@ class Named(Part):
 
 @dataclass(frozen=True)
 class Withdrawn(Part):
-    """A surface that was named, from when to when."""
+    """A name that was withdrawn during the flight.
+
+    - `fault`: the name.
+    - `from_s`, `to_s`: times at which the name was given and withdrawn, s.
+    """
 
     fault: str
     from_s: float
@@ -191,7 +230,15 @@ class Withdrawn(Part):
 
 @dataclass(frozen=True)
 class Isolation(Part):
-    """The named fault, as in `Named`. names: all names that were given, in the order of the faults."""
+    """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
+
+    - `isolated`: True if a fault was named.
+    - `withdrawn`: names that were withdrawn, in the order of time.
+    - `names`: all names that were given, withdrawn names included and premature names excluded. They are in
+      the order of the scenario's faults.
+    - `probing_s`: times at which probing began and ended, s; None without probing.
+    - `faults`: one `Named` for each fault if several faults were named at once; otherwise empty.
+    """
 
     isolated: bool
     fault: str | None
@@ -225,7 +272,13 @@ class Rates(Part):
 
 @dataclass(frozen=True)
 class Tracking(Part):
-    """RMS tracking errors, deg/s, None if there was no such time; path and energy of each surface."""
+    """The tracking errors and the movement of the surfaces.
+
+    - `pre_fault_rms_deg_s`, `post_fault_rms_deg_s`: RMS tracking error of each axis before and after the
+      first fault, deg/s; None if the flight has no such time.
+    - `surface_travel_deg`: surface to the length of its path, deg. Upward and downward movements are added.
+    - `surface_energy_deg2_s`: surface to the integral of its squared angular speed, deg²/s.
+    """
 
     pre_fault_rms_deg_s: Rates | None
     post_fault_rms_deg_s: Rates | None
@@ -235,7 +288,11 @@ class Tracking(Part):
 
 @dataclass(frozen=True)
 class ModeChange(Part):
-    """A mode of the supervisor, and the time from which it is active."""
+    """A change of the supervisor's mode.
+
+    - `time_s`: time from which the mode is active, s.
+    - `mode`: `nominal`, `adaptive`, `reallocated` or `unanticipated`.
+    """
 
     time_s: float
     mode: str
@@ -285,7 +342,11 @@ class Envelope(Part):
 
 @dataclass(frozen=True)
 class Departure(Part):
-    """Time at which the aircraft was lost, and the signal that left its limits."""
+    """The loss of the aircraft.
+
+    - `time_s`: time of the loss, s.
+    - `signal`: the signal that left its limits.
+    """
 
     time_s: float
     signal: str
@@ -364,7 +425,13 @@ class Limit(Part):
 
 @dataclass(frozen=True)
 class Expectation(Part):
-    """One expectation of the scenario, and its result; if it is not met, the reason, if it is known."""
+    """One expectation of the scenario, and its result.
+
+    - `name`: key of the expectation in the section `expect`.
+    - `passed`: True if it was met.
+    - `expected`, `actual`: expected and actual value.
+    - `reason`: why it was not met; None if it was met or if no reason is known.
+    """
 
     name: str
     passed: bool

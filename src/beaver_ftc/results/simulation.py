@@ -24,19 +24,24 @@ PLUGS = ("detector", "law")
 
 
 class Simulation(Stepping):
-    """A flight in progress, frame by frame, with your own commands, faults and repairs.
+    """A flight that you advance frame by frame, with your own commands, faults and repairs.
 
         sim = Simulation("elevator-partial-loss")
         while not sim.done:
             sim.step()
-        sim.land()
+        flight = sim.land()
 
-    scenario: a name, a path, a mapping or a Scenario. detector, law: plug-in objects to fly with. log: keep
-    one row for each frame in memory, or in the given log. prepare: called with the trimmed plant before the
-    flight. The first step also flies frame 0, which measures the trimmed flight.
+    - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
+    - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
+    - `log`: True keeps one row of the log for each frame in memory. A `MemoryLog` receives the rows instead.
+    - `prepare`: a function that is called once before the flight, with the trimmed plant as argument.
 
-    `done`, `t_s`, `mode`, `measured` and `verdict` tell the present state. `readout` has further values of
-    the frame just flown, with names and units.
+    Attributes: `t_s` is the time of the last frame, s. `done` is True after the last frame or after the loss
+    of the aircraft. `mode` is the mode of the supervisor. `measured` and `verdict` are the last `Measured`
+    and `Verdict`. `readout` has further values of the last frame, with names and units. `log` is the log so
+    far.
+
+    The first call of `step` also flies frame 0, which measures the aircraft in trim.
     """
 
     def __init__(
@@ -59,7 +64,10 @@ class Simulation(Stepping):
         return self.land().log
 
     def snapshot(self) -> "Snapshot":
-        """The present state of the flight. It can be continued any number of times, each time to the bit."""
+        """The present state of the flight. Its method `resume` returns a new `Simulation` in this state.
+
+        A snapshot can be resumed any number of times. Each new flight has exactly the same numbers.
+        """
         plugged = tuple(name for name, of in zip(PLUGS, self._plug_ins, strict=True) if of is not None)
         made = partial(type(self), self._given, log=self._kept is not None, prepare=self._prepare)
         return Snapshot(self.frames, self.t_s, tuple(self._asked), made, plugged)
@@ -69,13 +77,13 @@ class Simulation(Stepping):
         return cast("Self", self.snapshot().resume())
 
     def land(self) -> Flight:
-        """The flight so far, as `fly` would return it; the flight may continue."""
+        """The flight so far as a `Flight`. The simulation can continue afterwards."""
         outcome = self._outcome()
         self._flush()
         return Flight.landed(outcome, self._kept and self._kept.so_far())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
-        """Write the flight so far as a result folder; see `Flight.save`."""
+        """Write the flight so far as a result folder, and return its path. See `Flight.save`."""
         return self.land().save(out, report=report)
 
 

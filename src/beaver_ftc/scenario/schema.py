@@ -443,9 +443,11 @@ class Scenario(Section, title="beaver-ftc scenario"):
         return self
 
     def with_(self, changes: Mapping[str, Any]) -> Self:
-        """This scenario with new values at dotted keys, e.g. `{"faults[0].magnitude": 0.2}`.
+        """A copy of the scenario with new values.
 
-        Raises BadInput that names the key, what is wrong and what is allowed.
+        - `changes`: dotted key to new value, e.g. `{"faults[0].magnitude": 0.2}`.
+
+        Raises BadInput with the key, the mistake and the allowed values.
         """
         if not isinstance(changes, Mapping):
             raise BadInput(f"{changes!r:.60} is no change, allowed: a mapping of dotted keys to values")
@@ -474,7 +476,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
         }
 
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about allowed but unusual values, one line each: `key.path: warning`."""
+        """Warnings about values that are allowed but unusual: one text `key.path: warning` for each."""
         from beaver_ftc.scenario.declared import warnings_of
 
         return warnings_of(self)
@@ -491,10 +493,13 @@ ScenarioLike = Scenario | str | PathLike[str] | Mapping[str, Any]
 
 
 def load(scenario: ScenarioLike) -> Scenario:
-    """Load a scenario from a built-in name, a file's path or a mapping. A Scenario is returned unchanged.
+    """Load a scenario from a built-in name, a file's path or a mapping.
 
-    A mapping has the keys of a scenario file; `name` may be left out. Its CSV files are in the working
-    directory. Raises BadInput with one line for each mistake.
+    - `scenario`: a name from `scenarios()`, the path of a YAML file, a mapping with the keys of a scenario
+      file, or a `Scenario`, which is returned unchanged. A mapping needs no `name`. CSV files that a mapping
+      names are in the working directory.
+
+    Raises BadInput with one line for each mistake.
     """
     if isinstance(scenario, Scenario):
         return scenario

@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -10,22 +10,38 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
 import beaver_ftc as bf
+from beaver_ftc.studies.present.tables import markdown_table
 
 HEAD = """# Python names
 
-Which names does `import beaver_ftc as bf` give, and what does each take and return? Use this page to look
-up a name; [Python](reference/python.md) shows the names at work.
+Which names does `import beaver_ftc as bf` give, and what does each take and return? This page lists every
+public function, class and record, for readers who write Python. [Python](reference/python.md) shows how to
+use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
+READING = """## How to read an entry
 
-Each name has its signature, then its text. The text has the shape of each array, such as (3,) for three
-values or (3, surfaces) for three rows and a column for each surface, and the unit of each number. The
-arguments after `*` are given by name. `beaver_ftc.` is left out before every name. The fields of the records
-of a flight have the same names as the columns of a study, which [columns](reference/columns.md) explains:
-`isolation.withdrawn` is the field `withdrawn` of `Isolation`."""
+- **Heading.** The name without `beaver_ftc.` in front. A name without a dot is in the package itself: write
+  `bf.fly`. A name with a dot needs an import: write `from beaver_ftc.results.model import Fault`.
+- **Signature.** An argument with `=` has this default. Arguments after `*` must be given by name. `X | None`
+  means that the value may be None. The types are explained in the text below the signature.
+- **Arguments and fields.** Each line of a list has the name, the shape of an array, the unit, and the
+  meaning.
+- **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
+  each surface, in the order of the aircraft file. `(3, surfaces)` has three rows, and one column for each
+  surface. Elsewhere, n and m are defined in the entry.
+- **Units.** A name that ends in a unit has this unit, for example `altitude_m`. Otherwise the text states it.
+- **Methods.** They follow the class, with its name in front: `Flight.plot` is called as `flight.plot(...)`.
+- **Errors.** "Raises" names each exception of the package. [Errors](#errors) explains the two base classes.
+
+The records of a flight have the fields of `metrics.json`. A sweep has them as columns with dotted names: the
+column `isolation.withdrawn` is the field `withdrawn` of `Isolation`. [Columns](reference/columns.md) lists
+all of these columns."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
 
 RECORDS = "results.model"
+_CONTENTS = "*Table 1. The sections of this page, and the names in each.*"
+LONGEST_LINE = 88  # of a signature
 _MODULES = re.compile(r"\b(?:[a-z_]+\.)+(?=\w)")  # before a name in a signature
 _SHORT = {  # types of NumPy that are written out as a line of their parts
     _MODULES.sub("", inspect.formatannotation(written)): short
@@ -40,45 +56,71 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
         "load": (), "scenarios": (), "Scenario": ("with_", "warnings"), "fly": (), "Flight": (),
         "open_run": (),
     },
-    "What the records of a flight hold": {
+    "Records of a flight": {
         f"{RECORDS}.{name}": ()
         for name in (
-            "Fault", "Detection", "Isolation", "Tracking", "Rates", "ModeChange", "Departure", "Expectation",
+            "Fault", "Detection", "Statistical", "Inconclusive", "Isolation", "Named", "Withdrawn",
+            "Tracking", "Rates", "ModeChange", "Departure", "Expectation",
         )
     },
     "Step by step": {"Simulation": (), "Diagnosis": ()},
     "Many flights": {"sweep": ()},
-    "The aircraft, trim and linear models": {
+    "Aircraft, trim and linear models": {
         "aircraft.load": (), "aircraft.Aircraft": (), "trim": (), "plant.trim.TrimPoint": (), "linearise": (),
         "plant.linear.LinearModel": (),
     },
     "Plug-ins": dict.fromkeys(("Detector", "Law", "Measured", "Reference", "Verdict", "Context"), ()),
-    "What can go wrong": {"BadInput": (), "SimulationFailed": ()},
+    "Errors": {"BadInput": (), "SimulationFailed": ()},
 }  # fmt: skip
+SAYS = {
+    "Scenarios and flights": "Load or write a scenario, fly it, and read the result.",
+    "Records of a flight": "The attributes of a `Flight` are records. This section lists their fields.",
+    "Step by step": "Advance a flight with `Simulation`, or diagnose your own data with `Diagnosis`.",
+    "Many flights": "Fly variations of a scenario.",
+    "Aircraft, trim and linear models": "Read an aircraft file, trim the aircraft, and linearise it. "
+    "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives an aircraft `jsbsim:NAME` at its first use, "
+    "and checks an aircraft `./FOLDER` against its JSBSim model.",
+    "Plug-ins": "The two classes that you can write, and the records that they receive and return.",
+    "Errors": "Both errors have a message of one line, fit for a user, and an `exit_code` for a script.",
+}
 
 
 def page() -> str:
     """The page, for a terminal or a reader of Markdown."""
-    parts = [HEAD]
-    for heading, names in NAMES.items():
-        parts.append(f"## {heading}")
-        parts += [part for name, members in names.items() for part in _described(name, members)]
-    return "\n\n".join([*parts, NEXT]) + "\n"
+    return _joined(_described)
 
 
 def directives() -> str:
     """The page for a generator that reads docstrings by itself: a directive a name."""
-    parts = [HEAD]
+    return _joined(lambda name, members: iter((_directive(name, members),)))
+
+
+def _joined(described: Callable[[str, tuple[str, ...]], Iterator[str]]) -> str:
+    parts = [HEAD, "## Contents", _contents(), READING]
     for heading, names in NAMES.items():
-        parts.append(f"## {heading}")
-        parts += [_directive(name, members) for name, members in names.items()]
+        parts += [f"## {heading}", SAYS[heading]]
+        parts += [part for name, members in names.items() for part in described(name, members)]
     return "\n\n".join([*parts, NEXT]) + "\n"
+
+
+def _contents() -> str:
+    """A row for each section, which links to it."""
+    rows = [
+        (f"[{heading}](#{anchor(heading)})", ", ".join(f"`{name.rpartition('.')[2]}`" for name in names))
+        for heading, names in NAMES.items()
+    ]
+    return f"{_CONTENTS}\n\n{markdown_table(('section', 'names'), rows)}"
 
 
 def _directive(name: str, members: tuple[str, ...]) -> str:
     options = [f"      members: [{', '.join(members)}]"] if members else []
     options += ["      inherited_members: false"] if name.startswith(RECORDS) else []
     return "\n".join([f"::: beaver_ftc.{name}", *(["    options:"] if options else []), *options])
+
+
+def anchor(heading: str) -> str:
+    """The place of a heading in a link."""
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
 
 
 def found(name: str) -> Any:
@@ -105,17 +147,35 @@ def _described(name: str, members: tuple[str, ...]) -> Iterator[str]:
                 and (of.__doc__ or "").strip()
                 and of.__module__.startswith("beaver_ftc")
             ):
-                yield f"`{_signature(f'{name}.{member}', of)}`\n\n{_text(of)}"
+                called = f"{name.rpartition('.')[2]}.{member}"
+                yield f"**{called}**"
+                yield f"```python\n{_signature(called, of)}\n```"
+                yield _text(of)
 
 
 def _signature(name: str, what: Any) -> str:
     contract = getattr(what, "_is_protocol", False)  # its class needs no arguments
     if contract or (inspect.isclass(what) and issubclass(what, BaseModel | Exception)):
         return name
-    signature = _MODULES.sub("", str(inspect.signature(what)))
+    whole = inspect.signature(what)
+    shown = [one for one in whole.parameters.values() if one.name != "self" and not one.name.startswith("_")]
+    returned = inspect.Signature.empty if inspect.isclass(what) else whole.return_annotation
+    written = str(whole.replace(parameters=shown, return_annotation=returned))
+    signature = _MODULES.sub("", written)
     for written, short in _SHORT.items():
         signature = signature.replace(written, short)
-    return name + signature
+    signature = re.sub(r"'([A-Z]\w+(?: \| None)?)'", r"\1", signature)  # a name that is imported later
+    return _in_lines(name, signature)
+
+
+def _in_lines(name: str, signature: str) -> str:
+    """A signature that is too long for one line, with one argument in each line."""
+    if len(name + signature) <= LONGEST_LINE:
+        return name + signature
+    inside, _, returned = signature[1:].rpartition(")")
+    arguments = re.split(r", (?![^\[(]*[\])])", inside)
+    lines = "".join(f"    {argument},\n" for argument in arguments)
+    return f"{name}(\n{lines}){returned}"
 
 
 def _text(what: Any) -> str:

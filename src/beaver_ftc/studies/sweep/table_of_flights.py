@@ -33,13 +33,17 @@ def sweep(
     expect: Mapping[str, Any] | None = None,
     out: str | PathLike[str] | None = None,
 ) -> "DataFrame":
-    """Fly a scenario many times; returns one row for each flight, with the columns of results.parquet.
+    """Fly a scenario many times, and return a DataFrame with one row for each flight.
 
-    vary: how each dotted key varies, `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`. runs: number of
-    flights; left out: one for each point of the grid. workers: number of processes; the table does not depend
-    on it. seed, sampling, expect: as in a sweep file. out: keep results.parquet, summary.json and report.html
-    in `out/<name>`. `attrs` has scenario, seed, varied keys and units of the columns. Raises BadInput that
-    names the key. A flight that fails is a row with the reason.
+    - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
+    - `vary`: dotted key to its variation, e.g. `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`.
+    - `runs`: number of flights. By default each point of the grid is flown once.
+    - `workers`: number of processes. The rows do not depend on it.
+    - `seed`, `sampling`, `expect`: as in a sweep file.
+    - `out`: folder in which results.parquet, summary.json and report.html are kept, in a folder of their own.
+
+    The columns are those of results.parquet. `attrs` of the DataFrame contains scenario, seed, varied keys
+    and units. If a flight fails, its row has the reason. Raises BadInput with the key that is wrong.
     """
     asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
     made = _made(scenario, {key: value for key, value in asked.items() if value is not None})

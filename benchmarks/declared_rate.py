@@ -55,7 +55,10 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
     assert known is not None
     assert known.tail is not None
     assert threshold is not None
-    rate, count = extremes.expected_false_alarms(known.tail, threshold), round(hours * 3600.0 / LENGTH_S)
+    rate, count = (
+        extremes.expected_false_alarms_per_hour(known.tail, threshold),
+        round(hours * 3600.0 / LENGTH_S),
+    )
     alarms = sum(
         begun(diagnose(flown(vehicle, 10**6 + 1000 * seed + i, LENGTH_S), model).faulty) for i in range(count)
     )

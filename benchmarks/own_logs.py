@@ -37,9 +37,9 @@ from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
 from beaver_ftc.results.exports import RECORDINGS
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.by_aircraft import diagnose_by_aircraft, load_aircraft
+from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
-from beaver_ftc_logs.identification import identify, scale_commands_by_pressure
+from beaver_ftc_logs.identification import identify, scale_commands_by_dynamic_pressure
 from beaver_ftc_logs.model import Model, as_text
 from beaver_ftc_logs.samples import load_flights_for_fit, read_for_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
@@ -167,8 +167,8 @@ Said = tuple[DiagnosisRows, str | None]
 def by_aircraft(log: Log, of: Campaign) -> Said:
     """As `diagnose --aircraft`."""
     vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
-    told = load_aircraft(of.aircraft, str(log.folder / "scenario.yaml"))
-    _, rows, verdict = diagnose_by_aircraft(read_for_vehicle(log.path, vehicle), vehicle, told)
+    told = load_aircraft_and_declared_errors(of.aircraft, str(log.folder / "scenario.yaml"))
+    _, rows, verdict = diagnose_with_aircraft_model(read_for_vehicle(log.path, vehicle), vehicle, told)
     return rows, verdict["isolated"]
 
 
@@ -178,7 +178,7 @@ def identified(of: Campaign, logs: list[Log]) -> Model:
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(update={"faults": faults})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    found = identify(*scale_commands_by_pressure(load_flights_for_fit(named, vehicle), vehicle))
+    found = identify(*scale_commands_by_dynamic_pressure(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(as_text(found))
 
 

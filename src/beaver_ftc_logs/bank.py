@@ -19,12 +19,12 @@ import numpy as np
 
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.trust import groups_with_known_effect
+from beaver_ftc_logs.trust import is_group_effect_known
 
 HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
-_PAIR_LOSS_CHANGE_SHARE = 0.02
-_UNKNOWN_OFFSET_CHANGE_SHARE = 0.05
-_NO_RESPONSE_CHANGE_SHARE = 0.02
+_PAIR_LOSS_TRANSITION_SHARE = 0.02
+_UNKNOWN_OFFSET_TRANSITION_SHARE = 0.05
+_NO_RESPONSE_TRANSITION_SHARE = 0.02
 _PAIR_EFFECTIVENESS_LEVELS = (0.25, 0.5, 0.75)
 _PRIOR_HEALTHY_PROBABILITY, _PRIOR_NO_RESPONSE_PROBABILITY = 0.7, 0.2
 _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE = 0.3, 6.0
@@ -40,20 +40,20 @@ HypothesisRow = tuple[
 class HypothesisBank(NamedTuple):
     """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands.
 
-    effectiveness (H, G); hypothesis_kind (H,); change_share (H,): share of the changes that lead to the
+    effectiveness (H, G); hypothesis_kind (H,); transition_share (H,): share of the changes that lead to the
     hypothesis; rate_offset_variance (H, 3): of the offset of the rates that comes with it, (rad/s)2;
-    prior_probability (H,): probability before the flight; change_probability: of a change in a sample;
-    own_gain_share (H, G): share of a group's healthy response that the group's own gain multiplies: the
-    effectiveness, or 1 where the response of a control law to noise adds to the effect of a surface.
+    prior_probability (H,): probability before the flight; transition_probability: of a change in a sample;
+    group_gain_sensitivity (H, G): share of a group's healthy response that the group's own gain multiplies:
+    the effectiveness, or 1 where the response of a control law to noise adds to the effect of a surface.
     """
 
     effectiveness: Floats
     hypothesis_kind: np.ndarray
-    change_share: Floats
+    transition_share: Floats
     rate_offset_variance: Floats
     prior_probability: Floats
-    change_probability: float
-    own_gain_share: Floats
+    transition_probability: float
+    group_gain_sensitivity: Floats
 
     @property
     def no_response_index(self) -> int:
@@ -65,7 +65,7 @@ class HypothesisBank(NamedTuple):
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
         return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
 
-    def is_fault_of(self, group: int) -> np.ndarray:
+    def is_fault_of_group(self, group: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
         return np.asarray((self.effectiveness[:, group] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
 
@@ -73,7 +73,7 @@ class HypothesisBank(NamedTuple):
 def build_hypothesis_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model: none of a group of which nothing is said, where something is said of any."""
     n_groups, settings = len(model.groups), model.settings
-    has_known_effect = groups_with_known_effect(model)
+    has_known_effect = is_group_effect_known(model)
     known_groups = [
         group for group in range(n_groups) if has_known_effect[group] or not any(has_known_effect)
     ]
@@ -83,21 +83,21 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     may_be_pairs = len(known_groups) > 1
     single_fault_share = (
         1.0
-        - (_PAIR_LOSS_CHANGE_SHARE if may_be_pairs else 0.0)
-        - (_UNKNOWN_OFFSET_CHANGE_SHARE if may_be_stuck else 0.0)
+        - (_PAIR_LOSS_TRANSITION_SHARE if may_be_pairs else 0.0)
+        - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_be_stuck else 0.0)
     )
     for group in known_groups:
-        levels, level_shares = _effectiveness_levels(model, group)
+        levels, level_shares = _effectiveness_levels_and_prior_shares(model, group)
         group_share = (
             single_fault_share * len(model.groups[group]) / n_known_surfaces / len(model.vehicle.faults)
         )
         for offset_variance in _rate_offset_variances(model, group):
-            for level, change_share in zip(levels, level_shares, strict=True):
+            for level, transition_share in zip(levels, level_shares, strict=True):
                 rows.append(
                     (
                         _group_effectiveness_row(n_groups, {group: level}),
                         GROUP_LOSS,
-                        group_share * change_share,
+                        group_share * transition_share,
                         offset_variance,
                     )
                 )
@@ -105,23 +105,23 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     if may_be_stuck:
         unknown_offset_variance = np.diag(np.array(model.noise)) * settings.jam_sd**2
         rows.append(
-            (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_CHANGE_SHARE, unknown_offset_variance)
+            (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_TRANSITION_SHARE, unknown_offset_variance)
         )
-    rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_CHANGE_SHARE, np.zeros(3)))
-    effectiveness, hypothesis_kind, change_share, offset_variance = (
+    rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
+    effectiveness, hypothesis_kind, transition_share, offset_variance = (
         np.array(column) for column in zip(*rows, strict=True)
     )
-    change_share[1:] *= (1.0 - settings.repair_share) / change_share[1:].sum()
-    change_probability = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    own_gain_share = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
+    transition_probability = settings.changes_per_hour / (3600.0 * model.rate_hz)
+    group_gain_sensitivity = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
     return HypothesisBank(
         effectiveness,
         hypothesis_kind,
-        change_share,
+        transition_share,
         offset_variance,
-        _prior_probabilities(hypothesis_kind, change_share),
-        change_probability,
-        own_gain_share,
+        _prior_probabilities(hypothesis_kind, transition_share),
+        transition_probability,
+        group_gain_sensitivity,
     )
 
 
@@ -132,7 +132,7 @@ def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) ->
     return row
 
 
-def _effectiveness_levels(model: Model, group: int) -> tuple[Floats, Floats]:
+def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
     labelled_levels = settings.levels.get("+".join(model.groups[group]), [])
@@ -171,43 +171,43 @@ def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[HypothesisR
         (
             _group_effectiveness_row(n_groups, dict(zip(groups, levels, strict=True))),
             PAIR_LOSS,
-            _PAIR_LOSS_CHANGE_SHARE / len(groups_and_levels),
+            _PAIR_LOSS_TRANSITION_SHARE / len(groups_and_levels),
             np.zeros(3),
         )
         for groups, levels in groups_and_levels
     ]
 
 
-def _prior_probabilities(hypothesis_kind: np.ndarray, change_share: Floats) -> Floats:
+def _prior_probabilities(hypothesis_kind: np.ndarray, transition_share: Floats) -> Floats:
     """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
     is_other = (hypothesis_kind != HEALTHY) & (hypothesis_kind != NO_RESPONSE)
     prior_probability = (
-        change_share
+        transition_share
         * (1.0 - _PRIOR_HEALTHY_PROBABILITY - _PRIOR_NO_RESPONSE_PROBABILITY)
-        / change_share[is_other].sum()
+        / transition_share[is_other].sum()
     )
     prior_probability[0] = _PRIOR_HEALTHY_PROBABILITY
     prior_probability[-1] = _PRIOR_NO_RESPONSE_PROBABILITY
     return np.asarray(prior_probability)
 
 
-class AdaptationLimits(NamedTuple):
+class TrimAndGainStateModel(NamedTuple):
     """Limits of the adaptation of the N = 4 + G states: trim (3,) rad/s a sample, common gain, own gain of
     each group.
 
     initial_mean (N,) and initial_covariance (N, N) are those before the flight; max_deviation (N,): largest
     distance from the mean; deviation_retention (N,): share of that distance that remains a sample later;
-    walk_variance (N,): variance added a sample.
+    random_walk_variance (N,): variance added a sample.
     """
 
     initial_mean: Floats
     initial_covariance: Floats
     max_deviation: Floats
     deviation_retention: Floats
-    walk_variance: Floats
+    random_walk_variance: Floats
 
 
-def build_adaptation_limits(model: Model) -> AdaptationLimits:
+def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     """The bounds of adaptation that a model's settings say."""
     settings, n_groups = model.settings, len(model.groups)
     _, _, response, noise = model.coefficient_arrays()
@@ -217,20 +217,20 @@ def build_adaptation_limits(model: Model) -> AdaptationLimits:
     covariance[:3, :3] = np.diag(noise_variance * settings.trim_sd**2) + trim_shift.T @ trim_shift
     covariance[3, 3] = settings.gain_sd**2
     covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
-        settings.own_gain_sd** 2 + _excess_gain_variance(model)
+        settings.own_gain_sd** 2 + _gain_variance_beyond_level_step(model)
     )
     return_times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * n_groups)
     retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
-    walk_variance = (1.0 - retention**2) * np.diag(covariance)
-    walk_variance[:3] = noise_variance * np.array(settings.trim_walk) ** 2
+    random_walk_variance = (1.0 - retention**2) * np.diag(covariance)
+    random_walk_variance[:3] = noise_variance * np.array(settings.trim_walk) ** 2
     max_deviation_sd = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n_groups))
     mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
-    return AdaptationLimits(
-        mean, covariance, np.sqrt(np.diag(covariance)) * max_deviation_sd, retention, walk_variance
+    return TrimAndGainStateModel(
+        mean, covariance, np.sqrt(np.diag(covariance)) * max_deviation_sd, retention, random_walk_variance
     )
 
 
-def _excess_gain_variance(model: Model) -> Floats:
+def _gain_variance_beyond_level_step(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
     gain_variance = np.zeros(len(model.groups))
     if model.fitted is not None and model.fitted.gain_sd:
@@ -241,34 +241,34 @@ def _excess_gain_variance(model: Model) -> Floats:
 class ResidualNoise(NamedTuple):
     """The noise of a sample.
 
-    intercept_rad_s (3,): of the model; covariance (3, 3) of a sample, (rad/s)2; information_share:
+    intercept_rad_s (3,): of the model; covariance (3, 3) of a sample, (rad/s)2; effective_sample_share:
     information of a residual over that of a white one; degrees_of_freedom: of its t distribution;
     memory_samples, min_scale, max_scale: memory and limits of the running scale of the covariance;
     max_squared_residual: squared standardised residual above which a sample carries no more information;
-    variance_factor: the covariance over that of the residuals.
+    covariance_inflation: the covariance over that of the residuals.
     """
 
     intercept_rad_s: Floats
     covariance: Floats
-    information_share: float
+    effective_sample_share: float
     degrees_of_freedom: float
     memory_samples: float
     min_scale: float
     max_scale: float
     max_squared_residual: float
-    variance_factor: float
+    covariance_inflation: float
 
 
-def build_residual_noise(model: Model, noise_average: Sequence[float] = ()) -> ResidualNoise:
+def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = ()) -> ResidualNoise:
     """The noise that a model's settings say, of a colour."""
     settings, max_squared_residual = (
         model.settings,
-        _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_average)) else np.inf,
+        _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_ma_coefficients)) else np.inf,
     )
     memory_samples = settings.noise_memory_s * model.rate_hz
     return ResidualNoise(
-        model.whitened_intercept(noise_average), model.coefficient_arrays()[3], settings.power, settings.tail,
-        memory_samples,
+        model.whitened_intercept(noise_ma_coefficients), model.coefficient_arrays()[3],
+        settings.power, settings.tail, memory_samples,
         _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
-        model.noise_inflation(noise_average),
+        model.noise_inflation(noise_ma_coefficients),
     )  # fmt: skip

@@ -32,10 +32,10 @@ Mask = NDArray[np.bool_]
 _MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
 _MAX_STEP_JITTER = 0.1
 _MIN_STRETCH_SAMPLES = 50
-_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
-_MAX_DEFLECTION_FACTOR = 1.1
-_UNEXPLAINED_FROM_START_S = 1.0
-_ATTITUDE_ANGLES = ("roll", "pitch", "yaw")
+_AIR_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
+_MAX_COMMAND_TRAVEL_RATIO = 1.1
+_UNEXPLAINED_START_WINDOW_S = 1.0
+_ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class DiagnosedAircraft:
     declared_errors: Document = field(default_factory=dict)
 
 
-def load_aircraft(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
+def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
     """The aircraft of a name, and the errors that a scenario (file or name) declares: the published ones
     where None. Raises BadInput where the scenario is of another aircraft."""
     from beaver_ftc.aircraft import UnknownAircraft
@@ -80,12 +80,14 @@ class AircraftInputs:
     diagnosis: "Diagnosis"
     rate_hz: float
     diagnosis_inputs: list[Floats]
-    held_column_age_s: dict[str, float]
+    held_column_mean_age_s: dict[str, float]
     is_missing: Mask
     stretches: list[tuple[int, int]]
 
 
-def read_inputs(recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft) -> AircraftInputs:
+def read_diagnosis_inputs(
+    recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
+) -> AircraftInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
@@ -114,11 +116,11 @@ def read_inputs(recording: RecordedFlight, vehicle: Vehicle, diagnosed: Diagnose
     return AircraftInputs(samples, diagnosis, rate_hz, inputs, mean_age_s, is_missing, stretches)
 
 
-def diagnose_by_aircraft(
+def diagnose_with_aircraft_model(
     recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
 ) -> tuple[Samples, DiagnosisRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    aircraft_inputs = read_inputs(recording, vehicle, diagnosed)
+    aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed)
     return aircraft_inputs.samples, *diagnose_inputs(aircraft_inputs, diagnosed)
 
 
@@ -147,8 +149,8 @@ def diagnose_inputs(
     reasons = _rows_outside_envelope(
         inputs[1], diagnosed.aircraft, aircraft_inputs.is_missing, stretches
     ) | _rows_unexplained_from_start(samples.t_s, stretches, replayed)
-    rows = rows.without_verdict(_add_doubtful_alarm_reason(stretches, rows, reasons))
-    return rows, _verdict_document(samples, rows, replayed, diagnosed, aircraft_inputs.held_column_age_s)
+    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(stretches, rows, reasons))
+    return rows, _verdict_document(samples, rows, replayed, diagnosed, aircraft_inputs.held_column_mean_age_s)
 
 
 def _check_command_signs(
@@ -214,7 +216,7 @@ def _read_sample_inputs(
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.inputs_of` has them; and the mean age
     of what is held, s. needs_attitude: whether the attitude is wanted."""
-    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.held_column_age_s)
+    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.held_column_mean_age_s)
 
     def measured(one: Quantity) -> Floats:
         values, age_s = values_at(columns[one.column], samples.t_s, samples.dt_s)
@@ -231,7 +233,7 @@ def _read_sample_inputs(
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
     if needs_attitude:
-        for axis, angle in enumerate(_ATTITUDE_ANGLES):
+        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
             one = getattr(vehicle.attitude, angle) if vehicle.attitude else None
             if one is None or one.column not in columns:
                 says = "is missing, allowed: its column, where fdi.bounds declares turbulence"
@@ -249,17 +251,20 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
     """Raise BadInput where flow or commands are in another unit."""
     signals, commands = inputs[1], inputs[2]
     for axis, angle in enumerate(("alpha_rad", "beta_rad")):
-        median_angle = _known_median(np.abs(signals[:, axis]))
+        median_angle = _median_without_nan(np.abs(signals[:, axis]))
         if median_angle > 0.5 * pi:
             raise BadInput(
                 f"{flight_name}: flow.{angle} is {median_angle:.3g} in the middle, allowed: rad; `unit: deg`?"
             )
     is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
     density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
-    median_density_kg_m3 = _known_median(density_kg_m3)
-    if density_kg_m3.size and not _DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _DENSITY_LIMITS_KG_M3[1]:
+    median_density_kg_m3 = _median_without_nan(density_kg_m3)
+    if (
+        density_kg_m3.size
+        and not _AIR_DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _AIR_DENSITY_LIMITS_KG_M3[1]
+    ):
         says = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
-        allowed = "{:g} to {:g}".format(*_DENSITY_LIMITS_KG_M3)
+        allowed = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
         raise BadInput(f"{flight_name}: {says}, allowed: {allowed}, true airspeed in m/s and Pa")
     for surface_index, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
@@ -267,7 +272,7 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
             max(abs(travel.min_rad), abs(travel.max_rad)),
             np.nanmax(np.abs(commands[:, surface_index]), initial=0.0),
         )
-        if max_command_rad > _MAX_DEFLECTION_FACTOR * max_deflection_rad:
+        if max_command_rad > _MAX_COMMAND_TRAVEL_RATIO * max_deflection_rad:
             says = (
                 f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
                 f"{max_deflection_rad:.3g} rad"
@@ -275,7 +280,7 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
             raise BadInput(f"{flight_name}: {says}; full_deflection_rad says what 1 is")
 
 
-def _known_median(values: Floats) -> float:
+def _median_without_nan(values: Floats) -> float:
     """Median of the numbers among the values, nan where there is none."""
     known = values[~np.isnan(values)]
     return float(np.median(known)) if known.size else float("nan")
@@ -340,7 +345,7 @@ def _rows_unexplained_from_start(
     is_unexplained = np.zeros(len(t_s), dtype=bool)
     for begin, end in stretches:
         first_second_end = begin + int(
-            np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_FROM_START_S)
+            np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_START_WINDOW_S)
         )
         if any(verdict.isolated == "unanticipated" for verdict in replayed.verdicts[begin:first_second_end]):
             first_alarm = next(k for k in range(begin, first_second_end) if replayed.verdicts[k].detected)
@@ -349,7 +354,7 @@ def _rows_unexplained_from_start(
     return {says: is_unexplained}
 
 
-def _add_doubtful_alarm_reason(
+def _add_rows_after_doubtful_alarm(
     stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons there are; an alarm that was raised where one holds is none in what follows."""
@@ -372,7 +377,7 @@ def _verdict_document(
     rows: DiagnosisRows,
     replayed: ReplayedVerdicts,
     diagnosed: DiagnosedAircraft,
-    held_column_age_s: dict[str, float],
+    held_column_mean_age_s: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
     surfaces = list(diagnosed.aircraft.surfaces)
@@ -383,7 +388,7 @@ def _verdict_document(
     ]
     held_column_notes = [
         f"{name} is held, {age:.2g} s old on average: errors declared have to cover it"
-        for name, age in held_column_age_s.items()
+        for name, age in held_column_mean_age_s.items()
     ]
     return {
         "flight": samples.name,
@@ -402,13 +407,13 @@ def _verdict_document(
         "candidates": list(last_verdict.candidates),
         "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
         "events": findings.fault_events(rows, surfaces),
-        "can_separate": _excluded_loss_lines(rows, surfaces),
+        "can_separate": _excluded_loss_sentences(rows, surfaces),
         "isolability": {"together": []},
         "notes": [*samples.notes, *held_column_notes],
     }
 
 
-def _excluded_loss_lines(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
+def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
     """The loss of each surface that is excluded within a second in half of the healthy rows."""
     is_credible_healthy = (rows.faulty == 0) & (rows.credible == 1)
     if not is_credible_healthy.any():

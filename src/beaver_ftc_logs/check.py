@@ -57,7 +57,7 @@ _RATE_UNIT_OF_SUFFIX = {
 }
 _PWM_NEUTRAL_RANGE_US = (700.0, 2300.0)
 _IMPLAUSIBLE_RATE_RAD_S = 12.0
-_MIN_CORRELATION = 0.7
+_MIN_ANGLE_RATE_CORRELATION = 0.7
 _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _PLAUSIBLE_LOG_RATES_HZ = (4.0, 2000.0)
 
@@ -106,14 +106,14 @@ def _check_recording(recording: RecordedFlight, vehicle: Vehicle) -> tuple[bool,
         f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still_axes
     ]
     return not still_axes, [
-        _log_size_line(samples),
+        _log_size_text(samples),
         *samples.notes,
         *_compare_rates_and_angles(recording, vehicle),
         *still_lines,
     ]
 
 
-def _log_size_line(samples: Samples) -> str:
+def _log_size_text(samples: Samples) -> str:
     n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
     longest_gap_text = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
     size_text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s"
@@ -128,23 +128,29 @@ def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> li
     rates = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     pitch = attitude.pitch
     pitch_in_si = _column_in_si(columns, pitch) if pitch is not None and pitch.column in columns else None
-    roll_fit = physics.fit_roll(rates, _column_in_si(columns, attitude.roll), pitch_in_si)
+    roll_fit = physics.fit_roll_angle_to_rates(rates, _column_in_si(columns, attitude.roll), pitch_in_si)
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    lines = [_angle_rate_line(roll_fit, attitude.roll.column, vehicle.rates.p.column)]
+    lines = [_angle_rate_fit_text(roll_fit, attitude.roll.column, vehicle.rates.p.column)]
     if pitch is not None and pitch_in_si is not None:
-        pitch_fit = physics.fit_pitch(rates, _column_in_si(columns, attitude.roll), pitch_in_si)
-        lines += [_angle_rate_line(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
+        pitch_fit = physics.fit_pitch_angle_to_rates(
+            rates, _column_in_si(columns, attitude.roll), pitch_in_si
+        )
+        lines += [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
     if (yaw := attitude.yaw) is not None and yaw.column in columns:
-        yaw_fit = physics.fit_yaw(
+        yaw_fit = physics.fit_yaw_angle_to_rates(
             rates, _column_in_si(columns, attitude.roll), pitch_in_si, _column_in_si(columns, yaw)
         )
-        lines += [_angle_rate_line(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
+        lines += [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
     return lines
 
 
-def _angle_rate_line(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
-    verdict = "they agree" if abs(fit.correlation) > _MIN_CORRELATION else "they tell nothing of one another"
+def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
+    verdict = (
+        "they agree"
+        if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
+        else "they tell nothing of one another"
+    )
     return (
         f"the change of {angle_column} is {fit.slope:.3f} times the integral of {rate_column} "
         f"(correlation {fit.correlation:.2f}): {verdict}"
@@ -225,11 +231,15 @@ def _propose_vehicle(
 def _candidate_columns(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({one})" for one in _COLUMN_NAME_PATTERNS.values())
-    known = [name for name in names if re.fullmatch(pattern, _normalized_name(name)) or _may_be_command(name)]
+    known = [
+        name
+        for name in names
+        if re.fullmatch(pattern, _normalized_name(name)) or _may_be_command_column(name)
+    ]
     return known[:_MAX_READ_COLUMNS]
 
 
-def _may_be_command(name: str) -> bool:
+def _may_be_command_column(name: str) -> bool:
     return bool(
         re.search(_COMMAND_NAME_PATTERN, name.lower())
         and not re.search(_NOT_A_COMMAND_NAME_PATTERN, name.lower())
@@ -245,14 +255,18 @@ def _normalized_name(name: str) -> str:
 def _matching_column(pattern: str, names: Sequence[str]) -> str | None:
     """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
     matching_names = [
-        name for name in names if re.fullmatch(pattern, _normalized_name(name)) and not _may_be_command(name)
+        name
+        for name in names
+        if re.fullmatch(pattern, _normalized_name(name)) and not _may_be_command_column(name)
     ]
     return min(matching_names, key=lambda name: (len(name), name), default=None)
 
 
 def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | None]) -> list[str]:
     other_columns = set(column_of_quantity.values())
-    return [name for name in names if _may_be_command(name) and name not in other_columns][:_MAX_COMMANDS]
+    return [name for name in names if _may_be_command_column(name) and name not in other_columns][
+        :_MAX_COMMANDS
+    ]
 
 
 def _find_time_column(path: Path, lines: list[str]) -> tuple[str, str]:
@@ -267,7 +281,7 @@ def _find_time_column(path: Path, lines: list[str]) -> tuple[str, str]:
         plausible_units = [
             unit
             for unit, seconds_per_unit in SECONDS_PER_TIME_UNIT.items()
-            if median_step > 0.0 and _is_rate_plausible(1.0 / (median_step * seconds_per_unit))
+            if median_step > 0.0 and _is_log_rate_plausible(1.0 / (median_step * seconds_per_unit))
         ]
         if plausible_units:
             unit = next(
@@ -280,7 +294,7 @@ def _find_time_column(path: Path, lines: list[str]) -> tuple[str, str]:
     raise BadInput(f"{path}: no column of time, allowed: {says}; it has {nearest_names(TIME_COLUMN, names)}")
 
 
-def _is_rate_plausible(rate_hz: float) -> bool:
+def _is_log_rate_plausible(rate_hz: float) -> bool:
     return _PLAUSIBLE_LOG_RATES_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATES_HZ[1]
 
 
@@ -302,8 +316,10 @@ def _guess_rate_unit(
     roll angle's numbers are multiplied by."""
     rates = [recording.columns[name] for name in rate_columns]
     if roll is not None:
-        fit = physics.fit_roll(rates, replace(roll, values=roll.values * rad_per_roll_unit), None)
-        if fit is not None and abs(fit.correlation) > _MIN_CORRELATION:
+        fit = physics.fit_roll_angle_to_rates(
+            rates, replace(roll, values=roll.values * rad_per_roll_unit), None
+        )
+        if fit is not None and abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
         (unit for text, unit in _RATE_UNIT_OF_SUFFIX.items() if text in rate_columns[0].lower()), None

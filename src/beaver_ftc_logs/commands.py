@@ -50,7 +50,11 @@ def identify(
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc.results import clear_disk_errors
     from beaver_ftc.studies.engine import write_whole
-    from beaver_ftc_logs.identification import identification_text, identify, scale_commands_by_pressure
+    from beaver_ftc_logs.identification import (
+        identification_text,
+        identify,
+        scale_commands_by_dynamic_pressure,
+    )
     from beaver_ftc_logs.model import as_text
     from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
     from beaver_ftc_logs.samples import load_flights_for_fit
@@ -61,7 +65,7 @@ def identify(
     vehicle_file = load_vehicle(vehicle)
     if false_alarms_per_hour is not None:
         vehicle_file = with_false_alarm_rate(vehicle_file, false_alarms_per_hour)
-    loaded_flights, vehicle_file = scale_commands_by_pressure(
+    loaded_flights, vehicle_file = scale_commands_by_dynamic_pressure(
         load_flights_for_fit(flights, vehicle_file, reader), vehicle_file
     )
     model = identify(loaded_flights, vehicle_file)
@@ -151,17 +155,17 @@ def diagnose(options: DiagnoseOptions) -> None:
     _check_options_agree(options)
     flights, out, format = options.flights, options.out, options.format
     if options.aircraft is not None:
-        _diagnose_by_aircraft(options)
+        _diagnose_with_aircraft_model(options)
         return
     if options.model is None:
-        _replay_own_logs(flights, out, format)
+        _replay_run_logs(flights, out, format)
         return
-    from beaver_ftc_logs.detectors import check_detector
+    from beaver_ftc_logs.detectors import check_detector_name
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.model import load_model
     from beaver_ftc_logs.samples import stream_flights
 
-    check_detector(options.detector)
+    check_detector_name(options.detector)
     model = load_model(options.model)
     verdicts = [
         _diagnose_flight(flight, model, out, options.score, options.detector)
@@ -208,9 +212,14 @@ def _check_replay_options(options: DiagnoseOptions) -> None:
             raise BadInput(f"diagnose: {option}: allowed: only with --model MODEL or --aircraft NAME")
 
 
-def _diagnose_by_aircraft(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import as_text, diagnose_inputs, load_aircraft, read_inputs
-    from beaver_ftc_logs.pages import write_diagnosis_by_aircraft
+def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
+    from beaver_ftc_logs.by_aircraft import (
+        as_text,
+        diagnose_inputs,
+        load_aircraft_and_declared_errors,
+        read_diagnosis_inputs,
+    )
+    from beaver_ftc_logs.pages import write_diagnosis_with_aircraft_model
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import read_parts_for_vehicle
     from beaver_ftc_logs.scoring import score_diagnosis
@@ -219,7 +228,7 @@ def _diagnose_by_aircraft(options: DiagnoseOptions) -> None:
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    diagnosed = load_aircraft(str(options.aircraft), options.scenario)
+    diagnosed = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
     verdicts = []
     for path in options.flights:
         check_exists(path)
@@ -228,7 +237,7 @@ def _diagnose_by_aircraft(options: DiagnoseOptions) -> None:
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
         vehicle_file = load_vehicle(options.vehicle or str(vehicle_beside_log))
         for recording in read_parts_for_vehicle(path, vehicle_file, options.reader):
-            aircraft_inputs = read_inputs(recording, vehicle_file, diagnosed)
+            aircraft_inputs = read_diagnosis_inputs(recording, vehicle_file, diagnosed)
             rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed)
             samples, surfaces = aircraft_inputs.samples, diagnosed.aircraft.surfaces
             if options.score:
@@ -236,12 +245,14 @@ def _diagnose_by_aircraft(options: DiagnoseOptions) -> None:
             write_proof = (
                 partial(certified.write_certificate, aircraft_inputs, rows) if options.certificate else None
             )
-            folder = write_diagnosis_by_aircraft(options.out, samples, surfaces, rows, verdict, write_proof)
+            folder = write_diagnosis_with_aircraft_model(
+                options.out, samples, surfaces, rows, verdict, write_proof
+            )
             verdicts.append(verdict | {"folder": str(folder)})
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 
 
-def _replay_own_logs(flights: list[Path], out: Path, format: Format) -> None:
+def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
@@ -260,12 +271,12 @@ def _replay_own_logs(flights: list[Path], out: Path, format: Format) -> None:
 def _diagnose_flight(
     samples: "Samples", model: "Model", out: Path, with_score: bool, detector_name: str
 ) -> Document:
-    from beaver_ftc_logs.detectors import diagnose_with
+    from beaver_ftc_logs.detectors import diagnose_with_detector
     from beaver_ftc_logs.findings import verdict_document
     from beaver_ftc_logs.pages import write_diagnosis
     from beaver_ftc_logs.scoring import score_diagnosis
 
-    rows = diagnose_with(detector_name, samples, model)
+    rows = diagnose_with_detector(detector_name, samples, model)
     verdict = verdict_document(samples, model, rows) | {"detector": detector_name}
     if with_score:
         verdict["score"] = score_diagnosis(samples, rows, model.groups)

@@ -30,26 +30,30 @@ from beaver_ftc_logs.bank import build_hypothesis_bank
 from beaver_ftc_logs.diagnose import (
     UNKNOWN_SURFACE,
     DiagnosisRows,
+    blank_rows_not_credible,
     check_log_fits_model,
     diagnose,
     join_flagged_names,
     standardized_healthy_residual,
-    without_rows_not_credible,
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import columns_by_surface, split_response, surface_indices_by_group
+from beaver_ftc_logs.regression import (
+    group_values_by_surface,
+    surface_indices_by_group,
+    unexplained_rates_and_responses,
+)
 from beaver_ftc_logs.samples import Samples
-from beaver_ftc_logs.trust import with_dead_rates_unknown
+from beaver_ftc_logs.trust import with_rates_unknown_where_frozen_or_clipped
 
 LEAST_SQUARES_MEMORY_S = 20.0
-FREEZE_RULE_S = 6.0
+MIN_FROZEN_OUTPUT_S = 6.0
 _MIN_LOSS_STANDARD_ERRORS = 5.0
 _STANDARD_ERRORS_OF_90_PERCENT = 1.645
-LOOP_SURFACES_BY_GROUP = ("aileron", "elevator", "rudder")
-_N_LOOP_SURFACES = 4
+LOOP_DETECTOR_SURFACES = ("aileron", "elevator", "rudder")
+_N_LOOP_DETECTOR_SURFACES = 4
 _DECLARED_GYRO_NOISE_RAD_S = 1e-4
-BANK_OF_FILTERS = "bank-of-filters"
+BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
 
 
 def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponentially: bool) -> DiagnosisRows:
@@ -72,7 +76,7 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
 
 def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    is_predictable, unexplained, responses = split_response(samples, model)
+    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model)
     noise = model.coefficient_arrays()[3]
     whitening = np.linalg.inv(np.linalg.cholesky(noise))
     noise_sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(is_predictable), 3, 3))
@@ -122,9 +126,9 @@ def _least_squares_rows(
             estimate[:, g] = levels[np.abs(estimate[:, g, None] - levels).argmin(axis=1)]
         is_lost = estimate < 1.0
     bounds_by_group = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
-    bounds = {name: columns_by_surface(edge, model) for name, edge in bounds_by_group.items()}
+    bounds = {name: group_values_by_surface(edge, model) for name, edge in bounds_by_group.items()}
     named = join_flagged_names(is_lost, ["+".join(group) for group in model.groups])
-    return _rows_without_bounds(samples, named, columns_by_surface(estimate, model), **bounds)
+    return _rows_without_bounds(samples, named, group_values_by_surface(estimate, model), **bounds)
 
 
 def _rows_without_bounds(
@@ -156,7 +160,7 @@ def diagnose_by_freeze_rule(
             np.maximum.accumulate(np.where(has_moved, np.arange(len(has_moved)), 0))
         ]
         is_frozen[:, names.index(name)] = (
-            samples.t_s - unchanged_since_s[np.maximum(last_rows, 0)] > FREEZE_RULE_S
+            samples.t_s - unchanged_since_s[np.maximum(last_rows, 0)] > MIN_FROZEN_OUTPUT_S
         ) & (last_rows >= 0)
     return _rows_without_bounds(samples, join_flagged_names(is_frozen, names), 1.0 - is_frozen)
 
@@ -173,7 +177,7 @@ class LinearRateModel:
 
     def G(self, y: Floats) -> Floats:
         """Nothing: what surfaces do is in `contribution`, with its lags."""
-        return np.zeros((3, _N_LOOP_SURFACES))
+        return np.zeros((3, _N_LOOP_DETECTOR_SURFACES))
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
@@ -182,12 +186,12 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     Where the model can say nothing (a gap, a lost sample) the innovation is 0.
     """
     groups = surface_indices_by_group(model)
-    if len(groups) > len(LOOP_SURFACES_BY_GROUP):
+    if len(groups) > len(LOOP_DETECTOR_SURFACES):
         raise BadInput(
             f"{model.vehicle.name}: {len(groups)} groups of surfaces, allowed for a detector of the loop: "
-            f"at most {len(LOOP_SURFACES_BY_GROUP)}"
+            f"at most {len(LOOP_DETECTOR_SURFACES)}"
         )
-    is_predictable, unexplained, responses = split_response(samples, model)
+    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model)
     intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     previous_rates = np.vstack([rates[:1], rates[:-1]])
@@ -196,22 +200,22 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     )
     acceleration = (predicted_rates - previous_rates) / dt_s
     contribution, command = (
-        np.zeros((len(rates), 3, _N_LOOP_SURFACES)),
-        np.zeros((len(rates), _N_LOOP_SURFACES)),
+        np.zeros((len(rates), 3, _N_LOOP_DETECTOR_SURFACES)),
+        np.zeros((len(rates), _N_LOOP_DETECTOR_SURFACES)),
     )
     known_responses = np.where(is_predictable[:, None, None], responses, 0.0)
     for group_index, members in enumerate(groups):
         contribution[:, :, group_index] = known_responses[:, group_index] / dt_s
         command[:, group_index] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
     frames = zip(samples.t_s.tolist(), rates, acceleration, contribution, command, strict=True)
-    error = _model_error_rad_s2(model)
+    error = _model_error_sd_rad_s2(model)
     return [
         (Measured(t_s, frame_rates, np.zeros(N_Y), expected_rad_s2, by_surfaces, error.copy()), commanded)
         for t_s, frame_rates, expected_rad_s2, by_surfaces, commanded in frames
     ]
 
 
-def _model_error_rad_s2(model: Model) -> Floats:
+def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
     return np.asarray(np.sqrt(np.diag(model.coefficient_arrays()[3])) / (1.0 / model.rate_hz))
 
@@ -224,9 +228,10 @@ def loop_detector_context(model: Model) -> Context:
     design: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
-        trim_rad=np.zeros(_N_LOOP_SURFACES), travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES)),
-        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*LOOP_SURFACES_BY_GROUP, "flap"),
-        declared=Declared(noise=noise_sd, model_rad_s2=_model_error_rad_s2(model)),
+        trim_rad=np.zeros(_N_LOOP_DETECTOR_SURFACES),
+        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_DETECTOR_SURFACES)),
+        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*LOOP_DETECTOR_SURFACES, "flap"),
+        declared=Declared(noise=noise_sd, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
 
@@ -244,10 +249,10 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     estimate, low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
     named = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACES_BY_GROUP[: len(groups)]:
+        if verdicts[k].isolated not in LOOP_DETECTOR_SURFACES[: len(groups)]:
             named[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
-        group_index = LOOP_SURFACES_BY_GROUP.index(str(verdicts[k].isolated))
+        group_index = LOOP_DETECTOR_SURFACES.index(str(verdicts[k].isolated))
         named[k], low[k, groups[group_index]] = "+".join(model.groups[group_index]), 0.0
         estimate[k, groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
@@ -269,7 +274,7 @@ def _remaining_effectiveness(verdict: Verdict, group_index: int) -> float:
 
 
 _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], DiagnosisRows]] = {
-    BANK_OF_FILTERS: diagnose,
+    BANK_OF_FILTERS_DETECTOR: diagnose,
     "sliding-least-squares": partial(_diagnose_by_least_squares, forgets_exponentially=False),
     "forgetting-least-squares": partial(_diagnose_by_least_squares, forgets_exponentially=True),
 }
@@ -280,23 +285,21 @@ def detector_names() -> list[str]:
     return [*_FLIGHT_DETECTORS, *(name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name))]
 
 
-def check_detector(name: str) -> None:
+def check_detector_name(name: str) -> None:
     """Raise BadInput for a detector that recorded flights do not know."""
     known_names = detector_names()
     if name not in known_names:
         raise BadInput(f"--detector {name}: is not known{suggestion(name, known_names)}")
 
 
-def diagnose_with(detector_name: str, samples: Samples, model: Model) -> DiagnosisRows:
+def diagnose_with_detector(detector_name: str, samples: Samples, model: Model) -> DiagnosisRows:
     """The rows of one detector. Raises BadInput for an unknown name, or a log at another rate."""
-    check_detector(detector_name)
+    check_detector_name(detector_name)
     check_log_fits_model(samples, model)
-    if detector_name == BANK_OF_FILTERS:
+    if detector_name == BANK_OF_FILTERS_DETECTOR:
         return diagnose(samples, model)
-    live_samples = with_dead_rates_unknown(samples, model)
+    live_samples = with_rates_unknown_where_frozen_or_clipped(samples, model)
     if detector_name in _FLIGHT_DETECTORS:
-        return without_rows_not_credible(
-            samples, model, _FLIGHT_DETECTORS[detector_name](live_samples, model)
-        )
+        return blank_rows_not_credible(samples, model, _FLIGHT_DETECTORS[detector_name](live_samples, model))
     detector: Detector = made(DETECTORS, detector_name)
-    return without_rows_not_credible(samples, model, run_loop_detector(detector, live_samples, model))
+    return blank_rows_not_credible(samples, model, run_loop_detector(detector, live_samples, model))

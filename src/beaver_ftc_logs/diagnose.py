@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_hypothesis_bank
-from beaver_ftc_logs.filtering import fault_evidence_gains, hypothesis_posterior, page_sum
+from beaver_ftc_logs.filtering import fault_evidence_increments, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import columns_by_surface, split_response
+from beaver_ftc_logs.regression import group_values_by_surface, unexplained_rates_and_responses
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = "unknown"
-_MIN_NAMING_PROBABILITY = 0.5
-_MAX_WRONG_NAME_PROBABILITY = 0.001
+_MIN_ISOLATION_PROBABILITY = 0.5
+_MAX_WRONG_ISOLATION_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
 _RESIDUAL_DIRECTION_WINDOW_S = 1.0
@@ -38,8 +38,9 @@ class DiagnosisRows:
 
     t_s (n,); faulty (n,) 0 or 1; named_surfaces (n,) text; effectiveness of each surface, its
     effectiveness_low and effectiveness_high (n, S); fault_probability (n,) of any surface; credible (n,) 0 or
-    1, 1 where nothing else is given; evidence_since_s (n,) when the evidence for a fault began to gather, t_s
-    where nothing else is given; reasons_not_credible: rows that are not credible, by what is wrong.
+    1, 1 where nothing else is given; evidence_start_time_s (n,) when the evidence for a fault began to
+    gather, t_s where nothing else is given; reasons_not_credible: rows that are not credible, by what is
+    wrong.
     """
 
     t_s: Floats
@@ -50,12 +51,12 @@ class DiagnosisRows:
     effectiveness_high: Floats
     fault_probability: Floats
     credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    evidence_since_s: Floats = field(default_factory=lambda: np.empty(0))
+    evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
     reasons_not_credible: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if len(self.evidence_since_s) != len(self.t_s):
-            object.__setattr__(self, "evidence_since_s", self.t_s)
+        if len(self.evidence_start_time_s) != len(self.t_s):
+            object.__setattr__(self, "evidence_start_time_s", self.t_s)
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
@@ -91,16 +92,16 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_log_fits_model(samples, model)
     bank = build_hypothesis_bank(model)
-    live_samples = trust.with_dead_rates_unknown(samples, model)
+    live_samples = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
     posterior, _, _ = hypothesis_posterior(live_samples, model, bank)
     has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = rows_of_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
-        rows = _without_contradicted_names(live_samples, model, rows, model.settings.threshold)
-    return without_rows_not_credible(samples, model, rows, has_no_response)
+        rows = _withdraw_contradicted_isolation(live_samples, model, rows, model.settings.threshold)
+    return blank_rows_not_credible(samples, model, rows, has_no_response)
 
 
-def without_rows_not_credible(
+def blank_rows_not_credible(
     samples: Samples,
     model: Model,
     rows: DiagnosisRows,
@@ -108,26 +109,26 @@ def without_rows_not_credible(
 ) -> DiagnosisRows:
     """Rows at the log's own stamps, that say nothing where the model is not credible, and nothing of a group
     whose effect it does not know. has_no_response (n,): where nothing answers the commands."""
-    reasons = trust.rows_outside_model(samples, model)
+    reasons = trust.rows_not_credible_by_reason(samples, model)
     if has_no_response is not None and has_no_response.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
             has_no_response
         )
-    if not any(trust.groups_with_known_effect(model)):
+    if not any(trust.is_group_effect_known(model)):
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _with_unobservable_surfaces(
-        samples, model, _without_names_after_engine_failure(samples, model, rows)
+    rows = _add_surfaces_of_unknown_effect(
+        samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
-    has_known_gain = np.array(trust.groups_with_known_gain(model), dtype=float)[None]
+    has_known_gain = np.array(trust.is_group_gain_known(model), dtype=float)[None]
     is_unknown_gain = np.broadcast_to(
-        columns_by_surface(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
+        group_values_by_surface(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
     )
     return _rows_at_log_stamps(samples, rows.without_estimate(is_unknown_gain).without_verdict(reasons))
 
 
-def _with_unobservable_surfaces(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
+def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
     """Rows that name, with a surface, each whose effect the model cannot tell and that may be at fault in its
     place; bounds of a name of several hold where any one of them is at fault.
 
@@ -161,19 +162,26 @@ def _are_in_one_group(named_surfaces: set[str], model: Model) -> bool:
     return any(named_surfaces <= set(group) for group in model.groups)
 
 
-def _without_names_after_engine_failure(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
+def _withdraw_isolation_after_engine_failure(
+    samples: Samples, model: Model, rows: DiagnosisRows
+) -> DiagnosisRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_climb_mps = model.fitted.energy_climb if model.fitted is not None else None
-    if unpowered_climb_mps is None or samples.energy_climb_mps is None:
+    unpowered_energy_height_rate_mps = model.fitted.energy_climb if model.fitted is not None else None
+    if unpowered_energy_height_rate_mps is None or samples.energy_height_rate_mps is None:
         return rows
-    climb_mps = samples.energy_climb_mps
-    named = energy.without_surfaces_after_engine_failure(
-        rows.t_s, rows.faulty, rows.named_surfaces, climb_mps, unpowered_climb_mps, rows.evidence_since_s
+    climb_mps = samples.energy_height_rate_mps
+    named = energy.withdraw_surfaces_after_engine_failure(
+        rows.t_s,
+        rows.faulty,
+        rows.named_surfaces,
+        climb_mps,
+        unpowered_energy_height_rate_mps,
+        rows.evidence_start_time_s,
     )
     return replace(rows.without_estimate(named != rows.named_surfaces), named_surfaces=named)
 
 
-def _without_contradicted_names(
+def _withdraw_contradicted_isolation(
     samples: Samples, model: Model, rows: DiagnosisRows, min_log_likelihood_gain: float
 ) -> DiagnosisRows:
     """Rows that name no group where what the last second left unexplained lies along another.
@@ -182,7 +190,7 @@ def _without_contradicted_names(
     when it is healthy: a name is taken back where another direction, whatever the course of time along it,
     explains as much more as is asked. Not in moving air: gusts have directions, too.
     """
-    residual = standardized_healthy_residual(model, *split_response(samples, model))
+    residual = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
     _, _, response, noise = model.coefficient_arrays()
     response_directions = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
     direction_norms = np.linalg.norm(response_directions, axis=0)
@@ -194,7 +202,7 @@ def _without_contradicted_names(
     log_likelihood_gain = 0.5 * model.settings.power * (cumulated - cumulated[window_begin])
     best_gain, is_contradicted = log_likelihood_gain.max(axis=1), np.zeros(len(residual), dtype=bool)
     for group_index, group in enumerate(model.groups):
-        is_contradicted |= _rows_naming_any(rows.named_surfaces, set(group)) & (
+        is_contradicted |= _rows_isolating_any(rows.named_surfaces, set(group)) & (
             best_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
         )
     return replace(
@@ -206,14 +214,14 @@ def _without_contradicted_names(
 def standardized_healthy_residual(
     model: Model, is_predictable: NDArray[np.bool_], unexplained: Floats, responses: Floats
 ) -> Floats:
-    """Residual of a healthy vehicle by `split_response`, in standard deviations of the noise, (n, 3); 0 where
-    no sample can be predicted."""
+    """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
+    noise, (n, 3); 0 where no sample can be predicted."""
     intercept, _, _, noise = model.coefficient_arrays()
     residual = np.where(is_predictable[:, None], unexplained - intercept - responses.sum(axis=1), 0.0)
     return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(noise)).T)
 
 
-def _rows_naming_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
+def _rows_isolating_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
     """Which rows name a surface of which nothing is claimed."""
     return np.array([bool(surfaces & set(name.split("+"))) for name in named], dtype=bool)
 
@@ -227,7 +235,7 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
     trust.check_rate_units(samples, model.fitted)
-    trust.check_columns(samples, model)
+    trust.check_columns_as_identified(samples, model)
 
 
 def rows_of_posterior(
@@ -242,13 +250,17 @@ def rows_of_posterior(
     )
     is_healthier = posterior[:, 0] + no_response_probability > 0.5
     threshold = model.settings.threshold
-    evidence_gains = fault_evidence_gains(posterior, bank)
-    evidence = page_sum(evidence_gains, threshold or np.inf)
-    is_alarm_raised = is_name_sure = _has_held_long_enough(probability >= model.settings.alarm, model)
+    evidence_increments = fault_evidence_increments(posterior, bank)
+    evidence = page_cusum(evidence_increments, threshold or np.inf)
+    is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
+        probability >= model.settings.alarm, model
+    )
     if threshold is not None:
         naming_threshold = model.settings.name_evidence * threshold
         is_alarm_raised = (evidence >= threshold) & ~is_healthier
-        is_name_sure = (page_sum(evidence_gains, naming_threshold) >= naming_threshold) & ~is_healthier
+        has_isolation_evidence = (
+            page_cusum(evidence_increments, naming_threshold) >= naming_threshold
+        ) & ~is_healthier
     faulty = _latch_until_healthy(is_alarm_raised, is_healthier).astype(np.int64)
     evidence_begin = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
     by_group = [
@@ -264,13 +276,13 @@ def rows_of_posterior(
         t_s=samples.t_s,
         faulty=faulty,
         named_surfaces=_surfaces_at_fault(
-            model, bank, posterior, faulty, _latch_until_healthy(is_name_sure, is_healthier)
+            model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_healthier)
         ),
-        effectiveness=columns_by_surface(estimate, model),
-        effectiveness_low=columns_by_surface(low, model),
-        effectiveness_high=columns_by_surface(high, model),
+        effectiveness=group_values_by_surface(estimate, model),
+        effectiveness_low=group_values_by_surface(low, model),
+        effectiveness_high=group_values_by_surface(high, model),
         fault_probability=probability,
-        evidence_since_s=samples.t_s[evidence_begin],
+        evidence_start_time_s=samples.t_s[evidence_begin],
     )
 
 
@@ -345,28 +357,33 @@ def _surfaces_at_fault(
     bank: HypothesisBank,
     posterior: Floats,
     faulty: NDArray[np.int64],
-    is_name_sure: NDArray[np.bool_],
+    has_isolation_evidence: NDArray[np.bool_],
 ) -> NDArray[np.object_]:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
-    is_name_sure (n,): where the evidence is enough for a name. Where one group is at fault (`one_group`),
-    each that may be instead is named with it; `unknown` where none that the bank has is left out.
+    has_isolation_evidence (n,): where the evidence is enough for a name. Where one group is at fault
+    (`one_group`), each that may be instead is named with it; `unknown` where none that the bank has is left
+    out.
     """
     fault_probability = np.maximum(posterior[:, bank.is_fault].sum(axis=1), MIN_DIVISOR)
     group_shares = [
-        posterior[:, bank.is_fault_of(g)].sum(axis=1) / fault_probability for g in range(len(model.groups))
+        posterior[:, bank.is_fault_of_group(g)].sum(axis=1) / fault_probability
+        for g in range(len(model.groups))
     ]
     group_share = np.column_stack(group_shares)
-    is_likely = (group_share > _MIN_NAMING_PROBABILITY) & is_name_sure[:, None]
+    is_likely = (group_share > _MIN_ISOLATION_PROBABILITY) & has_isolation_evidence[:, None]
     if model.settings.one_group:
         is_single_loss = bank.hypothesis_kind == GROUP_LOSS
         single_loss_probability = np.column_stack(
-            [posterior[:, bank.is_fault_of(g) & is_single_loss].sum(axis=1) for g in range(len(model.groups))]
+            [
+                posterior[:, bank.is_fault_of_group(g) & is_single_loss].sum(axis=1)
+                for g in range(len(model.groups))
+            ]
         )
         is_likely = (
             single_loss_probability
-            > _MAX_WRONG_NAME_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
-        ) & is_name_sure[:, None]
+            > _MAX_WRONG_ISOLATION_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
+        ) & has_isolation_evidence[:, None]
         candidates = single_loss_probability.max(axis=0) > 0.0
         is_likely &= ~(is_likely[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
     likely_names = join_flagged_names(is_likely, ["+".join(group) for group in model.groups])
@@ -383,14 +400,17 @@ def _surfaces_at_fault(
             is_unknown_offset[k]
             or (
                 last_name != UNKNOWN_SURFACE
-                and (unchanged_samples < rename_samples or _keeps_all_names(new_name, last_name, model))
+                and (
+                    unchanged_samples < rename_samples
+                    or _still_names_all_surfaces(new_name, last_name, model)
+                )
             )
         )
         named[k] = last_name if keeps_name else new_name
     return named
 
 
-def _keeps_all_names(new_name: str, last_name: str, model: Model) -> bool:
+def _still_names_all_surfaces(new_name: str, last_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
     return model.settings.one_group and (

@@ -12,12 +12,12 @@ from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc_logs.recording import Floats
 
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
-UNPOWERED_CLIMB_QUANTILE = 0.15
+UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE = 0.15
 """Share of healthy flight in which energy falls as fast as without power."""
 _CLIMB_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
 
 
-def energy_climb_mps(
+def energy_height_rate_mps(
     t_s: Floats, altitude_m: Floats, airspeed_mps: Floats, stretch_number: np.ndarray
 ) -> Floats:
     """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
@@ -31,16 +31,16 @@ def energy_climb_mps(
     )
 
 
-def without_surfaces_after_engine_failure(
+def withdraw_surfaces_after_engine_failure(
     t_s: Floats,
     faulty: np.ndarray,
     named: np.ndarray,
     climb_mps: Floats,
-    unpowered_climb_mps: float,
-    evidence_since_s: Floats,
+    unpowered_energy_height_rate_mps: float,
+    evidence_start_time_s: Floats,
 ) -> np.ndarray:
-    """The names of rows (n,), without a surface where an engine may have failed. evidence_since_s (n,): since
-    when the evidence for the alarm of each row has gathered.
+    """The names of rows (n,), without a surface where an engine may have failed. evidence_start_time_s (n,):
+    since when the evidence for the alarm of each row has gathered.
 
     That is so while the window of the energy height reaches back to before then, and from where energy falls
     as without power until it rises, which it does by power alone. A row uses nothing later than its time.
@@ -48,9 +48,9 @@ def without_surfaces_after_engine_failure(
     kept_names = named.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        evidence_begin = int(np.searchsorted(t_s, evidence_since_s[begin]))
+        evidence_begin = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
         is_falling, is_rising = (
-            climb_mps[evidence_begin:end] <= unpowered_climb_mps,
+            climb_mps[evidence_begin:end] <= unpowered_energy_height_rate_mps,
             climb_mps[evidence_begin:end] > 0.0,
         )
         row_index = np.arange(end - evidence_begin)

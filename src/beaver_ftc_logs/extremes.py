@@ -22,13 +22,13 @@ from beaver_ftc.documents import Number, Section
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 
 _SHAPE_PRIOR_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
-_SCALE_RATIO_GRID = np.geomspace(0.2, 5.0, 61)
+_PARETO_SCALE_RATIO_GRID = np.geomspace(0.2, 5.0, 61)
 """The grid of the shape, and of the scale over the mean excess."""
-_PEAK_RATE_PROBABILITIES = (np.arange(40) + 0.5) / 40.0
+_PEAK_RATE_QUANTILE_PROBABILITIES = (np.arange(40) + 0.5) / 40.0
 _MIN_PEAKS, _PEAKS_PER_ROOT_OF_COUNT = 10, 2.0
 """Peaks over the level: so many at least, else so many times the root of their number."""
-_CREDIBLE_PROBABILITIES = (0.05, 0.95)
-EXPECTED_ALARMS_RULED_OUT = 3.0
+_CREDIBLE_INTERVAL_PROBABILITIES = (0.05, 0.95)
+EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
 _MAX_THRESHOLD = 1e4
 _PROBABILITY_ROUNDING = (
@@ -76,11 +76,13 @@ def fit_peak_tail(healthy_parts: Sequence[PeaksAndHours]) -> PeakTail | None:
         level=level,
         excess=(peaks[:n_peaks_over_level] - level).tolist(),
         minutes=60.0 * sum(hours for _, hours in healthy_parts),
-        dispersion=_excess_dispersion([(one[one > level] - level, hours) for one, hours in healthy_parts]),
+        dispersion=_excess_overdispersion(
+            [(one[one > level] - level, hours) for one, hours in healthy_parts]
+        ),
     )
 
 
-def _excess_dispersion(healthy_parts: Sequence[PeaksAndHours]) -> float:
+def _excess_overdispersion(healthy_parts: Sequence[PeaksAndHours]) -> float:
     """Chi-square by degree of freedom of what each part's excess comes to, 1 at least: sums of exponential
     excess at Poisson times have twice the variance that their number alone would give."""
     excess_sums, hours = (
@@ -97,7 +99,7 @@ def _excess_dispersion(healthy_parts: Sequence[PeaksAndHours]) -> float:
     return max(float(squared_deviation.sum()) / (len(healthy_parts) - 1), 1.0)
 
 
-def expected_false_alarms(tail: PeakTail, threshold: float) -> ExpectedFalseAlarms:
+def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarms:
     """False alarms an hour at a threshold not below the tail's level."""
     shape, scale, weight = _pareto_posterior(tail)
     false_alarm_rates = (
@@ -106,10 +108,11 @@ def expected_false_alarms(tail: PeakTail, threshold: float) -> ExpectedFalseAlar
     ).ravel()
     by_rate, rate_probability = (
         np.argsort(false_alarm_rates),
-        np.repeat(weight, len(_PEAK_RATE_PROBABILITIES)) / len(_PEAK_RATE_PROBABILITIES),
+        np.repeat(weight, len(_PEAK_RATE_QUANTILE_PROBABILITIES)) / len(_PEAK_RATE_QUANTILE_PROBABILITIES),
     )
     quantile_index = np.searchsorted(
-        np.cumsum(rate_probability[by_rate]), np.array(_CREDIBLE_PROBABILITIES) - _PROBABILITY_ROUNDING
+        np.cumsum(rate_probability[by_rate]),
+        np.array(_CREDIBLE_INTERVAL_PROBABILITIES) - _PROBABILITY_ROUNDING,
     )
     low, high = false_alarm_rates[by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
     return ExpectedFalseAlarms(float(false_alarm_rates @ rate_probability), float(low), float(high))
@@ -141,7 +144,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
     return tail.level + high_excess
 
 
-def guaranteed_threshold(rate_hz: float, false_alarms_per_hour: float) -> float:
+def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> float:
     """The threshold with so many false alarms an hour at most where the model is right, whatever the tail:
     Page's sum of a log likelihood ratio passes h once in exp(h) samples or less often [Lorden1971]."""
     return float(np.log(max(3600.0 * rate_hz / false_alarms_per_hour, 1.0)))
@@ -149,7 +152,7 @@ def guaranteed_threshold(rate_hz: float, false_alarms_per_hour: float) -> float:
 
 def missing_healthy_minutes(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """Minutes of health by which the rate asked would show without any tail, less those there are."""
-    return max(60.0 * EXPECTED_ALARMS_RULED_OUT / false_alarms_per_hour - tail.minutes, 0.0)
+    return max(60.0 * EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM / false_alarms_per_hour - tail.minutes, 0.0)
 
 
 def _peak_rate_quantiles(tail: PeakTail) -> Floats:
@@ -158,7 +161,7 @@ def _peak_rate_quantiles(tail: PeakTail) -> Floats:
 
     gamma_shape = len(tail.excess) / tail.dispersion + 0.5
     return np.asarray(
-        gamma.ppf(_PEAK_RATE_PROBABILITIES, gamma_shape) * tail.dispersion / (tail.minutes / 60.0)
+        gamma.ppf(_PEAK_RATE_QUANTILE_PROBABILITIES, gamma_shape) * tail.dispersion / (tail.minutes / 60.0)
     )
 
 
@@ -167,7 +170,7 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     from scipy.stats import genpareto
 
     excess = np.array(tail.excess)
-    scales = max(float(excess.mean()), MIN_DIVISOR) * _SCALE_RATIO_GRID
+    scales = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
     shape, scale = (part.ravel() for part in np.meshgrid(_SHAPE_GRID, scales, indexing="ij"))
     log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.dispersion
     log_posterior -= 0.5 * (shape / _SHAPE_PRIOR_SD) ** 2

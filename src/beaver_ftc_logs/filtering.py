@@ -21,23 +21,23 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc_logs.bank import HypothesisBank, build_adaptation_limits, build_residual_noise
+from beaver_ftc_logs.bank import HypothesisBank, build_residual_noise, build_trim_and_gain_state_model
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import split_whitened_response
+from beaver_ftc_logs.regression import whitened_rates_and_responses
 from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
 
-_DELAY_MEMORY_S = 600.0
+_DELAY_EVIDENCE_MEMORY_S = 600.0
 _MIN_HYPOTHESIS_PROBABILITY = 1e-15
-_MAX_CLIPPED_SQUARE = 3.0
+_MAX_CLIPPED_SQUARED_RESIDUAL = 3.0
 _RESIDUAL_SUM_SPANS_S, _SCALE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the seconds in which its size is taken."""
-_MEAN_CLIPPED_SQUARE = 0.93
+_MEAN_CLIPPED_SQUARED_RESIDUAL = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 _MIN_NOISE_MODEL_PROBABILITY = 1e-3
 """Probability of a colour of the noise below which it is left out."""
 
-BankRun = tuple[Floats, Floats, Floats, Floats]
+BankRunResult = tuple[Floats, Floats, Floats, Floats]
 """As `run_bank` returns it."""
 
 
@@ -49,19 +49,22 @@ def hypothesis_posterior(
     The mean over the delays of the model's settings, and the colours of its noise where the flight is not yet
     whitened, each weighted by how well it explains the last minutes.
     """
-    if model.colours and not samples.noise_average:
-        return _posterior_over_noise_models(samples, model, bank)
-    noise_model_of_flight, delays_s = model.with_noise_model(samples.noise_average), model.settings.delays_s
+    if model.colours and not samples.noise_ma_coefficients:
+        return _posterior_averaged_over_noise_models(samples, model, bank)
+    noise_model_of_flight, delays_s = (
+        model.with_noise_model(samples.noise_ma_coefficients),
+        model.settings.delays_s,
+    )
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), noise_model_of_flight, bank)
         for delay_s in delays_s
     ]
     return _average_bank_runs(
-        list(_delay_probabilities([run[3] for run in bank_runs], model.rate_hz)), bank_runs
+        list(_model_probabilities_with_forgetting([run[3] for run in bank_runs], model.rate_hz)), bank_runs
     )
 
 
-def _posterior_over_noise_models(
+def _posterior_averaged_over_noise_models(
     samples: Samples, model: Model, bank: HypothesisBank
 ) -> tuple[Floats, Floats, Floats]:
     """The mean over the colours of the noise. A colour is filtered up to the last sample at which its weight
@@ -73,13 +76,13 @@ def _posterior_over_noise_models(
         _noise_model_log_likelihood(flight, single_model, single_model.colours[0])
         for flight, single_model in whitened_flights
     ]
-    weights = _delay_probabilities(log_likelihoods, model.rate_hz)
+    weights = _model_probabilities_with_forgetting(log_likelihoods, model.rate_hz)
     kept_weights = np.where(np.asarray(weights) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, weights)
     kept_weights /= kept_weights.sum(axis=0)
     last_samples = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in kept_weights]
     bank_runs = [
         _run_bank_on_flight(
-            first_samples(flight, count), single_model.with_noise_model(flight.noise_average), bank
+            first_samples(flight, count), single_model.with_noise_model(flight.noise_ma_coefficients), bank
         )
         for (flight, single_model), count in zip(whitened_flights, last_samples, strict=True) if count
     ]  # fmt: skip
@@ -88,7 +91,9 @@ def _posterior_over_noise_models(
     )
 
 
-def _average_bank_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[Floats, Floats, Floats]:
+def _average_bank_runs(
+    weights: Sequence[Floats], runs: Sequence[BankRunResult]
+) -> tuple[Floats, Floats, Floats]:
     """Runs with weights (n,) each; a run ends where its weight stays 0."""
     averages: list[Floats] = []
     for output_index in range(3):
@@ -104,7 +109,7 @@ def _average_bank_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tu
 def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
     """Log likelihood of a colour at each sample of a flight that is whitened by it, all in health, (n,): by
     its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
-    is_predictable, unexplained, responses = split_whitened_response(flight, model)
+    is_predictable, unexplained, responses = whitened_rates_and_responses(flight, model)
     residual = np.nan_to_num(
         unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.average)
     )
@@ -116,7 +121,7 @@ def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: Nois
     return np.where(is_predictable, model.settings.power * log_likelihood, 0.0)
 
 
-def fault_evidence_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
+def fault_evidence_increments(posterior: Floats, bank: HypothesisBank) -> Floats:
     """Return the gain of each sample in the log odds of a fault, beyond that of a random change, (n,): the
     sum of it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the
     mean."""
@@ -126,12 +131,12 @@ def fault_evidence_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
     change_to_fault = (
-        bank.change_probability * bank.change_share[bank.is_fault].sum() / bank.change_share.sum()
+        bank.transition_probability * bank.transition_share[bank.is_fault].sum() / bank.transition_share.sum()
     )
     predicted_probability = np.concatenate(
         [
             [bank.prior_probability[bank.is_fault].sum()],
-            (1.0 - bank.change_probability) * fault_probability[:-1] + change_to_fault,
+            (1.0 - bank.transition_probability) * fault_probability[:-1] + change_to_fault,
         ]
     )
     return np.asarray(
@@ -141,12 +146,12 @@ def fault_evidence_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
 
 
 @kernel
-def page_sum(evidence_gains, max_sum):
-    """Page's sum of evidence_gains (n,): never below zero, where it starts again, and never above max_sum,
-    (n,)."""
-    page_value, page_sums = 0.0, np.zeros(len(evidence_gains))
-    for k in range(len(evidence_gains)):
-        page_value = min(max(page_value + evidence_gains[k], 0.0), max_sum)
+def page_cusum(evidence_increments, max_sum):
+    """Page's sum of evidence_increments (n,): never below zero, where it starts again, and never above
+    max_sum, (n,)."""
+    page_value, page_sums = 0.0, np.zeros(len(evidence_increments))
+    for k in range(len(evidence_increments)):
+        page_value = min(max(page_value + evidence_increments[k], 0.0), max_sum)
         page_sums[k] = page_value
     return page_sums
 
@@ -166,30 +171,32 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     return replace(samples, commands=(1.0 - delay_share) * commands + delay_share * neighbouring_commands)
 
 
-def _delay_probabilities(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
+def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
     """Probability of each delay at each sample, (D, n), by the evidence of some minutes."""
     from scipy.signal import lfilter
 
-    forgetting_factor = np.exp(-1.0 / (_DELAY_MEMORY_S * rate_hz))
+    forgetting_factor = np.exp(-1.0 / (_DELAY_EVIDENCE_MEMORY_S * rate_hz))
     cumulated = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
     weights = np.exp(cumulated - cumulated.max(axis=0))
     return np.asarray(weights / weights.sum(axis=0))
 
 
-def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRun:
+def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRunResult:
     """As the kernel gives it."""
-    ok, *parts = split_whitened_response(samples, model)
+    ok, *parts = whitened_rates_and_responses(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
-    noise = build_residual_noise(model, samples.noise_average)
+    noise = build_residual_noise(model, samples.noise_ma_coefficients)
     least = np.zeros(len(ok))
     if model.vehicle.other_laws:
         residual = np.where(ok[:, None], unexplained - noise.intercept_rad_s - answers.sum(axis=1), 0.0)
-        least = min_noise_scale(residual, ok, noise.covariance, model.rate_hz)
-    found: BankRun = run_bank(unexplained, answers, ok, bank, build_adaptation_limits(model), noise, least)
+        least = min_noise_variance_scale(residual, ok, noise.covariance, model.rate_hz)
+    found: BankRunResult = run_bank(
+        unexplained, answers, ok, bank, build_trim_and_gain_state_model(model), noise, least
+    )
     return found
 
 
-def min_noise_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
+def min_noise_variance_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
     """Return how many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the
     last seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
 
@@ -221,7 +228,7 @@ def run_bank(y, f, ok, bank, own, noise, least):
     Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used. bank: Bank, own: Adaptation,
     noise: Noise (bank.py); least (n,): scale of the noise at least.
     """
-    n, hypotheses, states = len(y), len(bank.change_share), len(own.initial_mean)
+    n, hypotheses, states = len(y), len(bank.transition_share), len(own.initial_mean)
     idle = hypotheses - 1
     mu = bank.prior_probability.copy()
     m = np.zeros((hypotheses, states))
@@ -234,7 +241,7 @@ def run_bank(y, f, ok, bank, own, noise, least):
     evidence = np.zeros(n)
     scale = 1.0
     for k in range(n):
-        prior = _mix_hypotheses(mu, m, p, bank, own.walk_variance)
+        prior = _mix_hypotheses(mu, m, p, bank, own.random_walk_variance)
         _relax_to_model(m, p, own)
         m[idle], p[idle] = (
             own.initial_mean,
@@ -245,7 +252,9 @@ def run_bank(y, f, ok, bank, own, noise, least):
                 prior, m, p, y[k], f[k], bank, noise, max(scale, least[k])
             )
             _limit_states(m, own.initial_mean - own.max_deviation, own.initial_mean + own.max_deviation)
-            scale *= np.exp((1.0 - mu[idle]) * (square / 3.0 - _MEAN_CLIPPED_SQUARE) / noise.memory_samples)
+            scale *= np.exp(
+                (1.0 - mu[idle]) * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL) / noise.memory_samples
+            )
             scale = min(max(scale, noise.min_scale), noise.max_scale)
         else:
             mu = prior
@@ -260,7 +269,7 @@ def run_bank(y, f, ok, bank, own, noise, least):
 def _mix_hypotheses(mu, m, p, bank, walk):
     """Let each hypothesis pass to any other; m and p are replaced, the prior probabilities returned."""
     hypotheses, states = m.shape
-    stay = 1.0 - bank.change_probability
+    stay = 1.0 - bank.transition_probability
     mean = np.zeros(states)
     spread = np.zeros((states, states))
     for h in range(hypotheses):
@@ -272,7 +281,7 @@ def _mix_hypotheses(mu, m, p, bank, walk):
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
-        prior[h] = stay * mu[h] + bank.change_probability * bank.change_share[h]
+        prior[h] = stay * mu[h] + bank.transition_probability * bank.transition_share[h]
         total += prior[h]
         _merge_gaussians(
             stay * mu[h] / prior[h], m[h], p[h], mean, spread, bank.rate_offset_variance[h], walk
@@ -322,21 +331,23 @@ def _correct_hypotheses(prior, m, p, y, f, bank, noise, scale):
     covariance, dof = noise.covariance * scale, noise.degrees_of_freedom
     for h in range(hypotheses):
         seen = _state_sensitivity(
-            bank.effectiveness[h], bank.own_gain_share[h], f, noise.intercept_rad_s, states
+            bank.effectiveness[h], bank.group_gain_sensitivity[h], f, noise.intercept_rad_s, states
         )
         if h == hypotheses - 1:
             squares[h], log_det = _update_gaussian(nothing, certain, y, seen, covariance, noise)
         else:
             squares[h], log_det = _update_gaussian(m[h], p[h], y, seen, covariance, noise)
         square = min(squares[h], noise.max_squared_residual)
-        log[h] = noise.information_share * (-0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det)
+        log[h] = noise.effective_sample_share * (
+            -0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det
+        )
     most = log.max()
     mu = np.maximum(prior * np.exp(log - most), _MIN_HYPOTHESIS_PROBABILITY)
     total = mu.sum()
     mu /= total
     clipped = 0.0
     for h in range(hypotheses):
-        clipped += mu[h] * min(noise.variance_factor * squares[h], 3.0 * _MAX_CLIPPED_SQUARE)
+        clipped += mu[h] * min(noise.covariance_inflation * squares[h], 3.0 * _MAX_CLIPPED_SQUARED_RESIDUAL)
     return mu, clipped, most + np.log(total)
 
 

@@ -18,11 +18,11 @@ from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import split_response
+from beaver_ftc_logs.regression import unexplained_rates_and_responses
 from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
-LOSS_HORIZONS_S = (5.0, 20.0, 60.0)
+DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
 _MIN_PROPORTIONAL_COSINE = 0.9
 _MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
@@ -35,7 +35,7 @@ _PROPORTIONAL_GROUP_NOTE = (
 
 def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Document:
     """The document of verdict.json."""
-    found = separability_statement(samples, model)
+    found = isolability_document(samples, model)
     return {
         "flight": samples.name,
         "vehicle": model.vehicle.name,
@@ -46,7 +46,7 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "faulty": bool(rows.faulty.any()),
         "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
-        "can_separate": [*trust.unknown_effect_lines(model), *separability_sentences(found)],
+        "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(found)],
         "isolability": found,
         "settings": model.settings.model_dump(),
         "notes": list(samples.notes),
@@ -61,11 +61,11 @@ def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     """
     _, name = np.unique(rows.named_surfaces.astype(str), return_inverse=True)
     said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
-    runs = _join_events(rows, constant_stretches(said))
+    runs = _join_brief_events(rows, constant_stretches(said))
     return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
-def _join_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _join_brief_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
     joined: list[tuple[int, int]] = []
@@ -126,9 +126,9 @@ def lasting_events(events: list[Document]) -> list[Document]:
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
     shown, every = lasting_events(verdict["events"]), len(verdict["events"])
-    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_line(verdict)
-    lines = [f"{verdict['flight']}: {what} in {duration_in_words(verdict)}", *map(_event_line, shown)]
-    lines += credible_lines(verdict)
+    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
+    lines = [f"{verdict['flight']}: {what} in {duration_in_words(verdict)}", *map(_event_text, shown)]
+    lines += credibility_text_lines(verdict)
     if brief := every - len(shown):
         lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s")
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
@@ -137,7 +137,7 @@ def as_text(verdict: Document) -> str:
     return "\n".join(lines)
 
 
-def _no_event_line(verdict: Document) -> str:
+def _no_event_text(verdict: Document) -> str:
     """No event: because no fault shows, or because nothing can be said."""
     share = verdict["credible"]["share"]
     if share < _MIN_CREDIBLE_ROW_SHARE:
@@ -145,7 +145,7 @@ def _no_event_line(verdict: Document) -> str:
     return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
 
 
-def credible_lines(verdict: Document) -> list[str]:
+def credibility_text_lines(verdict: Document) -> list[str]:
     """Return lines on the parts of a flight without a statement, and the reasons."""
     known = verdict["credible"]
     if known["share"] >= 1.0:
@@ -164,7 +164,7 @@ def duration_in_words(verdict: Document) -> str:
     return f"{verdict['recorded_s']:.0f} s, {gaps} gap{'s' if gaps > 1 else ''} in the log left out"
 
 
-def _event_line(event: Document) -> str:
+def _event_text(event: Document) -> str:
     left = ", ".join(
         f"{name} {known['estimate']:.2f} ({known['low']:.2f} to {known['high']:.2f})"
         for name, known in event["effectiveness"].items()
@@ -173,10 +173,10 @@ def _event_line(event: Document) -> str:
     return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}{brief}"
 
 
-def separability_statement(samples: Samples, model: Model) -> dict[str, Any]:
+def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_hypothesis_bank(model)
-    answers = _whitened_answers(samples, model)
+    answers = _whitened_group_responses(samples, model)
     return {
         "together": [
             {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
@@ -184,40 +184,40 @@ def separability_statement(samples: Samples, model: Model) -> dict[str, Any]:
             if len(group) > 1
         ],
         "groups": [
-            {"surfaces": group, **_group_information(answers, index, model, bank, samples.dt_s)}
+            {"surfaces": group, **_group_fisher_information(answers, index, model, bank, samples.dt_s)}
             for index, group in enumerate(model.groups)
         ],
-        "alike": _proportional_groups(answers, model),
-        "columns_held_s": {name: round(age, 4) for name, age in samples.held_column_age_s.items()},
+        "alike": _group_pair_cosines(answers, model),
+        "columns_held_s": {name: round(age, 4) for name, age in samples.held_column_mean_age_s.items()},
     }
 
 
-def _whitened_answers(samples: Samples, model: Model) -> Floats:
+def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    ok, _, answers = split_response(samples, model)
+    ok, _, answers = unexplained_rates_and_responses(samples, model)
     answers, noise = answers[ok], np.array(model.noise)
     whitened = np.linalg.solve(np.linalg.cholesky(noise), answers.reshape(-1, 3).T).T
     return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.power))
 
 
-def _group_information(
+def _group_fisher_information(
     answers: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
-    odds = _alarm_log_odds(model, bank, group, dt_s)
+    odds = _log_odds_needed_for_alarm(model, bank, group, dt_s)
     if not len(answers):
-        return {"information_per_s": 0.0, "smallest_loss": _smallest_losses(0.0, odds)}
+        return {"information_per_s": 0.0, "smallest_loss": _smallest_detectable_losses(0.0, odds)}
     own = float((answers[:, group] ** 2).sum(axis=1).mean()) / dt_s
-    left = _conditional_information(answers, group) / dt_s
+    left = _conditional_fisher_information(answers, group) / dt_s
     return {
         "information_per_s": own,
         "information_per_s_of_its_motion": left,
-        "smallest_loss": _smallest_losses(own, odds),
-        "smallest_loss_by_motion_alone": _smallest_losses(left, odds),
+        "smallest_loss": _smallest_detectable_losses(own, odds),
+        "smallest_loss_by_motion_alone": _smallest_detectable_losses(left, odds),
     }
 
 
-def _conditional_information(answers: Floats, group: int) -> float:
+def _conditional_fisher_information(answers: Floats, group: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
     n, groups, axes = answers.shape
     constant = np.tile(np.eye(axes), (n, 1))
@@ -228,23 +228,23 @@ def _conditional_information(answers: Floats, group: int) -> float:
     return float(rest @ rest) / n
 
 
-def _alarm_log_odds(model: Model, bank: HypothesisBank, group: int, dt_s: float) -> float:
+def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, shares = model.settings, bank.change_share[bank.is_fault_of(group)]
+    settings, shares = model.settings, bank.transition_share[bank.is_fault_of_group(group)]
     if not len(shares):
         return float("inf")
     change = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
     return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
 
 
-def _smallest_losses(information: float, odds: float) -> dict[str, float | None]:
+def _smallest_detectable_losses(information: float, odds: float) -> dict[str, float | None]:
     """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in LOSS_HORIZONS_S}
+    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in DETECTION_HORIZONS_S}
     losses = {key: np.sqrt(2.0 * odds / much) if much > 0.0 else np.inf for key, much in gathered.items()}
     return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
-def _proportional_groups(answers: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosines(answers: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for a, b in combinations(range(len(model.groups)), 2):
@@ -258,12 +258,12 @@ def _proportional_groups(answers: Floats, model: Model) -> list[dict[str, Any]]:
     return pairs
 
 
-def separability_sentences(found: dict[str, Any]) -> list[str]:
+def isolability_sentences(found: dict[str, Any]) -> list[str]:
     """The statement in words."""
     said = [entry["says"] for entry in found["together"]]
     for entry in found["groups"]:
         said.append(
-            f"{', '.join(entry['surfaces'])}: {_smallest_visible_loss_in_words(entry['smallest_loss'])}"
+            f"{', '.join(entry['surfaces'])}: {_smallest_detectable_loss_text(entry['smallest_loss'])}"
         )
     for pair in found["alike"]:
         if not pair["separable"]:
@@ -275,9 +275,9 @@ def separability_sentences(found: dict[str, Any]) -> list[str]:
     return said
 
 
-def _smallest_visible_loss_in_words(smallest: dict[str, float | None]) -> str:
+def _smallest_detectable_loss_text(smallest: dict[str, float | None]) -> str:
     seen = [f"{loss:.0%} within {horizon} s" for horizon, loss in smallest.items() if loss is not None]
     if not seen:
-        longest = f"{LOSS_HORIZONS_S[-1]:g} s"
+        longest = f"{DETECTION_HORIZONS_S[-1]:g} s"
         return f"not even a complete loss would show within {longest} by the mean of this flight's commands."
     return f"the smallest loss that shows on average is {', '.join(seen)}."

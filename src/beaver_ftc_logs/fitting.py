@@ -18,33 +18,33 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
-from beaver_ftc_logs.bank import build_adaptation_limits, build_hypothesis_bank
+from beaver_ftc_logs.bank import build_hypothesis_bank, build_trim_and_gain_state_model
 from beaver_ftc_logs.diagnose import DiagnosisRows, rows_of_posterior
-from beaver_ftc_logs.filtering import fault_evidence_gains, hypothesis_posterior, page_sum
+from beaver_ftc_logs.filtering import fault_evidence_increments, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
 
-UNFITTED_LABEL_EDGE_S = 1.5
+UNFITTED_LABEL_CHANGE_MARGIN_S = 1.5
 """Labels are good to about a second: what lies nearer to a change is not fitted."""
-MIN_LABEL_S = 3.0
+MIN_LABEL_DURATION_S = 3.0
 """A label that holds for less is the edge of another."""
 RATE_LAG_CANDIDATES = (1, 2, 3, 4)
 COMMAND_LAG_CANDIDATES = (2, 3, 4, 6)
-_MAX_RESIDUAL_CORRELATION_S = 2.0
+_NEWEY_WEST_MAX_LAG_S = 2.0
 _MIN_RATE_SPREAD_RAD_S = 1e-6
 _MARGIN_BEFORE_FAILURE_S = 1.0
-_ALARM_PROBABILITY, _ALARM_PROBABILITY_HOLD_S, _INFORMATION_SHARE_UNLABELLED = 0.995, 0.3, 0.9
+_ALARM_PROBABILITY, _ALARM_PROBABILITY_HOLD_S, _EFFECTIVE_SAMPLE_SHARE_UNLABELLED = 0.995, 0.3, 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
 With parts enough that are not fitted, the rate of false alarms decides instead."""
 _DEFAULT_FALSE_ALARMS_PER_HOUR = 1.0
-_DRIFT_SPANS_S = (2.0, 8.0)
+_TRIM_DRIFT_AVERAGING_SPANS_S = (2.0, 8.0)
 """Spans whose means tell the drift of the trim from the residual's colour."""
-_INFORMATION_SHARE = 0.8
+_EFFECTIVE_SAMPLE_SHARE = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
-_OTHER_DAYS_SETTINGS: dict[str, Any] = {
+_FILTER_SETTINGS_FOR_OTHER_DAYS: dict[str, Any] = {
     "trim_sd": 0.1,
     "trim_shift": 0.03,
     "trim_walk": [2.5e-3, 6e-4, 2e-3],
@@ -54,7 +54,7 @@ _OTHER_DAYS_SETTINGS: dict[str, Any] = {
 }
 """How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
 drift of the trim is what the means of the residual over 30 s show in that flight."""
-_OTHER_LAWS_SETTINGS: dict[str, Any] = {
+_FILTER_SETTINGS_FOR_OTHER_LAWS: dict[str, Any] = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
     "name_evidence": 2.0,
@@ -64,34 +64,34 @@ _OTHER_LAWS_SETTINGS: dict[str, Any] = {
 """How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
-_MOVING_AIR_SETTINGS: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
+_FILTER_SETTINGS_FOR_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 _GAIN_WINDOW_S, AUTOREGRESSIVE_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
-_INFORMATION_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
+_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
 same way, the first on seed 1 of five aircraft."""
 _GYRO_NOISE_FACTOR, _GUST_NOISE_FACTOR = 1.7, 2.5
 """In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
 Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
-_MAX_NOISE_FACTOR = 200.0
+_MAX_PART_NOISE_INFLATION = 200.0
 """Largest noise factor of a part: of few flights one can be far from all others (1,550 of seed 205, else
 5)."""
-_DELAY_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
+_COMMAND_DELAY_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _RANK_TOLERANCE = 1e-9
-_MAX_MISREAD_TESTED_PARTS = 4
+_MAX_PARTS_TESTED_FOR_COLUMN_MISTAKES = 4
 """Parts left out whose columns are read wrongly, too: the largest of n is passed by the next, if that is
 alike, with the chance 1 / (n + 1)."""
-_MAX_FIT_SPLITS, _MAX_GAIN_SD = 12, 0.33
+_MAX_CROSS_VALIDATION_SPLITS, _MAX_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _MAX_COLUMN_GAIN_SD = 1e3
-_N_PRIOR_CHANGES = 20
+_N_PRIOR_EFFECTIVENESS_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
-_BOUND_MASS_CANDIDATES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-_BOUND_COVERAGE_GOAL = 0.93
+_CREDIBLE_MASS_CANDIDATES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+_CREDIBLE_COVERAGE_GOAL = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
@@ -137,8 +137,8 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
     labels = samples.labels[:, is_labelled]
     is_usable &= np.isfinite(labels).all(axis=1)
     for begin, end in constant_stretches(labels):
-        is_short = (end - begin) * samples.dt_s < MIN_LABEL_S
-        edge_samples = round(UNFITTED_LABEL_EDGE_S / samples.dt_s)
+        is_short = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
+        edge_samples = round(UNFITTED_LABEL_CHANGE_MARGIN_S / samples.dt_s)
         is_usable[begin : end if is_short else begin + edge_samples] = False
         is_usable[max(end - edge_samples, begin) : end] = False
     return is_usable
@@ -148,41 +148,47 @@ def fit_model(
     stretches: Sequence[Stretch], vehicle: Vehicle, settings: FilterSettings | None = None
 ) -> Model:
     """The model that fits these stretches. Raises BadInput where there is too little to fit."""
-    history, lags = choose_order(stretches, vehicle)
+    history, lags = choose_model_order(stretches, vehicle)
     model = _fit_model_cached(stretches, vehicle, history, lags)
-    model = model.model_copy(update={"settings": settings or prior_settings(stretches, model)})
+    model = model.model_copy(update={"settings": settings or estimate_filter_settings(stretches, model)})
     return _with_inflated_noise(stretches, model) if model.colours else model
 
 
-def fit_with_order_of(stretches: Sequence[Stretch], model: Model) -> Model:
+def fit_with_same_order(stretches: Sequence[Stretch], model: Model) -> Model:
     """Another fit of the same order and settings to other stretches."""
     fitted = _fit_model_cached(stretches, model.vehicle, model.history, model.lags)
-    inflation_of_noise = {tuple(one.average): one.wider for one in model.colours}
-    return _with_noise_factors(fitted.model_copy(update={"settings": model.settings}), inflation_of_noise)
+    noise_inflation_by_ma_coefficients = {tuple(one.average): one.wider for one in model.colours}
+    return _with_noise_inflation(
+        fitted.model_copy(update={"settings": model.settings}), noise_inflation_by_ma_coefficients
+    )
 
 
-def _with_noise_factors(model: Model, inflation_of_noise: dict[tuple[float, ...], float]) -> Model:
+def _with_noise_inflation(
+    model: Model, noise_inflation_by_ma_coefficients: dict[tuple[float, ...], float]
+) -> Model:
     colours = [
-        one.model_copy(update={"wider": inflation_of_noise.get(tuple(one.average), 1.0)})
+        one.model_copy(update={"wider": noise_inflation_by_ma_coefficients.get(tuple(one.average), 1.0)})
         for one in model.colours
     ]
     return model.model_copy(update={"colours": colours})
 
 
-def _fit_without_parts(
-    stretches: Sequence[Stretch], model: Model, explained_effect_share: list[float]
+def _cross_validation_fits(
+    stretches: Sequence[Stretch], model: Model, effect_share_explained_by_others: list[float]
 ) -> Iterator[tuple[Model, Sequence[Stretch]]]:
     """Fits like the model to parts of the stretches, with how well each knows its gains; and the rest.
-    explained_effect_share: of the whole, as in `FittedRanges`."""
-    for fitted, kept in _fit_splits(stretches):
-        part_model = fit_with_order_of(fitted, model)
-        fit = fit_order(fitted, model.vehicle, model.history, model.lags)
-        gain_sd = group_gain_sd(fit, model).tolist()
-        part_ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=explained_effect_share)
+    effect_share_explained_by_others: of the whole, as in `FittedRanges`."""
+    for fitted, kept in _cross_validation_splits(stretches):
+        part_model = fit_with_same_order(fitted, model)
+        fit = fit_least_squares_of_order(fitted, model.vehicle, model.history, model.lags)
+        gain_sd = group_gain_standard_error(fit, model).tolist()
+        part_ranges = FittedRanges(
+            commands=[], rates=[], gain_sd=gain_sd, tied=effect_share_explained_by_others
+        )
         yield part_model.model_copy(update={"fitted": part_ranges}), kept
 
 
-def choose_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
+def choose_model_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
     """Past samples of rates and commands by the Bayesian information criterion."""
     scores = bic_by_order(stretches, vehicle)
     return min(scores, key=lambda order: scores[order])
@@ -193,7 +199,7 @@ def bic_by_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[i
 
     Every order's regressors are among those of the largest: one matrix of products serves all.
     """
-    regressors, rates, _ = stacked_regression(
+    regressors, rates, _ = stacked_regression_data(
         stretches, vehicle, max(RATE_LAG_CANDIDATES), max(COMMAND_LAG_CANDIDATES)
     )
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
@@ -205,7 +211,7 @@ def bic_by_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[i
     scores = {}
     for history in RATE_LAG_CANDIDATES:
         for lags in COMMAND_LAG_CANDIDATES:
-            columns = _columns_of_model_order(vehicle, history, lags)
+            columns = _regressor_columns_of_order(vehicle, history, lags)
             coefficients = np.linalg.lstsq(
                 regressor_products[np.ix_(columns, columns)], cross_products[columns], rcond=1e-12
             )[0]
@@ -216,13 +222,13 @@ def bic_by_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[i
     return scores
 
 
-def _columns_of_model_order(vehicle: Vehicle, history: int, lags: int) -> list[int]:
+def _regressor_columns_of_order(vehicle: Vehicle, history: int, lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
-    first_signal, n_signals = 1 + 3 * max(RATE_LAG_CANDIDATES), len(vehicle.past_regressor_names)
+    first_signal, n_signals = 1 + 3 * max(RATE_LAG_CANDIDATES), len(vehicle.signal_regressor_names)
     first_command = first_signal + n_signals * vehicle.n_signal_lags(max(RATE_LAG_CANDIDATES))
     group_starts = [
         first_command + group * max(COMMAND_LAG_CANDIDATES)
-        for group in range(len(regression.group_surfaces(vehicle)))
+        for group in range(len(regression.group_surfaces_by_commands(vehicle)))
     ]
     command_columns = [start + lag for start in group_starts for lag in range(lags)]
     return [
@@ -232,18 +238,20 @@ def _columns_of_model_order(vehicle: Vehicle, history: int, lags: int) -> list[i
     ]
 
 
-def fit_order(
+def fit_least_squares_of_order(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> regression.RateRegression:
     """Least squares of given order over all stretches."""
     what = ("order", vehicle.model_dump_json(), history, lags)
-    return _compute_once(stretches, what, lambda: _fit_order_uncached(stretches, vehicle, history, lags))
+    return _compute_once(
+        stretches, what, lambda: _fit_least_squares_of_order_uncached(stretches, vehicle, history, lags)
+    )
 
 
-def _fit_order_uncached(
+def _fit_least_squares_of_order_uncached(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> regression.RateRegression:
-    regressors, rates, stretch_number = stacked_regression(stretches, vehicle, history, lags)
+    regressors, rates, stretch_number = stacked_regression_data(stretches, vehicle, history, lags)
     if len(rates) < 10 * regressors.shape[1]:
         raise BadInput(
             f"identify: {len(rates)} samples known to be healthy, allowed: at least "
@@ -258,19 +266,20 @@ def _fit_order_uncached(
             f"identify: rate {still_axes[0]} does not move, allowed: flights in which every rate does"
         )
     dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
-    return regression.least_squares(
-        regressors, rates, stretch_number, round(_MAX_RESIDUAL_CORRELATION_S / dt_s)
-    )
+    return regression.least_squares(regressors, rates, stretch_number, round(_NEWEY_WEST_MAX_LAG_S / dt_s))
 
 
-def stacked_regression(
+def stacked_regression_data(
     stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Regressors, rates and run number over all stretches: the same samples for any order.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
-    groups, max_lag = regression.group_surfaces(vehicle), max(RATE_LAG_CANDIDATES + COMMAND_LAG_CANDIDATES)
+    groups, max_lag = (
+        regression.group_surfaces_by_commands(vehicle),
+        max(RATE_LAG_CANDIDATES + COMMAND_LAG_CANDIDATES),
+    )
     regressors, rates, stretch_numbers = [], [], []
     for stretch_index, stretch in enumerate(stretches):
         one, n_signal_lags = stretch.samples, vehicle.n_signal_lags(history)
@@ -297,8 +306,8 @@ def _fit_model_cached(stretches: Sequence[Stretch], vehicle: Vehicle, history: i
 
 
 def _fit_model_uncached(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
-    fit = fit_order(stretches, vehicle, history, lags)
-    names, groups = list(vehicle.surfaces), regression.group_surfaces(vehicle)
+    fit = fit_least_squares_of_order(stretches, vehicle, history, lags)
+    names, groups = list(vehicle.surfaces), regression.group_surfaces_by_commands(vehicle)
     first_command_row = len(fit.coefficients) - len(groups) * lags
     shape = (len(groups), lags, 3)
     model = Model(
@@ -319,11 +328,13 @@ def _fit_model_uncached(stretches: Sequence[Stretch], vehicle: Vehicle, history:
 def _fit_noise_models(stretches: Sequence[Stretch], model: Model) -> list[NoiseModel]:
     """The colours that flights are whitened by, with the noise of each."""
     noise_models = []
-    for noise_average in sorted({one.samples.noise_average for one in stretches} - {()}):
+    for noise_ma_coefficients in sorted({one.samples.noise_ma_coefficients for one in stretches} - {()}):
         residuals = [
-            one_step_residuals(model, one) for one in stretches if one.samples.noise_average == noise_average
+            one_step_residuals(model, one)
+            for one in stretches
+            if one.samples.noise_ma_coefficients == noise_ma_coefficients
         ]
-        noise_models.append(_fit_noise_model(list(noise_average), residuals))
+        noise_models.append(_fit_noise_model(list(noise_ma_coefficients), residuals))
     return noise_models
 
 
@@ -350,7 +361,7 @@ def _fit_noise_model(
     )
 
 
-def prior_settings(stretches: Sequence[Stretch], model: Model) -> FilterSettings:
+def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed.
 
     A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
@@ -372,34 +383,39 @@ def prior_settings(stretches: Sequence[Stretch], model: Model) -> FilterSettings
         repairs += sum(int(level == 1.0) for flight in label_levels for level in flight[1:])
     levels = {name: found for name, found in levels.items() if found}
     air_moves = model.vehicle.moving_air
-    delays_s = [share / model.rate_hz for share in ((0.0,) if air_moves else _DELAY_CANDIDATES_SAMPLES)]
+    delays_s = [
+        share / model.rate_hz for share in ((0.0,) if air_moves else _COMMAND_DELAY_CANDIDATES_SAMPLES)
+    ]
     law_settings = (
-        _OTHER_LAWS_SETTINGS | (_MOVING_AIR_SETTINGS if air_moves else {}) if model.vehicle.other_laws else {}
+        _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if air_moves else {})
+        if model.vehicle.other_laws
+        else {}
     )
     if not levels:
-        trim_walk = _trim_drift(stretches, model)
+        trim_walk = _trim_drift_sd(stretches, model)
         usual_model = model.model_copy(
             update={"settings": FilterSettings(trim_walk=trim_walk, **law_settings)}
         )
         max_power = (
-            (1.0 if air_moves else _INFORMATION_SHARE_OTHER_LAWS)
+            (1.0 if air_moves else _EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
             if law_settings
-            else _INFORMATION_SHARE_UNLABELLED
+            else _EFFECTIVE_SAMPLE_SHARE_UNLABELLED
         )
-        power = min(max_power, 1.0 / gain_dispersion(stretches, usual_model))
+        power = min(max_power, 1.0 / gain_error_overdispersion(stretches, usual_model))
         alarm = {"alarm": _ALARM_PROBABILITY, "hold_s": _ALARM_PROBABILITY_HOLD_S}
         return FilterSettings(**alarm, **law_settings, power=power, trim_walk=trim_walk, delays_s=delays_s)
     return FilterSettings(
         levels=levels,
         changes_per_hour=float(np.sqrt((changes + 1) / hours * FilterSettings().changes_per_hour)),
-        **(_OTHER_DAYS_SETTINGS | law_settings),
+        **(_FILTER_SETTINGS_FOR_OTHER_DAYS | law_settings),
         delays_s=delays_s,
-        repair_share=(repairs + _N_PRIOR_CHANGES / 2) / (changes + _N_PRIOR_CHANGES),
-        power=_INFORMATION_SHARE,
+        repair_share=(repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
+        / (changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
+        power=_EFFECTIVE_SAMPLE_SHARE,
     )
 
 
-def gain_dispersion(stretches: Sequence[Stretch], model: Model) -> float:
+def gain_error_overdispersion(stretches: Sequence[Stretch], model: Model) -> float:
     """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
     believes.
 
@@ -411,15 +427,15 @@ def gain_dispersion(stretches: Sequence[Stretch], model: Model) -> float:
     """
     flights = [(stretch.samples, stretch.usable) for stretch in stretches]
     squares = n_gains = float(len(model.groups))
-    for part_model, left_out in _fit_without_parts(
-        stretches, model, trust.explained_effect_share(flights, model).tolist()
+    for part_model, left_out in _cross_validation_fits(
+        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
-        has_known_effect = np.array(trust.groups_with_known_effect(part_model))
+        has_known_effect = np.array(trust.is_group_effect_known(part_model))
         for one in left_out:
             responses, residual = _standardized_group_responses(part_model, one)
             responses = responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
-            squared_error, rank = _squared_gain_error(
-                responses, residual.ravel(), _gain_covariance(part_model, has_known_effect)
+            squared_error, rank = _normalized_squared_gain_error(
+                responses, residual.ravel(), _prior_gain_covariance(part_model, has_known_effect)
             )
             squares, n_gains = squares + squared_error, n_gains + rank
     return squares / n_gains
@@ -431,12 +447,12 @@ def _with_inflated_noise(stretches: Sequence[Stretch], model: Model) -> Model:
     gyros show what the model itself lacks."""
     flights = [(stretch.samples, stretch.usable) for stretch in stretches]
     ratios_of_noise: dict[tuple[float, ...], list[float]] = {}
-    for part_model, left_out in _fit_without_parts(
-        stretches, model, trust.explained_effect_share(flights, model).tolist()
+    for part_model, left_out in _cross_validation_fits(
+        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
-        has_known_effect = np.array(trust.groups_with_known_effect(part_model))
+        has_known_effect = np.array(trust.is_group_effect_known(part_model))
         gain_covariance: Floats = np.asarray(
-            np.kron(_gain_covariance(part_model, has_known_effect), np.ones((3, 3))), dtype=float
+            np.kron(_prior_gain_covariance(part_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
         for one in left_out:
             responses, residual = _standardized_group_responses(part_model, one)
@@ -447,37 +463,39 @@ def _with_inflated_noise(stretches: Sequence[Stretch], model: Model) -> Model:
                     _without_mean(responses[part]),
                     _without_mean(residual[part]),
                 )
-                squares, rank = _squared_gain_error(
+                squares, rank = _normalized_squared_gain_error(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
                     gain_covariance,
                 )
-                ratios_of_noise.setdefault(one.samples.noise_average, []).append(
-                    min(squares / max(rank, 1), _MAX_NOISE_FACTOR)
+                ratios_of_noise.setdefault(one.samples.noise_ma_coefficients, []).append(
+                    min(squares / max(rank, 1), _MAX_PART_NOISE_INFLATION)
                 )
-    inflation_of_noise = {
+    noise_inflation_by_ma_coefficients = {
         colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in ratios_of_noise.items()
     }
     if model.vehicle.other_laws:
-        inflation_of_noise = {
-            one: size * (_GYRO_NOISE_FACTOR if _is_gyro_noise(one) else _GUST_NOISE_FACTOR)
-            for one, size in inflation_of_noise.items()
+        noise_inflation_by_ma_coefficients = {
+            one: size * (_GYRO_NOISE_FACTOR if _is_gyro_noise_spectrum(one) else _GUST_NOISE_FACTOR)
+            for one, size in noise_inflation_by_ma_coefficients.items()
         }
-    return _with_noise_factors(model, inflation_of_noise)
+    return _with_noise_inflation(model, noise_inflation_by_ma_coefficients)
 
 
-def _is_gyro_noise(noise_average: Sequence[float]) -> bool:
+def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
     """Whether noise takes from the next sample what it added to one, as an instrument's does."""
-    return len(noise_average) > 1 and noise_average[1] < 0.0
+    return len(noise_ma_coefficients) > 1 and noise_ma_coefficients[1] < 0.0
 
 
-def _gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) -> Floats:
+def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    state_covariance = build_adaptation_limits(model).initial_covariance[3:, 3:]
+    state_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
     return np.asarray(state_covariance[0, 0] + np.diag(np.diag(state_covariance)[1:][has_known_effect]))
 
 
-def _squared_gain_error(responses: Floats, residual: Floats, gain_covariance: Floats) -> tuple[float, int]:
+def _normalized_squared_gain_error(
+    responses: Floats, residual: Floats, gain_covariance: Floats
+) -> tuple[float, int]:
     """Squares of the gains of a residual (m,) on responses (m, G), in their covariance and what lies between
     flights, and how many gains there are."""
     information, score = responses.T @ responses, responses.T @ residual
@@ -492,9 +510,9 @@ def _squared_gain_error(responses: Floats, residual: Floats, gain_covariance: Fl
 def _standardized_group_responses(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
-    _, residual, rate_responses = whitened_residual(model, kept)
+    _, residual, rate_responses = whitened_residual_and_responses(model, kept)
     whitening = np.linalg.inv(
-        np.linalg.cholesky(np.array(model.with_noise_model(kept.samples.noise_average).noise))
+        np.linalg.cholesky(np.array(model.with_noise_model(kept.samples.noise_ma_coefficients).noise))
     ).T
     responses, standardized_residual = (
         np.einsum("nga,ab->nbga", rate_responses, whitening),
@@ -508,7 +526,7 @@ def _without_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _trim_drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
+def _trim_drift_sd(stretches: Sequence[Stretch], model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
@@ -517,13 +535,13 @@ def _trim_drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
     squares, counts, span_samples = (
         np.zeros((2, 3)),
         np.zeros(2),
-        np.round(np.array(_DRIFT_SPANS_S) * model.rate_hz),
+        np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz),
     )
-    for fitted, kept in _fit_splits(stretches):
-        part_model = fit_with_order_of(fitted, model)
+    for fitted, kept in _cross_validation_splits(stretches):
+        part_model = fit_with_same_order(fitted, model)
         for one in kept:
-            rows, residual, _ = whitened_residual(part_model, one)
-            noise = np.array(part_model.with_noise_model(one.samples.noise_average).noise)
+            rows, residual, _ = whitened_residual_and_responses(part_model, one)
+            noise = np.array(part_model.with_noise_model(one.samples.noise_ma_coefficients).noise)
             standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise), MIN_DIVISOR))
             for begin, end in _consecutive_runs(rows):
                 for i, short_span in enumerate(span_samples.astype(int).tolist()):
@@ -539,10 +557,10 @@ def _trim_drift(stretches: Sequence[Stretch], model: Model) -> list[float]:
         return usual_drift.tolist()
     short_variance, long_variance = squares / counts[:, None]
     short_span, long_span = span_samples
-    walk_variance = (
+    random_walk_variance = (
         1.5 * (long_span * long_variance - short_span * short_variance) / (long_span**2 - short_span**2)
     )
-    return np.maximum(np.sqrt(np.maximum(walk_variance, 0.0)), usual_drift).tolist()
+    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), usual_drift).tolist()
 
 
 def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
@@ -588,23 +606,29 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
         list[extremes.PeaksAndHours](),
         list[Floats](),
     )
-    for part_model, kept in _fit_without_parts(
-        stretches, model, trust.explained_effect_share(flights, model).tolist()
+    for part_model, kept in _cross_validation_fits(
+        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
         for one in kept:
             noise_scale, part = _healthy_alarm_statistics(part_model, one)
             scale = max(scale, noise_scale)
-            if len(parts) < _MAX_MISREAD_TESTED_PARTS:
-                misread_log_likelihood = max(misread_log_likelihood, _misread_log_likelihood(part_model, one))
+            if len(parts) < _MAX_PARTS_TESTED_FOR_COLUMN_MISTAKES:
+                misread_log_likelihood = max(
+                    misread_log_likelihood, _max_column_mistake_log_likelihood_gain(part_model, one)
+                )
             parts.append(part)
             if len(stretches) > 1 and model.vehicle.other_laws:
                 gain_deviations.append(_squared_gain_deviation(part_model, one))
-    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
     gain_variance = np.zeros(len(model.groups))
     if model.vehicle.other_laws:
-        gain_variance = _gain_variance_between_laws(_max_law_bias(stretches, model), gain_deviations)
-    gain_standard_errors = np.minimum(np.sqrt(group_gain_sd(fit, model) ** 2 + gain_variance), _MAX_GAIN_SD)
-    column_gain_errors = column_gain_sd(fit, model, float(gain_variance.max()))
+        gain_variance = _gain_variance_between_laws(
+            _max_gain_bias_under_one_law(stretches, model), gain_deviations
+        )
+    gain_standard_errors = np.minimum(
+        np.sqrt(group_gain_standard_error(fit, model) ** 2 + gain_variance), _MAX_GAIN_SD
+    )
+    column_gain_errors = column_gain_standard_error(fit, model, float(gain_variance.max()))
     fitted_ranges = trust.fitted_ranges(flights, model, gain_standard_errors, scale).model_copy(
         update={"column_sd": column_gain_errors}
     )
@@ -618,7 +642,7 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
     if tail is None and asked_per_hour is not None:
         minutes = _total_healthy_minutes(parts)
         says = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
-        missing_minutes = extremes.EXPECTED_ALARMS_RULED_OUT * 60.0 / asked_per_hour - minutes
+        missing_minutes = extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 60.0 / asked_per_hour - minutes
         raise BadInput(
             f"identify: false_alarms_per_hour {asked_per_hour:g}: {says}, allowed: "
             f"{missing_minutes:.0f} min more"
@@ -634,12 +658,12 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
         update={
             "fitted": fitted_ranges.model_copy(update={"tail": tail, "misread": misread_log_likelihood}),
             "settings": model.settings.model_copy(update=settings),
-            "identified": dict(_test_left_out_alarms(parts, false_alarms_per_hour, model)),
+            "identified": dict(_cross_validate_alarm_threshold(parts, false_alarms_per_hour, model)),
         }
     )
 
 
-def _max_law_bias(stretches: Sequence[Stretch], model: Model) -> Floats:
+def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> Floats:
     """By how much a group's gain may be misread under one law, (G,).
 
     Of the residual's variance the share that its own past predicts is no noise, but what the model lacks. A
@@ -653,7 +677,7 @@ def _max_law_bias(stretches: Sequence[Stretch], model: Model) -> Floats:
         flight_residuals = [
             one_step_residuals(model, one)[1]
             for one in stretches
-            if list(one.samples.noise_average) == colour.average
+            if list(one.samples.noise_ma_coefficients) == colour.average
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
         chance_share = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if colour.before else 0.0
@@ -671,7 +695,7 @@ def _squared_gain_deviation(model: Model, kept: Stretch) -> Floats:
     responses, residual = _standardized_group_responses(model, kept)
     responses = responses.sum(axis=3).reshape(residual.size, -1)
     squared_deviation = np.full(responses.shape[1], np.nan)
-    has_known_effect = np.array(trust.groups_with_known_effect(model)) & (responses.any(axis=0))
+    has_known_effect = np.array(trust.is_group_effect_known(model)) & (responses.any(axis=0))
     information = responses[:, has_known_effect].T @ responses[:, has_known_effect]
     inverse = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
     gains = inverse @ (responses[:, has_known_effect].T @ residual.ravel())
@@ -700,7 +724,7 @@ def _choose_alarm_threshold(
         if model.vehicle.other_laws
         else 0.0
     )
-    min_threshold = theory_factor * extremes.guaranteed_threshold(model.rate_hz, false_alarms_per_hour)
+    min_threshold = theory_factor * extremes.threshold_by_lorden_bound(model.rate_hz, false_alarms_per_hour)
     return (
         max(extremes.threshold_for_false_alarms(tail, false_alarms_per_hour), min_threshold)
         if tail is not None
@@ -708,10 +732,10 @@ def _choose_alarm_threshold(
     )
 
 
-def _misread_log_likelihood(model: Model, kept: Stretch) -> float:
+def _max_column_mistake_log_likelihood_gain(model: Model, kept: Stretch) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(kept.usable[:, None], kept.samples.rates, np.nan)
-    gain_of_mistake, _ = trust.log_likelihood_gains(replace(kept.samples, rates=rates), model)
+    gain_of_mistake, _ = trust.log_likelihood_gain_of_corrections(replace(kept.samples, rates=rates), model)
     return max(0.0, *gain_of_mistake.values()) if gain_of_mistake else 0.0
 
 
@@ -719,7 +743,7 @@ def _total_healthy_minutes(parts: Sequence[extremes.PeaksAndHours]) -> float:
     return 60.0 * sum(hours for _, hours in parts)
 
 
-def _test_left_out_alarms(
+def _cross_validate_alarm_threshold(
     healthy_parts: Sequence[extremes.PeaksAndHours], false_alarms_per_hour: float | None, model: Model
 ) -> Document:
     """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
@@ -747,19 +771,21 @@ def _healthy_alarm_statistics(model: Model, kept: Stretch) -> tuple[float, extre
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
     posterior, _, noise_scale = hypothesis_posterior(kept.samples, model, bank)
-    evidence_gains, labels = fault_evidence_gains(posterior, bank), kept.samples.labels
+    evidence_increments, labels = fault_evidence_increments(posterior, bank), kept.samples.labels
     is_healthy = kept.usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
     rows = np.flatnonzero(is_healthy)
-    page_sums = [page_sum(evidence_gains[rows[begin:end]], np.inf) for begin, end in _consecutive_runs(rows)]
+    page_sums = [
+        page_cusum(evidence_increments[rows[begin:end]], np.inf) for begin, end in _consecutive_runs(rows)
+    ]
     peaks = np.concatenate([extremes.peaks_between_zeros(one) for one in page_sums])
     return float(noise_scale[kept.usable].max(initial=1.0)), (peaks, len(rows) * kept.samples.dt_s / 3600.0)
 
 
-def _fit_splits(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
+def _cross_validation_splits(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
     """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
     if len(stretches) == 1:
         return [(fitted, [kept]) for fitted, kept, _ in validation_folds(stretches)]
-    n_splits = min(len(stretches), _MAX_FIT_SPLITS)
+    n_splits = min(len(stretches), _MAX_CROSS_VALIDATION_SPLITS)
     left_out_indices = [
         [i for i in range(len(stretches)) if i % n_splits == turn] for turn in range(n_splits)
     ]
@@ -769,7 +795,7 @@ def _fit_splits(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[
     ]
 
 
-def group_gain_sd(fit: regression.RateRegression, model: Model) -> Floats:
+def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> Floats:
     """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
     effect is made up by the past, as an elevator's by alpha, its sum is not known, and its factor is.
@@ -807,18 +833,20 @@ def group_gain_sd(fit: regression.RateRegression, model: Model) -> Floats:
     )
 
 
-def column_gain_sd(fit: regression.RateRegression, model: Model, gain_variance: float) -> dict[str, float]:
+def column_gain_standard_error(
+    fit: regression.RateRegression, model: Model, gain_variance: float
+) -> dict[str, float]:
     """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
-    `group_gain_sd` of a whole response; K coefficients of nothing but errors have the information K. As much
-    wider as the noise of parts left out. gain_variance: variance of a gain between laws: a law ties commands
-    to these columns.
+    `group_gain_standard_error` of a whole response; K coefficients of nothing but errors have the information
+    K. As much wider as the noise of parts left out. gain_variance: variance of a gain between laws: a law
+    ties commands to these columns.
     """
     noise_inflation, noise_sd = (
         max((one.wider for one in model.colours), default=1.0),
         np.sqrt(np.diag(fit.residual_covariance)),
     )
     sd_of_column = {}
-    for name, (rows, coefficients) in trust.cross_coefficients(model).items():
+    for name, (rows, coefficients) in trust.cross_axis_coefficients(model).items():
         coefficient_rows = [1 + row for row in rows]
         standardized_coefficients = coefficients / np.maximum(
             fit.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
@@ -836,20 +864,22 @@ def column_gain_sd(fit: regression.RateRegression, model: Model, gain_variance: 
     return sd_of_column
 
 
-def explained_by_fold(stretches: Sequence[Stretch], model: Model) -> list[Document]:
+def explained_variance_by_fold(stretches: Sequence[Stretch], model: Model) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
     return [
-        {"left_out": name, **one_step_prediction_quality(fit_with_order_of(fitted, model), kept)}
+        {"left_out": name, **one_step_prediction_quality(fit_with_same_order(fitted, model), kept)}
         for fitted, kept, name in validation_folds(stretches)
     ]
 
 
-def score_folds(stretches: Sequence[Stretch], model: Model) -> tuple[list[Document], float]:
+def score_folds_and_choose_credible_mass(
+    stretches: Sequence[Stretch], model: Model
+) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     entries: list[Document] = []
     coverage_by_mass: list[list[float]] = []
     for fitted, kept, name in validation_folds(stretches):
-        part_model = fit_with_order_of(fitted, model)
+        part_model = fit_with_same_order(fitted, model)
         entry: Document = {"left_out": name, **one_step_prediction_quality(part_model, kept)}
         labels = np.where(kept.usable[:, None], kept.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
@@ -858,14 +888,14 @@ def score_folds(stretches: Sequence[Stretch], model: Model) -> tuple[list[Docume
             coverage_by_mass.append(
                 [
                     score_against_labels(by_mass[mass], labels)["held_by_bounds"]
-                    for mass in _BOUND_MASS_CANDIDATES
+                    for mass in _CREDIBLE_MASS_CANDIDATES
                 ]
             )
         entries.append(entry)
     if not coverage_by_mass:
         return entries, model.settings.bounds
-    return entries, _BOUND_MASS_CANDIDATES[
-        int(np.argmin(np.abs(np.mean(coverage_by_mass, axis=0) - _BOUND_COVERAGE_GOAL)))
+    return entries, _CREDIBLE_MASS_CANDIDATES[
+        int(np.argmin(np.abs(np.mean(coverage_by_mass, axis=0) - _CREDIBLE_COVERAGE_GOAL)))
     ]
 
 
@@ -874,7 +904,7 @@ def _diagnosis_by_credible_mass(model: Model, kept: Stretch) -> dict[float, Diag
     posterior, _, _ = hypothesis_posterior(kept.samples, model, bank)
     settings = [
         model.settings.model_copy(update={"bounds": m})
-        for m in {*_BOUND_MASS_CANDIDATES, model.settings.bounds}
+        for m in {*_CREDIBLE_MASS_CANDIDATES, model.settings.bounds}
     ]
     return {
         one.bounds: rows_of_posterior(
@@ -898,20 +928,20 @@ def one_step_prediction_quality(model: Model, kept: Stretch) -> Document:
     }
 
 
-def whitened_residual(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
+def whitened_residual_and_responses(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
-    is_predictable, unexplained, responses = regression.split_whitened_response(
+    is_predictable, unexplained, responses = regression.whitened_rates_and_responses(
         kept.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(kept.usable & is_predictable)
-    intercept = model.whitened_intercept(kept.samples.noise_average)
+    intercept = model.whitened_intercept(kept.samples.noise_ma_coefficients)
     return rows, (unexplained - responses.sum(axis=1) - intercept)[rows], responses[rows]
 
 
 def one_step_residuals(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    is_predictable, unexplained, responses = regression.split_response(
+    is_predictable, unexplained, responses = regression.unexplained_rates_and_responses(
         kept.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(kept.usable & is_predictable)

@@ -17,13 +17,13 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 
 
-def fit_residual_predictor(
+def residual_predictor_by_yule_walker(
     model: Model, process_covariance: Floats, gyro_noise_rad_s: float, n_lags: int
 ) -> tuple[Floats, Floats]:
     """Coefficients (3 n_lags, 3), latest lag first, that predict the residual from earlier ones, and the
     covariance (3, 3) of the rest. process_covariance: Q (3, 3), (rad/s)2; gyro_noise_rad_s: standard
     deviation of a gyro."""
-    autocovariance = _autocovariance(model, process_covariance, gyro_noise_rad_s, n_lags)
+    autocovariance = _residual_autocovariance(model, process_covariance, gyro_noise_rad_s, n_lags)
     lags = np.arange(n_lags)
     blocks = np.array([[_autocovariance_at_lag(autocovariance, int(j - i)) for j in lags] for i in lags])
     lag_covariance = blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
@@ -32,7 +32,7 @@ def fit_residual_predictor(
     return np.asarray(coefficients), np.asarray(autocovariance[0] - cross_covariance.T @ coefficients)
 
 
-def _autocovariance(
+def _residual_autocovariance(
     model: Model, process_covariance: Floats, gyro_noise_rad_s: float, n_lags: int
 ) -> NDArray[np.float64]:
     """E w[k] w[k-t]' for lags t = 0 ... n_lags, (n_lags + 1, 3, 3)."""

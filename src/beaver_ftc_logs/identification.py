@@ -18,9 +18,9 @@ from beaver_ftc_logs.regression import (
     variance_inflation_factors,
 )
 from beaver_ftc_logs.samples import (
-    NOISE_AVERAGE_CANDIDATES,
+    NOISE_MA_CANDIDATES,
     UNSEEN_GYRO_NOISE_RAD_S,
-    UNSEEN_NOISE_AVERAGES,
+    UNSEEN_NOISE_MA_COEFFICIENTS,
     Samples,
     scale_by_dynamic_pressure,
     whiten_samples,
@@ -44,18 +44,18 @@ _MAX_COMMAND_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
-    vehicle, assumption_lines = with_assumed_conditions(flights, vehicle)
+    vehicle, assumption_lines = with_assumed_law_and_air(flights, vehicle)
     _check_command_units_alike(flights, vehicle)
     stretches = fitting.usable_stretches(whiten_flights(flights, vehicle))
     model = fitting.fit_model(stretches, vehicle)
-    check_explained_variance(fitting.explained_by_fold(stretches, model), stretches, model)
+    check_explained_variance(fitting.explained_variance_by_fold(stretches, model), stretches, model)
     model = add_unseen_noise_models(fitting.add_validity_range(stretches, model), flights)
-    tests, bounds = fitting.score_folds(stretches, model)
+    tests, bounds = fitting.score_folds_and_choose_credible_mass(stretches, model)
     identified = {
         "assumed": assumption_lines,
         "flights": [_used_samples_entry(stretch) for stretch in stretches],
         "tests": tests,
-        "another_day": expected_on_another_day(tests, model),
+        "another_day": expected_performance_on_another_day(tests, model),
         "collinear": collinear_regressors(stretches, model),
         "colour": standard_error_inflation(stretches, model),
         "spectrum": residual_spectrum(stretches, model),
@@ -77,7 +77,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     )
     quietest_noise = min((np.array(one.noise) for one in model.colours), key=np.linalg.det)
     colours = list(model.colours)
-    for average in UNSEEN_NOISE_AVERAGES:
+    for average in UNSEEN_NOISE_MA_COEFFICIENTS:
         if average not in known_averages:
             whitened_flights = fitting.usable_stretches([whiten_samples(one, average) for one in flights])
             residuals = np.vstack([fitting.one_step_residuals(model, one)[1] for one in whitened_flights])
@@ -85,7 +85,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                 NoiseModel(average=list(average), noise=np.cov(residuals.T).tolist(), wider=max_inflation)
             )
     for gyro_noise_rad_s in UNSEEN_GYRO_NOISE_RAD_S:
-        predictor, noise = gyro_noise.fit_residual_predictor(
+        predictor, noise = gyro_noise.residual_predictor_by_yule_walker(
             model, quietest_noise, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
         )
         predictor_and_noise = {"before": predictor.tolist(), "noise": noise.tolist()}
@@ -93,7 +93,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     return model.model_copy(update={"colours": colours})
 
 
-def with_assumed_conditions(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
+def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
     """The vehicle with what its file leaves open of laws and air, and a line on each with the reason.
 
     A log of healthy flight shows neither which law nor which air a later flight has: both are taken to be
@@ -129,64 +129,73 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     n_lags = max(fitting.RATE_LAG_CANDIDATES), max(fitting.RATE_LAG_CANDIDATES)
     if not vehicle.moving_air:
         return list(flights)
-    noise_averages = [_choose_noise_average(one, vehicle, n_lags) for one in flights]
+    noise_averages = [_choose_noise_ma_coefficients(one, vehicle, n_lags) for one in flights]
     whitened_flights = [
-        whiten_samples(one, noise_average) for one, noise_average in zip(flights, noise_averages, strict=True)
+        whiten_samples(one, noise_ma_coefficients)
+        for one, noise_ma_coefficients in zip(flights, noise_averages, strict=True)
     ]
     for _ in range(_N_WHITENING_ROUNDS):
-        regressors, rates, _ = fitting.stacked_regression(
+        regressors, rates, _ = fitting.stacked_regression_data(
             fitting.usable_stretches(whitened_flights), vehicle, *n_lags
         )
         coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
         best_averages = [
-            _best_noise_average(fitting.usable_stretches([one]), vehicle, n_lags, np.asarray(coefficients))
+            _best_noise_ma_coefficients(
+                fitting.usable_stretches([one]), vehicle, n_lags, np.asarray(coefficients)
+            )
             for one in flights
         ]
-        if (new_averages := [noise_average for _, noise_average in best_averages]) == noise_averages:
+        if (
+            new_averages := [noise_ma_coefficients for _, noise_ma_coefficients in best_averages]
+        ) == noise_averages:
             break
         mean_score, noise_averages = np.mean([score for score, _ in best_averages]), new_averages
         whitened_flights = [
-            whiten_samples(one, noise_average, float(np.exp((mean_score - score) / 6.0)))
-            for one, (score, noise_average) in zip(flights, best_averages, strict=True)
+            whiten_samples(one, noise_ma_coefficients, float(np.exp((mean_score - score) / 6.0)))
+            for one, (score, noise_ma_coefficients) in zip(flights, best_averages, strict=True)
         ]
     return whitened_flights
 
 
-def _choose_noise_average(flight: Samples, vehicle: Vehicle, n_lags: tuple[int, int]) -> tuple[float, ...]:
+def _choose_noise_ma_coefficients(
+    flight: Samples, vehicle: Vehicle, n_lags: tuple[int, int]
+) -> tuple[float, ...]:
     """The colour of which a fit to one flight alone leaves least: the likeliest of an ARMAX model, by
     profile likelihood over the moving averages."""
 
-    def remaining_log_determinant(noise_average: tuple[float, ...]) -> float:
-        regressors, rates, _ = fitting.stacked_regression(
-            fitting.usable_stretches([whiten_samples(flight, noise_average)]), vehicle, *n_lags
+    def residual_log_determinant(noise_ma_coefficients: tuple[float, ...]) -> float:
+        regressors, rates, _ = fitting.stacked_regression_data(
+            fitting.usable_stretches([whiten_samples(flight, noise_ma_coefficients)]), vehicle, *n_lags
         )
         if len(rates) < 2:
             raise BadInput(
                 f"identify: {flight.name}: {len(rates)} samples known to be healthy, allowed: at least 2"
             )
         residual = rates - regressors @ np.linalg.lstsq(regressors, rates, rcond=None)[0]
-        return float(np.linalg.slogdet(np.cov(residual.T))[1]) - 6.0 * float(np.log(sum(noise_average)))
+        return float(np.linalg.slogdet(np.cov(residual.T))[1]) - 6.0 * float(
+            np.log(sum(noise_ma_coefficients))
+        )
 
-    return min(NOISE_AVERAGE_CANDIDATES, key=remaining_log_determinant)
+    return min(NOISE_MA_CANDIDATES, key=residual_log_determinant)
 
 
-def _best_noise_average(
+def _best_noise_ma_coefficients(
     stretch: list[fitting.Stretch], vehicle: Vehicle, n_lags: tuple[int, int], coefficients: Floats
 ) -> tuple[float, tuple[float, ...]]:
     """The colour of a flight, and the log determinant of the residual that it leaves."""
     from scipy.signal import lfilter
 
-    regressors, rates, _ = fitting.stacked_regression(stretch, vehicle, *n_lags)
+    regressors, rates, _ = fitting.stacked_regression_data(stretch, vehicle, *n_lags)
     residual = rates - regressors @ coefficients
     log_determinants = {
         one: np.linalg.slogdet(np.cov(lfilter([1.0], one, residual, axis=0).T))[1]
-        for one in NOISE_AVERAGE_CANDIDATES
+        for one in NOISE_MA_CANDIDATES
     }
     best_average = min(log_determinants, key=lambda one: float(log_determinants[one]))
     return float(log_determinants[best_average]) + 6.0 * float(np.log(sum(best_average))), best_average
 
 
-def expected_on_another_day(tests: list[Document], model: Model) -> Document:
+def expected_performance_on_another_day(tests: list[Document], model: Model) -> Document:
     """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
     merit, false alarms an hour and how sure that is, and how many minutes would show it."""
     scores = [test["score"] for test in tests if "score" in test]
@@ -202,7 +211,7 @@ def expected_on_another_day(tests: list[Document], model: Model) -> Document:
     return expected | {
         "false_alarms_per_hour": {
             "asked": false_alarms_per_hour,
-            **asdict(extremes.expected_false_alarms(fitted_ranges.tail, settings.threshold)),
+            **asdict(extremes.expected_false_alarms_per_hour(fitted_ranges.tail, settings.threshold)),
         },
         "minutes_left_out": fitted_ranges.tail.minutes,
         "minutes_missing": extremes.missing_healthy_minutes(fitted_ranges.tail, false_alarms_per_hour),
@@ -210,19 +219,19 @@ def expected_on_another_day(tests: list[Document], model: Model) -> Document:
     }
 
 
-def scale_commands_by_pressure(
+def scale_commands_by_dynamic_pressure(
     flights: Sequence[Samples], vehicle: Vehicle
 ) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
     known and this explains more; else both as they are."""
     open_keys = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
-    scaled_flights, scaled_vehicle = _with_commands_by_pressure(
-        flights, with_assumed_conditions(flights, vehicle)[0] if open_keys else vehicle
+    scaled_flights, scaled_vehicle = _choose_dynamic_pressure_scaling(
+        flights, with_assumed_law_and_air(flights, vehicle)[0] if open_keys else vehicle
     )
     return scaled_flights, scaled_vehicle.model_copy(update=open_keys) if open_keys else scaled_vehicle
 
 
-def _with_commands_by_pressure(
+def _choose_dynamic_pressure_scaling(
     flights: Sequence[Samples], vehicle: Vehicle
 ) -> tuple[Sequence[Samples], Vehicle]:
     known_airspeeds = [one.airspeed[np.isfinite(one.airspeed)] for one in flights if one.airspeed is not None]
@@ -260,7 +269,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
         scaled_flights, vehicle
     )  # a criterion believes each sample, as only white noise lets it
 
-    def with_powers(scaled_vehicle: Vehicle, whitens: bool = True) -> list[Samples]:
+    def scale_and_whiten_flights(scaled_vehicle: Vehicle, whitens: bool = True) -> list[Samples]:
         bic = [
             scale_by_dynamic_pressure(
                 one, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
@@ -270,21 +279,21 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
         if not (whitens and vehicle.moving_air):
             return bic
         return [
-            whiten_samples(one, whitened_flight.noise_average, whitened_flight.fit_weight)
+            whiten_samples(one, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
             for one, whitened_flight in zip(bic, whitened_flights, strict=True)
         ]
 
     min_bic, names = (
-        _min_bic(with_powers(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE,
+        _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE,
         list(vehicle.surfaces),
     )
-    for group in regression.group_surfaces(vehicle):
+    for group in regression.group_surfaces_by_commands(vehicle):
         for power in _AIRSPEED_POWER_CANDIDATES:
             powers = vehicle.airspeed_powers | {names[i]: power for i in group}
             candidate = vehicle.model_copy(update={"airspeed_powers": powers})
-            if (bic := _min_bic(with_powers(candidate), candidate)) < min_bic:
+            if (bic := _min_bic(scale_and_whiten_flights(candidate), candidate)) < min_bic:
                 min_bic, vehicle = bic, candidate
-    return with_powers(vehicle, whitens=False), vehicle
+    return scale_and_whiten_flights(vehicle, whitens=False), vehicle
 
 
 def check_explained_variance(
@@ -308,7 +317,7 @@ def check_explained_variance(
             f"help: more than these {minutes:.1f} min, commands that move more "
             f"({stillest_command[0]} has a standard "
             f"deviation of {stillest_command[1]:.2g}), or the commands that this vehicle follows"
-            f"{_rate_remarks(stretches, model)}"
+            f"{_remarks_on_rates(stretches, model)}"
         )
 
 
@@ -323,7 +332,7 @@ def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> 
         )
 
 
-def _rate_remarks(stretches: Sequence[fitting.Stretch], model: Model) -> str:
+def _remarks_on_rates(stretches: Sequence[fitting.Stretch], model: Model) -> str:
     """Return the mistakes found in the rates when the log was read, each after a semicolon."""
     rates = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
     notes = [note for one in stretches for note in one.samples.notes if note.startswith(rates)]
@@ -344,7 +353,7 @@ def _used_samples_entry(stretch: fitting.Stretch) -> Document:
 def collinear_regressors(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    regressors, _, _ = fitting.stacked_regression(stretches, model.vehicle, model.history, model.lags)
+    regressors, _, _ = fitting.stacked_regression_data(stretches, model.vehicle, model.history, model.lags)
     factors = variance_inflation_factors(regressors[:, 1:])
     worst = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     inflated = [
@@ -359,14 +368,14 @@ def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
     n_signal_lags = range(1, model.vehicle.n_signal_lags(model.history) + 1)
-    signals = [f"{name}[-{k}]" for k in n_signal_lags for name in model.vehicle.past_regressor_names]
+    signals = [f"{name}[-{k}]" for k in n_signal_lags for name in model.vehicle.signal_regressor_names]
     delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
 
 def standard_error_inflation(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
     first_command_row = len(fit.standard_error_inflation) - len(model.groups) * model.lags
     return dict(
         zip("pqr", np.median(fit.standard_error_inflation[first_command_row:], axis=0).tolist(), strict=True)
@@ -397,16 +406,16 @@ def identification_text(model: Model) -> str:
         f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  {line}" for line in identified.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(g)}" for g in model.groups if len(g) > 1),
-        *_dynamic_pressure_lines(model),
+        *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
             f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: {one.wider:.2g} times as "
             "wide, in squares, as gains of 10 s left out differ, and other laws may"
             for one in model.colours
         ),
-        *(f"  {line}" for line in trust.unknown_effect_lines(model)),
+        *(f"  {line}" for line in trust.unknown_effect_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in identified["flights"] for note in flight["notes"]),
-        *map(_left_out_test_line, identified["tests"]),
-        *_another_day_lines(identified["another_day"], len(identified["flights"])),
+        *map(_left_out_test_text, identified["tests"]),
+        *_another_day_sentences(identified["another_day"], len(identified["flights"])),
         f"  the residual's colour widens standard errors by {_values_by_axis_text(identified['colour'])}",
     ]
     output_error = identified["output_error"]
@@ -428,7 +437,7 @@ def identification_text(model: Model) -> str:
     return "\n".join(lines)
 
 
-def _another_day_lines(expected: Document, n_flights: int) -> list[str]:
+def _another_day_sentences(expected: Document, n_flights: int) -> list[str]:
     """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
     what_day = (
         "another day, each left out in turn"
@@ -458,14 +467,14 @@ def _another_day_lines(expected: Document, n_flights: int) -> list[str]:
     return lines
 
 
-def _dynamic_pressure_lines(model: Model) -> list[str]:
+def _dynamic_pressure_sentences(model: Model) -> list[str]:
     if (reference_mps := model.vehicle.reference_airspeed_mps) is None:
         return []
     others = "".join(f", {n} with airspeed^{x:g}" for n, x in model.vehicle.airspeed_powers.items() if x != 2)
     return [f"  surfaces work with the dynamic pressure, 1 at {reference_mps:.4g} m/s{others}"]
 
 
-def _left_out_test_line(test: Document) -> str:
+def _left_out_test_text(test: Document) -> str:
     if not test["samples"]:
         return f"  without {test['left_out']}: nothing in it is known"
     line = f"  without {test['left_out']}: explains {_values_by_axis_text(test['explained'])} of it"

@@ -162,7 +162,7 @@ class Model(Section):
     history: Whole = Field(ge=1, le=50)
     lags: Whole = Field(ge=1, le=50)
     intercept: Row = Field(min_length=3, max_length=3)
-    past: Matrix = Field(description="(3 history + past_regressor_names x signal lags, 3)")
+    past: Matrix = Field(description="(3 history + signal_regressor_names x signal lags, 3)")
     response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
     response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
     noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
@@ -177,7 +177,7 @@ class Model(Section):
 
     @model_validator(mode="after")
     def _check_consistent(self) -> "Model":
-        rows = 3 * self.history + len(self.vehicle.past_regressor_names) * self.vehicle.n_signal_lags(
+        rows = 3 * self.history + len(self.vehicle.signal_regressor_names) * self.vehicle.n_signal_lags(
             self.history
         )
         says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it again"

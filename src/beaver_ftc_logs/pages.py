@@ -26,7 +26,7 @@ from beaver_ftc_logs.samples import Samples
 if TYPE_CHECKING:
     from jinja2 import Template
 
-_TEMPLATES = Path(__file__).parent / "templates"
+_TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 _MAX_PLOTTED_POINTS = 6000
 IDENTIFICATION_PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
 _PREDICTION_WINDOW_S = 40.0
@@ -38,7 +38,9 @@ def load_template(name: str) -> "Template":
     """A page's template by its file name."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = Environment(loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined)
+    loader = Environment(
+        loader=FileSystemLoader(_TEMPLATE_FOLDER), autoescape=True, undefined=StrictUndefined
+    )
     return loader.get_template(name)
 
 
@@ -68,7 +70,7 @@ def _render_flight_page(
         brief_s=MAX_BRIEF_EVENT_S,
         words=words,
         picture=_encode_png(flight_figure(samples, surfaces, rows, words["bounds"])),
-        ages=samples.held_column_age_s,
+        ages=samples.held_column_mean_age_s,
         notes=[*_log_notes(samples), words["predicts"]],
     )
 
@@ -79,7 +81,7 @@ def _log_notes(samples: Samples) -> list[str]:
     notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gap_count_text} in the log."]
     notes += [
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
-        for name, age in samples.held_column_age_s.items()
+        for name, age in samples.held_column_mean_age_s.items()
     ]
     return [*notes, *samples.notes]
 
@@ -172,7 +174,7 @@ def write_diagnosis(
     return write_results(out, samples.name, columns, verdict, render_diagnosis(samples, model, rows, verdict))
 
 
-def write_diagnosis_by_aircraft(
+def write_diagnosis_with_aircraft_model(
     out: Path,
     samples: Samples,
     surfaces: Sequence[str],
@@ -182,13 +184,13 @@ def write_diagnosis_by_aircraft(
 ) -> Path:
     """The same of a flight that an aircraft's own model diagnosed; write_more: writes into the folder,
     too."""
-    from beaver_ftc_logs.stepped import EXCLUSION_MEMORY_S
+    from beaver_ftc_logs.stepped import EFFECTIVENESS_BOUND_WINDOW_S
 
     words = {
         "bounds": "bounds",
         "quiet": "No residual left the bound of the errors declared.",
         "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
-        f"is at fault, has stood for {EXCLUSION_MEMORY_S:g} s, and the errors declared hold.",
+        f"is at fault, has stood for {EFFECTIVENESS_BOUND_WINDOW_S:g} s, and the errors declared hold.",
     }
     page = _render_flight_page(samples, surfaces, rows, verdict, words)
     return write_results(out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_more)
@@ -227,7 +229,7 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     stretches = fitting.usable_stretches(flights)
-    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=IDENTIFICATION_PAGE_MARK,
@@ -237,7 +239,7 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encode_png(_prediction_figure(stretches, model)),
         spectrum=_encode_png(_spectrum_figure(stretches, model)),
-        correlation=_encode_png(_correlation_figure(fit, names)),
+        correlation=_encode_png(_coefficient_correlation_figure(fit, names)),
     )
 
 
@@ -256,7 +258,7 @@ def _encode_png(figure: Any) -> str:
 def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     folds = [
-        (fitting.fit_with_order_of(fitted, model), kept, name)
+        (fitting.fit_with_same_order(fitted, model), kept, name)
         for fitted, kept, name in fitting.validation_folds(stretches)
     ]
     folds = [part for part in folds if part[1].usable.any()][:_MAX_SHOWN_FLIGHTS]
@@ -265,7 +267,7 @@ def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> An
     blocks = figure.subfigures(n_shown, squeeze=False)[:, 0]
     for block, (fitted, kept, name) in zip(blocks, folds, strict=False):
         axes = block.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _liveliest_prediction(
+        t_s, rates, residual = _prediction_in_most_active_window(
             fitted, kept, round(_PREDICTION_WINDOW_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
@@ -280,7 +282,7 @@ def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> An
     return figure
 
 
-def _liveliest_prediction(
+def _prediction_in_most_active_window(
     model: Model, kept: fitting.Stretch, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
@@ -290,12 +292,12 @@ def _liveliest_prediction(
         np.full_like(kept.samples.rates, np.nan),
     )
     rates[rows], window_residual[rows] = kept.samples.rates[rows], residual
-    begin = _start_of_liveliest_window(rates, rows, window_samples)
+    begin = _start_of_most_active_window(rates, rows, window_samples)
     part = slice(begin, begin + window_samples)
     return kept.samples.t_s[part], rates[part], window_residual[part]
 
 
-def _start_of_liveliest_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
+def _start_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
     squared_rates = np.zeros(len(rates))
     squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
@@ -324,7 +326,7 @@ def _spectrum_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
     return figure
 
 
-def _correlation_figure(fit: RateRegression, names: list[str]) -> Any:
+def _coefficient_correlation_figure(fit: RateRegression, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
     size = 2.5 + 0.19 * len(names)
     figure = _new_figure(size + 0.8, size)

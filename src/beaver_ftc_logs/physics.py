@@ -20,7 +20,7 @@ _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW = 1.5, 1.8
 _LOW_CORRELATION, _LOW_CORRELATION_OF_FEW = 0.4, 0.2
 _GRAVITY_MPS2 = UNITS["g"][1]
-_GRAVITY_RANGE_G = (0.5, 2.0)
+_PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
 _MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
 _MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
 
@@ -42,7 +42,7 @@ class AngleRateFit:
         return self.n_windows >= _MIN_MANY_WINDOWS
 
 
-def fit_roll(rates: list[Column], roll: Column, pitch: Column | None) -> AngleRateFit | None:
+def fit_roll_angle_to_rates(rates: list[Column], roll: Column, pitch: Column | None) -> AngleRateFit | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
     rates: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
@@ -58,17 +58,19 @@ def fit_roll(rates: list[Column], roll: Column, pitch: Column | None) -> AngleRa
     return _fit_angle_to_rate(t_s, phi, terms, circle, theta)
 
 
-def fit_pitch(rates: list[Column], roll: Column, pitch: Column) -> AngleRateFit | None:
-    """How the pitch angle follows the rates, as `fit_roll`."""
+def fit_pitch_angle_to_rates(rates: list[Column], roll: Column, pitch: Column) -> AngleRateFit | None:
+    """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
     t_s = rates[0].t_s
     _, q, r = (_interpolate_column(column, t_s) for column in rates)
     angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
     return _fit_angle_to_rate(t_s, _interpolate_column(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
 
 
-def fit_yaw(rates: list[Column], roll: Column, pitch: Column | None, yaw: Column) -> AngleRateFit | None:
-    """How the yaw angle follows the rates, as `fit_roll`; r and q are in one unit, since a turn changes both
-    alike."""
+def fit_yaw_angle_to_rates(
+    rates: list[Column], roll: Column, pitch: Column | None, yaw: Column
+) -> AngleRateFit | None:
+    """How the yaw angle follows the rates, as `fit_roll_angle_to_rates`; r and q are in one unit, since a
+    turn changes both alike."""
     t_s = rates[0].t_s
     _, q, r = (_interpolate_column(column, t_s) for column in rates)
     angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
@@ -180,16 +182,16 @@ def find_attitude_mistake(
             continue
         for other, column in {**rates, **other_columns}.items():
             other_fit = _fit_angle_of_axis([*columns[:axis], column, *columns[axis + 1 :]], angles, axis)
-            if other_fit is not None and abs(other_fit.correlation) > _required_other_correlation(
+            if other_fit is not None and abs(other_fit.correlation) > _min_correlation_of_other_column(
                 fit, other in rates
             ):
                 return _exchanged_column_text(angle[0], (rate, fit), (other, other_fit), _RATE_TITLES[axis])
-        if says := angle_remark(fit, rate, angle[0]):
+        if says := angle_rate_remark(fit, rate, angle[0]):
             return says
     return None
 
 
-def _required_other_correlation(fit: AngleRateFit, is_rate: bool) -> float:
+def _min_correlation_of_other_column(fit: AngleRateFit, is_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
     own_correlation = abs(fit.correlation)
     if is_rate and own_correlation < (_LOW_CORRELATION if fit.has_many_windows else _LOW_CORRELATION_OF_FEW):
@@ -211,8 +213,10 @@ def _fit_angle_of_axis(
     if roll is None or (known := (roll, pitch, yaw)[axis]) is None:
         return None
     if axis == 2:
-        return fit_yaw(rates, roll, pitch, known)
-    return fit_pitch(rates, roll, known) if axis else fit_roll(rates, roll, pitch)
+        return fit_yaw_angle_to_rates(rates, roll, pitch, known)
+    return (
+        fit_pitch_angle_to_rates(rates, roll, known) if axis else fit_roll_angle_to_rates(rates, roll, pitch)
+    )
 
 
 def _exchanged_column_text(
@@ -225,7 +229,7 @@ def _exchanged_column_text(
     )
 
 
-def angle_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
+def angle_rate_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
     nothing is. rate, angle: their columns.
 
@@ -269,7 +273,7 @@ def gravity_remark(acceleration: Column, name: str) -> str | None:
     is."""
     values = acceleration.values[np.isfinite(acceleration.values)]
     median_mps2 = float(np.median(np.abs(values))) if values.size else 0.0
-    if _GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _GRAVITY_RANGE_G[1]:
+    if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
         return None
     unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None
     fits = (

@@ -63,7 +63,7 @@ def _with_columns_from(
     factor_of_column: Mapping[str, float],
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.past_regressor_names
+    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.signal_regressor_names
     columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
     new_columns = []
     for name in names:

@@ -125,7 +125,7 @@ def rows_in_time_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]
     if (np.diff(t_s) > 0).all() and np.isfinite(t_s).all():
         return np.arange(len(t_s)), ""
     stamped = np.flatnonzero(np.isfinite(t_s))
-    kept_rows = stamped[_longest_increasing(t_s[stamped])]
+    kept_rows = stamped[_longest_increasing_rows(t_s[stamped])]
     left_out = np.setdiff1d(np.arange(len(t_s)), kept_rows)
     misplaced_rows = [k for k in left_out.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
     if not misplaced_rows:
@@ -138,7 +138,7 @@ def rows_in_time_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]
     )
 
 
-def _longest_increasing(t_s: Floats) -> NDArray[np.int64]:
+def _longest_increasing_rows(t_s: Floats) -> NDArray[np.int64]:
     """Places of a longest strictly increasing subsequence, by patience sorting from the end.
 
     From the end, so that of a row and one that comes late behind it the late one is left out.

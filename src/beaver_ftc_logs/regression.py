@@ -25,7 +25,7 @@ _N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_STANDARD_ERRORS = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
 
 
-def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
+def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
     """Surfaces by what excites them: those in one group get proportional commands."""
     rows = mixer_matrix(vehicle)
     groups: list[list[int]] = []
@@ -81,7 +81,7 @@ def surface_indices_by_group(model: Model) -> list[list[int]]:
     return [[names.index(name) for name in group] for group in model.groups]
 
 
-def columns_by_surface(values: Floats, model: Model) -> Floats:
+def group_values_by_surface(values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     group_of_surface = np.full(len(model.vehicle.surfaces), -1)
     for group, members in enumerate(surface_indices_by_group(model)):
@@ -89,7 +89,7 @@ def columns_by_surface(values: Floats, model: Model) -> Floats:
     return np.asarray(np.take(np.column_stack([values, np.ones(len(values))]), group_of_surface, axis=1))
 
 
-def split_response(
+def unexplained_rates_and_responses(
     samples: Samples, model: Model, scales_by_labels: bool = False
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
     """By a model: which samples it can predict, (n,), what the past leaves unexplained of the rates, (n, 3),
@@ -104,13 +104,13 @@ def split_response(
     return is_predictable, unexplained, np.einsum("ngl,glr->ngr", commands, response)
 
 
-def split_whitened_response(
+def whitened_rates_and_responses(
     samples: Samples, model: Model, scales_by_labels: bool = False
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """As `split_response`, less the prediction of each residual from those before it by the flight's noise
-    model: a healthy flight leaves a white residual."""
-    is_predictable, unexplained, responses = split_response(samples, model, scales_by_labels)
-    predictor, is_whitened = model.noise_predictor(samples.noise_average), is_predictable.copy()
+    """As `unexplained_rates_and_responses`, less the prediction of each residual from those before it by the
+    flight's noise model: a healthy flight leaves a white residual."""
+    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model, scales_by_labels)
+    predictor, is_whitened = model.noise_predictor(samples.noise_ma_coefficients), is_predictable.copy()
     for lag in range(1, len(predictor) + 1):
         is_whitened &= _delay_rows(is_predictable, lag, False)
     return (
@@ -166,7 +166,9 @@ def least_squares(x: Floats, y: Floats, stretch_number: NDArray[np.int64], max_l
     white_errors = np.sqrt(np.maximum(np.outer(np.diag(inverse), np.diag(residual_covariance)), 0.0))
     newey_west_errors = np.column_stack(
         [
-            _newey_west(scaled_regressors, residuals[:, axis], inverse, stretch_number, max_lag)
+            _newey_west_standard_errors(
+                scaled_regressors, residuals[:, axis], inverse, stretch_number, max_lag
+            )
             for axis in range(y.shape[1])
         ]
     )
@@ -181,7 +183,7 @@ def least_squares(x: Floats, y: Floats, stretch_number: NDArray[np.int64], max_l
     )  # fmt: skip
 
 
-def _newey_west(
+def _newey_west_standard_errors(
     scaled_regressors: Floats,
     residual: Floats,
     inverse: Floats,
@@ -199,9 +201,9 @@ def _newey_west(
     return np.sqrt(np.maximum(np.diag(inverse @ score_covariance @ inverse), 0.0))
 
 
-def coefficient_bounds(x: Floats, y: Floats, information_share: float) -> tuple[Floats, Floats]:
+def coefficient_upper_bounds(x: Floats, y: Floats, effective_sample_share: float) -> tuple[Floats, Floats]:
     """Least squares of y (n,) on x (n, m): what each coefficient surely does not exceed, (m,), which is much
-    where columns make one another up; and squares of what is left (n,). information_share: as in
+    where columns make one another up; and squares of what is left (n,). effective_sample_share: as in
     `FilterSettings`."""
     regressor_rms = np.maximum(np.sqrt((x**2).mean(axis=0)), MIN_DIVISOR)
     scaled_regressors = x / regressor_rms
@@ -211,7 +213,9 @@ def coefficient_bounds(x: Floats, y: Floats, information_share: float) -> tuple[
     )
     coefficients = inverse @ (scaled_regressors.T @ y)
     squared_residual = (y - scaled_regressors @ coefficients) ** 2
-    standard_error = np.sqrt(np.maximum(np.diag(inverse), 0.0) * squared_residual.mean() / information_share)
+    standard_error = np.sqrt(
+        np.maximum(np.diag(inverse), 0.0) * squared_residual.mean() / effective_sample_share
+    )
     return (coefficients + BOUND_STANDARD_ERRORS * standard_error) / regressor_rms, squared_residual
 
 

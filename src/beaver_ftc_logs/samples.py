@@ -30,12 +30,12 @@ _PRESSURE_RATIO_LIMITS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 MAX_FIT_SAMPLES, _STRETCH_SAMPLES = 200_000, 5000
 """Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
-NOISE_AVERAGE_CANDIDATES = (
+NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
-UNSEEN_NOISE_AVERAGES = NOISE_AVERAGE_CANDIDATES[:2]
+UNSEEN_NOISE_MA_COEFFICIENTS = NOISE_MA_CANDIDATES[:2]
 UNSEEN_GYRO_NOISE_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
 """Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a
 laboratory's to a toy's, so close together that none is 1.8 times off."""
@@ -49,12 +49,13 @@ class Samples:
 
     t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
     signals (n, X); labels (n, S) effectiveness, nan where unknown; stretch_number (n,) of the gap-free
-    stretch; held_column_age_s: mean age of each; log_stamps_s (m,) the log's own time stamps, s; notes: what
-    is said of the reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of rates,
-    commands and signals has been the same, (n,) s; is_rate_clipped (n,); energy_climb_mps (n,): rate of the
-    energy height over the last seconds, None where it is not logged; noise_average: the moving average of the
-    noise, that rates, commands and signals are whitened by, none where empty; fit_weight: of a sample in a
-    fit; n_parts: in how many the log was read, of which these are stretches where there are several.
+    stretch; held_column_mean_age_s: mean age of each; log_stamps_s (m,) the log's own time stamps, s; notes:
+    what is said of the reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of
+    rates, commands and signals has been the same, (n,) s; is_rate_clipped (n,); energy_height_rate_mps (n,):
+    rate of the energy height over the last seconds, None where it is not logged; noise_ma_coefficients: the
+    moving average of the noise, that rates, commands and signals are whitened by, none where empty;
+    fit_weight: of a sample in a fit; n_parts: in how many the log was read, of which these are stretches
+    where there are several.
     """
 
     name: str
@@ -65,22 +66,22 @@ class Samples:
     labels: Floats
     stretch_number: NDArray[np.int64]
     dt_s: float
-    held_column_age_s: dict[str, float]
+    held_column_mean_age_s: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
     still_s: Mapping[str, Floats] = field(default_factory=dict)
     is_rate_clipped: NDArray[np.bool_] | None = None
-    energy_climb_mps: Floats | None = None
-    noise_average: tuple[float, ...] = ()
+    energy_height_rate_mps: Floats | None = None
+    noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
     n_parts: int = 1
 
 
-_SAMPLE_FIELDS = (
+_PER_SAMPLE_FIELDS = (
     "t_s", "rates", "commands", "signals", "labels", "stretch_number", "airspeed", "is_rate_clipped",
-    "energy_climb_mps",
+    "energy_height_rate_mps",
 )  # fmt: skip
 
 
@@ -117,14 +118,21 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         labels=_sampled_labels(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
-        held_column_age_s={name: age_s for name, (_, age_s) in values_and_age.items() if age_s is not None},
+        held_column_mean_age_s={
+            name: age_s for name, (_, age_s) in values_and_age.items() if age_s is not None
+        },
         logged_failures=recording.logged_failures,
         log_stamps_s=log_stamps_s,
-        notes=(*recording.notes, *dict.fromkeys(_column_mistakes(recording, used_columns, rate_columns))),
+        notes=(
+            *recording.notes,
+            *dict.fromkeys(_used_column_defect_texts(recording, used_columns, rate_columns)),
+        ),
         airspeed=_sampled_airspeed(recording, vehicle, t_s, step_s),
-        still_s={name: _still_time_s(recording.columns[name], t_s) for name in used_columns},
+        still_s={name: _unchanged_time_s(recording.columns[name], t_s) for name in used_columns},
         is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_columns], t_s),
-        energy_climb_mps=_sampled_energy_climb_mps(recording, vehicle, (t_s, stretch_number, step_s)),
+        energy_height_rate_mps=_sampled_energy_height_rate_mps(
+            recording, vehicle, (t_s, stretch_number, step_s)
+        ),
     )
     reference_mps = vehicle.reference_airspeed_mps
     return (
@@ -153,7 +161,9 @@ def scale_by_dynamic_pressure(
     )
 
 
-def whiten_samples(samples: Samples, noise_average: Sequence[float], fit_weight: float = 1.0) -> Samples:
+def whiten_samples(
+    samples: Samples, noise_ma_coefficients: Sequence[float], fit_weight: float = 1.0
+) -> Samples:
     """The flight with rates, commands and signals filtered by C(1) / C(z), C the moving average of the noise
     (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins again
     after a gap, and where a number is missing."""
@@ -167,7 +177,7 @@ def whiten_samples(samples: Samples, noise_average: Sequence[float], fit_weight:
     for begin, end in pairwise([0, *edges.tolist(), len(values)]):
         first = values[begin]
         values[begin:end] = first + lfilter(
-            [sum(noise_average)], noise_average, values[begin:end] - first, axis=0
+            [sum(noise_ma_coefficients)], noise_ma_coefficients, values[begin:end] - first, axis=0
         )
     rates, commands, new_signals = np.split(
         values, np.cumsum([part.shape[1] for part in signal_groups])[:2], axis=1
@@ -177,17 +187,17 @@ def whiten_samples(samples: Samples, noise_average: Sequence[float], fit_weight:
         rates=rates,
         commands=commands,
         signals=new_signals,
-        noise_average=tuple(noise_average),
+        noise_ma_coefficients=tuple(noise_ma_coefficients),
         fit_weight=fit_weight,
     )
 
 
-def _column_mistakes(
+def _used_column_defect_texts(
     recording: RecordedFlight, used_columns: list[str], rate_columns: list[str]
 ) -> Iterator[str]:
     """Yield a line for each mistake in the columns that are used."""
     for name in used_columns:
-        yield from signals.column_mistakes(name, recording.columns[name], measured=name in rate_columns)
+        yield from signals.column_defect_texts(name, recording.columns[name], measured=name in rate_columns)
         if (
             name in rate_columns
             and (rate_spread := float(np.nanstd(recording.columns[name].values)))
@@ -200,12 +210,12 @@ def _column_mistakes(
             )
 
 
-def _still_time_s(column: Column, t_s: Floats) -> Floats:
+def _unchanged_time_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
     column = _finite_rows(column)
     return np.nan_to_num(
-        _latest_values(t_s, column.t_s, signals.still_time_s(column)) + _held_age_s(column, t_s)
+        _latest_values(t_s, column.t_s, signals.unchanged_time_s(column)) + _held_age_s(column, t_s)
     )
 
 
@@ -230,7 +240,7 @@ def _sampled_airspeed(
     return None if column is None else values_at(column, t_s, step_s)[0]
 
 
-def _sampled_energy_climb_mps(
+def _sampled_energy_height_rate_mps(
     recording: RecordedFlight, vehicle: Vehicle, time_base: tuple[Floats, NDArray[np.int64], float]
 ) -> Floats | None:
     """As in Samples; time_base: times, stretches and step of the samples."""
@@ -242,7 +252,7 @@ def _sampled_energy_climb_mps(
         return None
     t_s, stretch_number, step_s = time_base
     altitude, airspeed = (values_at(column, t_s, step_s)[0] for column in logged_columns)
-    return energy.energy_climb_mps(t_s, altitude, airspeed, stretch_number)
+    return energy.energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
 def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:
@@ -331,7 +341,7 @@ def _sample_times(
         raise BadInput(
             f"{flight_name}: rates are logged at {rate_hz:.2g} Hz, allowed: at least "
             f"{MIN_LOG_RATE_HZ:g} Hz to tell "
-            f"a surface's effect from the vehicle's own motion{_other_time_units(rate_hz)}"
+            f"a surface's effect from the vehicle's own motion{_other_time_unit_hint(rate_hz)}"
         )
     if rate_hz > _MAX_LOG_RATE_HZ:
         raise BadInput(
@@ -350,7 +360,7 @@ def _sample_times(
     return regular_times
 
 
-def _other_time_units(rate_hz: float) -> str:
+def _other_time_unit_hint(rate_hz: float) -> str:
     """The units of time in which a log too slow would be one of 10 to 1000 Hz."""
     plausible_units = [
         unit
@@ -507,7 +517,7 @@ def first_samples(samples: Samples, count: int) -> Samples:
 def _select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
     selected = {
-        name: of[rows].copy() for name in _SAMPLE_FIELDS if (of := getattr(samples, name)) is not None
+        name: of[rows].copy() for name in _PER_SAMPLE_FIELDS if (of := getattr(samples, name)) is not None
     }
     still_s = {name: of[rows].copy() for name, of in samples.still_s.items()}
     return replace(samples, log_stamps_s=selected["t_s"], still_s=still_s, **selected)
@@ -515,7 +525,7 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
 
 def _concatenate(name: str, flights: list[Samples], n_parts: int) -> Samples:
     """Samples one after the other, with a gap between."""
-    field_names = [name for name in _SAMPLE_FIELDS if getattr(flights[0], name) is not None]
+    field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(flights[0], name) is not None]
     joined: dict[str, Any] = {
         name: np.concatenate([getattr(one, name) for one in flights]) for name in field_names
     }

@@ -52,8 +52,8 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
         "settings": frequent_settings.tolist(),
         "classes": float(
             np.mean(
-                nearest_setting(estimated_effectiveness, frequent_settings)
-                == nearest_setting(true_effectiveness, frequent_settings)
+                nearest_label_setting(estimated_effectiveness, frequent_settings)
+                == nearest_label_setting(true_effectiveness, frequent_settings)
             )
         ),
         "healthy_or_faulty": float(np.mean((rows.faulty[is_known] == 1) == is_truly_faulty)),
@@ -68,7 +68,7 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     }
 
 
-def nearest_setting(estimate: Floats, settings: Floats) -> np.ndarray:
+def nearest_label_setting(estimate: Floats, settings: Floats) -> np.ndarray:
     """Index of the setting nearest to each row."""
     squared_distance = ((estimate[:, None, :] - settings[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(squared_distance.argmin(axis=1))

@@ -12,12 +12,12 @@ from beaver_ftc_logs.recording import Column, Floats
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
 _MIN_CLIPPED_ROWS, _MIN_CLIPPED_TOTAL_ROWS = 3, 10
-_MIN_JUMP_STEPS, _MAX_JUMP_SHARE = 40.0, 0.01
+_MIN_SPIKE_STEPS, _MAX_SPIKE_SHARE = 40.0, 0.01
 
 Mask = NDArray[np.bool_]
 
 
-def still_time_s(column: Column) -> Floats:
+def unchanged_time_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
     row_index = np.arange(len(column.values))
     unchanged_since = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row_index, 0))
@@ -47,7 +47,7 @@ def is_clipped(values: Floats) -> Mask:
         level = np.cumsum(
             _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
-        n_met = np.cumsum(is_at_maximum) - _rows_at_previous_level(is_at_maximum, level)
+        n_met = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(is_at_maximum, level)
         clipped |= (
             is_at_maximum
             & (row_index - at_maximum_since >= _MIN_CLIPPED_ROWS - 1)
@@ -56,7 +56,7 @@ def is_clipped(values: Floats) -> Mask:
     return clipped
 
 
-def _rows_at_previous_level(is_at_maximum: Mask, level: NDArray[np.int64]) -> NDArray[np.int64]:
+def _count_rows_at_previous_maxima(is_at_maximum: Mask, level: NDArray[np.int64]) -> NDArray[np.int64]:
     """Count the rows at the largest value before the present one was reached."""
     n_at_maximum = np.cumsum(is_at_maximum)
     first_rows = np.flatnonzero(np.diff(level, prepend=0))
@@ -67,35 +67,37 @@ def _rows_at_previous_level(is_at_maximum: Mask, level: NDArray[np.int64]) -> ND
     )
 
 
-def find_jump_rows(values: Floats) -> NDArray[np.int64]:
+def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     """Single rows that leave the signal by 40 times its usual step and come back, where these are few."""
     finite_rows = np.flatnonzero(np.isfinite(values))
     if len(finite_rows) < MIN_STILL_ROWS:
         return finite_rows[:0]
     steps = np.diff(values[finite_rows])
     usual_step = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    is_jump = (np.abs(steps[:-1]) > _MIN_JUMP_STEPS * usual_step) & (
-        np.abs(steps[1:]) > _MIN_JUMP_STEPS * usual_step
+    is_jump = (np.abs(steps[:-1]) > _MIN_SPIKE_STEPS * usual_step) & (
+        np.abs(steps[1:]) > _MIN_SPIKE_STEPS * usual_step
     )
     is_jump &= steps[:-1] * steps[1:] < 0.0
     jumps = finite_rows[1:-1][is_jump]
-    return jumps if usual_step > 0.0 and len(jumps) <= _MAX_JUMP_SHARE * len(finite_rows) else finite_rows[:0]
+    return (
+        jumps if usual_step > 0.0 and len(jumps) <= _MAX_SPIKE_SHARE * len(finite_rows) else finite_rows[:0]
+    )
 
 
-def column_mistakes(name: str, column: Column, measured: bool) -> list[str]:
+def column_defect_texts(name: str, column: Column, measured: bool) -> list[str]:
     """Return a line for each mistake in a column over the whole flight. measured: a rate, not a command."""
     values, lines = column.values, [column.note] if column.note else []
     n_missing = int((~np.isfinite(values)).sum())
     if n_missing:
         lines.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
-    longest_still_s = float(still_time_s(column).max(initial=0.0))
+    longest_still_s = float(unchanged_time_s(column).max(initial=0.0))
     if measured and longest_still_s > MIN_STILL_S:
         lines.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
     if not measured and values.size and np.nanmin(values) == np.nanmax(values):
         lines.append(f"{name}: does not move, nothing can be said of what it moves alone")
     if measured and (rows := is_clipped(values)).any():
         lines.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
-    if measured and len(jump_places := find_jump_rows(values)):
-        jump_count_text = "1 jump" if len(jump_places) == 1 else f"{len(jump_places)} jumps"
-        lines.append(f"{name}: {jump_count_text}, the first at {column.t_s[jump_places[0]]:.2f} s")
+    if measured and len(spike_rows := find_spike_rows(values)):
+        jump_count_text = "1 jump" if len(spike_rows) == 1 else f"{len(spike_rows)} jumps"
+        lines.append(f"{name}: {jump_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
     return lines

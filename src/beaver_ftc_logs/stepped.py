@@ -16,12 +16,12 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import coefficient_bounds, split_into_flight_parts
+from beaver_ftc_logs.regression import coefficient_upper_bounds, split_into_flight_parts
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
-EXCLUSION_MEMORY_S = 1.0
+EFFECTIVENESS_BOUND_WINDOW_S = 1.0
 _LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
-_INFORMATION_SHARE = 0.4
+_EFFECTIVE_SAMPLE_SHARE = 0.4
 _DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
@@ -66,7 +66,7 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
         innovation[:, :, None], innovation_bound[:, :, None], expected_effect
     )
     loss_bounds[0][0], loss_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
-    memory_samples = max(round(EXCLUSION_MEMORY_S * rate_hz), 1)
+    memory_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
     low, high = (
         1.0 + _sliding_maximum(loss_bounds[0], memory_samples),
         1.0 - _sliding_maximum(-loss_bounds[1], memory_samples),
@@ -91,8 +91,10 @@ def _max_command_gains(innovation: Floats, expected_effect: Floats) -> Floats:
     )
     scaled_innovation, max_gains = innovation / innovation_sd, np.full(expected_effect.shape[2], -np.inf)
     for part in parts:
-        theta, _ = coefficient_bounds(
-            regressors[part].reshape(3 * len(part), -1), scaled_innovation[part].ravel(), _INFORMATION_SHARE
+        theta, _ = coefficient_upper_bounds(
+            regressors[part].reshape(3 * len(part), -1),
+            scaled_innovation[part].ravel(),
+            _EFFECTIVE_SAMPLE_SHARE,
         )
         max_gains = np.maximum(max_gains, 1.0 + theta[3:])
     return max_gains

@@ -21,7 +21,7 @@ from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.readings import corrected_readings
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.samples import NOISE_AVERAGE_CANDIDATES, Samples, whiten_samples
+from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 
 Mask = NDArray[np.bool_]
@@ -30,17 +30,17 @@ _RANGE_MARGIN = 0.5
 """Share of its span by which a range is passed before a row is outside."""
 _AIRSPEED_MARGIN = 0.15
 _RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
-_STILL_TIME_FACTOR = 3.0
+_UNCHANGED_TIME_FACTOR = 3.0
 _MISREAD_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _CLIPPED_MEMORY_S = 30.0
-_MIN_EFFECT_NOISE_RATIO = 1e-6
+_MIN_EFFECT_NOISE_POWER_RATIO = 1e-6
 _MAX_EXPLAINED_SHARE, _MAX_EFFECT_NOISE_POWER_RATIO = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_RATE_SPREAD_RATIO, _RATE_SPREAD_FACTOR = 10.0, 1.6
 _ALIKE_MOTION_FACTOR, _OTHER_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
-_SPAN_QUANTILES = (0.001, 0.999)
+_RANGE_QUANTILES = (0.001, 0.999)
 _MEDIAN_CHI_SQUARE_3 = 2.366
 """The median of a square of three axes."""
 MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN, _MIN_COLUMN_GAIN = -0.3, 0.2, 0.5
@@ -67,23 +67,25 @@ def fitted_ranges(
         airspeed=central_range(np.concatenate(known_airspeeds)[:, None])[0] if known_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_column_correlation(group_commands).tolist(),
-        tied=explained_effect_share(flights, model).tolist(),
+        tied=effect_share_explained_by_others(flights, model).tolist(),
         gain_sd=gain_sd.tolist(),
-        still_s=_longest_still_times_s(flights),
+        still_s=_longest_unchanged_times_s(flights),
         scale=noise_scale,
-        energy_climb=_unpowered_climb_mps(flights),
+        energy_climb=_unpowered_energy_height_rate_mps(flights),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
     )
 
 
-def _unpowered_climb_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
+def _unpowered_energy_height_rate_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
     known_climbs = [
-        one.energy_climb_mps[is_used] for one, is_used in flights if one.energy_climb_mps is not None
+        one.energy_height_rate_mps[is_used]
+        for one, is_used in flights
+        if one.energy_height_rate_mps is not None
     ]
     values = np.concatenate(known_climbs) if known_climbs else np.empty(0)
     values = values[np.isfinite(values)]
-    return float(np.quantile(values, energy.UNPOWERED_CLIMB_QUANTILE)) if values.size else None
+    return float(np.quantile(values, energy.UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE)) if values.size else None
 
 
 def central_range(values: Floats) -> list[list[float]]:
@@ -91,7 +93,7 @@ def central_range(values: Floats) -> list[list[float]]:
     if not values.shape[1]:
         return []
     known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
-    return np.nanquantile(known, _SPAN_QUANTILES, axis=0).T.tolist()
+    return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
 def _column_correlation(values: Floats) -> Floats:
@@ -100,7 +102,7 @@ def _column_correlation(values: Floats) -> Floats:
     return np.asarray(centred.T @ centred / np.maximum(np.outer(size, size), MIN_DIVISOR))
 
 
-def _longest_still_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+def _longest_unchanged_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
     names = dict.fromkeys(name for samples, _ in flights for name in samples.still_s)
     return {
         name: max((float(one.still_s[name].max(initial=0.0)) for one, _ in flights if name in one.still_s))
@@ -108,12 +110,12 @@ def _longest_still_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str,
     }
 
 
-def explained_effect_share(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def effect_share_explained_by_others(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
     effect_power, unexplained_power = _effect_powers(flights, model)
-    has_moved = effect_power > _MIN_EFFECT_NOISE_RATIO
+    has_moved = effect_power > _MIN_EFFECT_NOISE_POWER_RATIO
     explained_share = 1.0 - unexplained_power / np.minimum(
         np.where(has_moved, effect_power, 1.0), _MAX_EFFECT_NOISE_POWER_RATIO
     )
@@ -149,7 +151,7 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
         effect = commands[:, g] @ response[g] @ whiten
         effect = effect - effect.mean(axis=0)
         effect_power[g] = float((effect**2).sum()) / len(effect)
-        if effect_power[g] > _MIN_EFFECT_NOISE_RATIO:
+        if effect_power[g] > _MIN_EFFECT_NOISE_POWER_RATIO:
             unexplained_effect = (
                 effect - other_regressors @ np.linalg.lstsq(other_regressors, effect, rcond=None)[0]
             )
@@ -157,16 +159,16 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     return effect_power, unexplained_power
 
 
-def groups_with_known_effect(model: Model) -> list[bool]:
+def is_group_effect_known(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
     if model.fitted is None or not model.fitted.tied:
         return [True] * len(model.groups)
     return [share < _MAX_EXPLAINED_SHARE for share in model.fitted.tied]
 
 
-def groups_with_known_gain(model: Model) -> list[bool]:
+def is_group_gain_known(model: Model) -> list[bool]:
     """Whether the effect of each group is known under any law: the model may not err by all of it."""
-    has_known_effect = groups_with_known_effect(model)
+    has_known_effect = is_group_effect_known(model)
     if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
         return has_known_effect
     return [
@@ -177,11 +179,11 @@ def groups_with_known_gain(model: Model) -> list[bool]:
 
 def surfaces_of_unknown_effect(model: Model) -> set[str]:
     """The surfaces of which nothing is said."""
-    pairs = zip(model.groups, groups_with_known_effect(model), strict=True)
+    pairs = zip(model.groups, is_group_effect_known(model), strict=True)
     return {name for group, has_known_effect in pairs if not has_known_effect for name in group}
 
 
-def unknown_effect_lines(model: Model) -> list[str]:
+def unknown_effect_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
     if model.fitted is None:
         return []
@@ -189,7 +191,7 @@ def unknown_effect_lines(model: Model) -> list[str]:
     return [
         f"{says.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
         for group, share, has_known_effect in zip(
-            model.groups, model.fitted.tied, groups_with_known_effect(model), strict=False
+            model.groups, model.fitted.tied, is_group_effect_known(model), strict=False
         )
         if not has_known_effect
     ]
@@ -257,7 +259,7 @@ def check_command_units(
             )
 
 
-class _PartGains(NamedTuple):
+class _FlightPartGains(NamedTuple):
     """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
     log likelihood of a sample of each part, (4,), but for what all colours have alike."""
@@ -265,11 +267,11 @@ class _PartGains(NamedTuple):
     max_group_gains: list[float]
     min_group_gains: list[float]
     max_column_gains: dict[str, float]
-    min_noise_scale: float
+    min_noise_variance_scale: float
     log_likelihoods: Floats
 
 
-def check_columns(samples: Samples, model: Model) -> None:
+def check_columns_as_identified(samples: Samples, model: Model) -> None:
     """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
     flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
     since no fault has always been there and changes what is not its own.
@@ -277,7 +279,7 @@ def check_columns(samples: Samples, model: Model) -> None:
     What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
     answer is refused only where it is wrong by each colour of the noise that is likelier, too. A model that
     knows the effect of no surface says nothing of any flight, and refuses none."""
-    if not any(groups_with_known_effect(model)):
+    if not any(is_group_effect_known(model)):
         return
     whitened_readings = [
         (whiten_samples(samples, one.average), model.with_single_noise_model(one)) for one in model.colours
@@ -294,8 +296,8 @@ def check_columns(samples: Samples, model: Model) -> None:
     if part_gains is None:
         return
     mistakes = _column_mistakes(samples, model, part_gains)
-    for noise_average in NOISE_AVERAGE_CANDIDATES if mistakes else ():
-        other_gains = _bound_part_gains(whiten_samples(samples, noise_average), model)
+    for noise_ma_coefficients in NOISE_MA_CANDIDATES if mistakes else ():
+        other_gains = _bound_part_gains(whiten_samples(samples, noise_ma_coefficients), model)
         if other_gains is not None and other_gains.log_likelihoods.mean() > part_gains.log_likelihoods.mean():
             other_mistakes = _column_mistakes(samples, model, other_gains)
             mistakes = {what: says for what, says in mistakes.items() if what in other_mistakes}
@@ -305,10 +307,10 @@ def check_columns(samples: Samples, model: Model) -> None:
         raise BadInput(f"{samples.name}: {says}, {allowed}")
 
 
-def _column_mistakes(samples: Samples, model: Model, part_gains: _PartGains) -> dict[str, str]:
+def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGains) -> dict[str, str]:
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
-    mistakes, gain_known = {}, groups_with_known_gain(model)
+    mistakes, gain_known = {}, is_group_gain_known(model)
     for group, has_known_gain, max_gain, min_gain in zip(
         model.groups, gain_known, part_gains.max_group_gains, part_gains.min_group_gains, strict=True
     ):
@@ -331,7 +333,9 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _PartGains) -> 
             effect_text = f"does at least {min_gain:.3g} times what it did"
             mistakes[f"unit {name}"] = f"{command} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
     if odd_columns := [
-        name for name, share in part_gains.max_column_gains.items() if share < _least_column_gain(model, name)
+        name
+        for name, share in part_gains.max_column_gains.items()
+        if share < _min_plausible_column_gain(model, name)
     ]:
         says = (
             f"what the rates answer to {', '.join(odd_columns)} is not what it is in the model, in all of it"
@@ -340,7 +344,7 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _PartGains) -> 
     return mistakes
 
 
-def _least_column_gain(model: Model, name: str) -> float:
+def _min_plausible_column_gain(model: Model, name: str) -> float:
     """The gain of what the rates answer to a column below which it is another: below what the model's error
     explains; none where that may be all of it."""
     gain_sd = model.fitted.column_sd.get(name, 0.0) if model.fitted is not None else 0.0
@@ -356,7 +360,7 @@ def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
     holds for a correct model. The flight must be likelier by as much more as flights were that the model was
     not fitted on, whose columns are right, and by as much again for another law (`FittedRanges.misread`).
     """
-    gain_of_mistake, n_part_samples = log_likelihood_gains(samples, model)
+    gain_of_mistake, n_part_samples = log_likelihood_gain_of_corrections(samples, model)
     if not gain_of_mistake:
         return None
     says, largest_gain = max(gain_of_mistake.items(), key=lambda one: one[1])
@@ -370,7 +374,7 @@ def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
     return f"each part of the flight is at least 10^{log10_ratio:.0f} times as likely with {says}"
 
 
-def log_likelihood_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
+def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
     corrected = list(corrected_readings(samples, model.vehicle, surfaces_of_unknown_effect(model)))
@@ -390,10 +394,10 @@ def log_likelihood_gains(samples: Samples, model: Model) -> tuple[dict[str, floa
 
 
 def _part_log_likelihoods(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """Log likelihood of a sample of each part, as in `_PartGains`, and as how many white samples a part
+    """Log likelihood of a sample of each part, as in `_FlightPartGains`, and as how many white samples a part
     counts; of a long flight every k-th sample is taken. None where a part is too short."""
-    whitening, information_share, log_noise_size = _flight_noise_whitening(samples, model)
-    is_predictable, unexplained, responses = regression.split_whitened_response(samples, model)
+    whitening, effective_sample_share, log_noise_size = _flight_noise_whitening(samples, model)
+    is_predictable, unexplained, responses = regression.whitened_rates_and_responses(samples, model)
     rows = np.flatnonzero(is_predictable)
     if (
         parts := regression.split_into_flight_parts(rows[:: max(len(rows) // _MAX_COMPARED_SAMPLES, 1)])
@@ -401,20 +405,21 @@ def _part_log_likelihoods(samples: Samples, model: Model) -> tuple[Floats, float
         return None
     fits = [_trim_and_gain_regression(part, unexplained, responses, whitening) for part in parts]
     noise_scales = [
-        _noise_variance_scale(regression.coefficient_bounds(x, y, information_share)[1]) for x, y in fits
+        _noise_variance_scale(regression.coefficient_upper_bounds(x, y, effective_sample_share)[1])
+        for x, y in fits
     ]
-    return -log_noise_size - 1.5 * np.log(noise_scales), information_share * min(map(len, parts))
+    return -log_noise_size - 1.5 * np.log(noise_scales), effective_sample_share * min(map(len, parts))
 
 
 def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
     """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    noise_inflation = model.noise_inflation(samples.noise_average)
+    noise_inflation = model.noise_inflation(samples.noise_ma_coefficients)
     noise_root = np.linalg.cholesky(
-        model.with_noise_model(samples.noise_average).coefficient_arrays()[3] / noise_inflation
+        model.with_noise_model(samples.noise_ma_coefficients).coefficient_arrays()[3] / noise_inflation
     )
     log_noise_size = float(
-        np.log(np.diag(noise_root)).sum() - 3.0 * np.log(sum(samples.noise_average or (1.0,)))
+        np.log(np.diag(noise_root)).sum() - 3.0 * np.log(sum(samples.noise_ma_coefficients or (1.0,)))
     )
     return np.linalg.inv(noise_root).T, model.settings.power / noise_inflation, log_noise_size
 
@@ -435,14 +440,16 @@ def _noise_variance_scale(squared_residual: Floats) -> float:
     return float(np.median(squared_residual.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3)
 
 
-def _bound_part_gains(samples: Samples, model: Model) -> _PartGains | None:
+def _bound_part_gains(samples: Samples, model: Model) -> _FlightPartGains | None:
     """None where a part is too short."""
-    is_predictable, unexplained, responses = regression.split_whitened_response(samples, model)
+    is_predictable, unexplained, responses = regression.whitened_rates_and_responses(samples, model)
     if (parts := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
         return None
-    columns, names = _column_contributions(samples, model)
-    columns = regression.subtract_noise_prediction(columns, model.noise_predictor(samples.noise_average))
-    (whitening, information_share, log_noise_size), n_groups = (
+    columns, names = _column_contributions_to_rates(samples, model)
+    columns = regression.subtract_noise_prediction(
+        columns, model.noise_predictor(samples.noise_ma_coefficients)
+    )
+    (whitening, effective_sample_share, log_noise_size), n_groups = (
         _flight_noise_whitening(samples, model),
         len(model.groups),
     )
@@ -454,13 +461,15 @@ def _bound_part_gains(samples: Samples, model: Model) -> _PartGains | None:
     noise_scales, all_responses = [], np.concatenate([responses, columns], axis=1)
     for part in parts:
         regressors, whitened_residual = _trim_and_gain_regression(part, unexplained, all_responses, whitening)
-        max_gain, squared_residual = regression.coefficient_bounds(
-            regressors[:, : 3 + n_groups], whitened_residual, information_share
+        max_gain, squared_residual = regression.coefficient_upper_bounds(
+            regressors[:, : 3 + n_groups], whitened_residual, effective_sample_share
         )
-        negated_min_gain, _ = regression.coefficient_bounds(
-            -regressors[:, : 3 + n_groups], whitened_residual, information_share
+        negated_min_gain, _ = regression.coefficient_upper_bounds(
+            -regressors[:, : 3 + n_groups], whitened_residual, effective_sample_share
         )
-        column_gain, _ = regression.coefficient_bounds(regressors, whitened_residual, information_share)
+        column_gain, _ = regression.coefficient_upper_bounds(
+            regressors, whitened_residual, effective_sample_share
+        )
         max_gains, min_gains = (
             np.maximum(max_gains, max_gain[3:]),
             np.minimum(min_gains, -negated_min_gain[3:]),
@@ -469,7 +478,7 @@ def _bound_part_gains(samples: Samples, model: Model) -> _PartGains | None:
             max_column_gains, 1.0 + column_gain[3 + n_groups :]
         )  # what the past does is taken off already
         noise_scales.append(_noise_variance_scale(squared_residual))
-    return _PartGains(
+    return _FlightPartGains(
         max_gains.tolist(),
         min_gains.tolist(),
         dict(zip(names, max_column_gains.tolist(), strict=True)),
@@ -489,22 +498,22 @@ def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -
     return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
 
-def _column_contributions(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
+def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
     """Compute the contribution of each column to each predicted sample: rates of the other axes, and signals,
     (n, C, 3); and their names."""
     n_signal_lags = model.vehicle.n_signal_lags(model.history)
     past, _, _ = regression.build_regressors(samples, [[0]], model.history, 1, False, n_signal_lags)
-    parts = cross_coefficients(model)
+    parts = cross_axis_coefficients(model)
     return np.stack([past[:, rows] @ coefficients for rows, coefficients in parts.values()], axis=1), list(
         parts
     )
 
 
-def cross_coefficients(model: Model) -> dict[str, tuple[list[int], Floats]]:
+def cross_axis_coefficients(model: Model) -> dict[str, tuple[list[int], Floats]]:
     """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
     rate on its own axis."""
     rates = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-    names = rates * model.history + model.vehicle.past_regressor_names * model.vehicle.n_signal_lags(
+    names = rates * model.history + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(
         model.history
     )
     coefficients, rows_of_column = np.array(model.past), dict[str, list[int]]()
@@ -519,12 +528,12 @@ def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:
     return np.ptp(np.array(ranges, dtype=float).reshape(-1, 2), axis=1)
 
 
-def rows_outside_model(samples: Samples, model: Model) -> dict[str, Mask]:
+def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
     reasons: dict[str, Mask] = {}
-    for name, max_still_s in _max_still_s(samples, model).items():
-        reasons[f"{name} stands still, for longer than {max_still_s:.3g} s"] = (
-            samples.still_s[name] > max_still_s
+    for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
+        reasons[f"{name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
+            samples.still_s[name] > max_unchanged_time_s
         )
     if samples.is_rate_clipped is not None:
         reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
@@ -552,7 +561,7 @@ def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRan
     names = [f"command of {surface}" for surface in model.vehicle.surfaces]
     columns = [
         *zip(names, samples.commands.T, fitted.commands, strict=False),
-        *zip(_rate_columns(model), samples.rates.T, fitted.rates, strict=False),
+        *zip(_rate_column_names(model), samples.rates.T, fitted.rates, strict=False),
     ]
     reasons = {}
     for name, values, (low, high) in columns:
@@ -585,37 +594,40 @@ def _mostly_true_recently(is_true: Mask, samples: Samples) -> Mask:
     return np.asarray(n_true[1:] - n_true[begin] > _MIN_OUTSIDE_SHARE * (end - begin))
 
 
-def _rate_columns(model: Model) -> list[str]:
+def _rate_column_names(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _max_still_s(samples: Samples, model: Model) -> dict[str, float]:
+def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of STILL_S on."""
-    fitted_still_s = model.fitted.still_s if model.fitted else {}
-    usual_still_s = {
-        name: 0.0 if name in _rate_columns(model) else np.inf for name in samples.still_s
-    } | fitted_still_s
-    min_still_s = {
-        name: MIN_STILL_S / 3.0 if name in fitted_still_s and name in _rate_columns(model) else MIN_STILL_S
-        for name in usual_still_s
+    fitted_unchanged_time_s = model.fitted.still_s if model.fitted else {}
+    usual_unchanged_time_s = {
+        name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.still_s
+    } | fitted_unchanged_time_s
+    min_unchanged_time_s = {
+        name: MIN_STILL_S / 3.0
+        if name in fitted_unchanged_time_s and name in _rate_column_names(model)
+        else MIN_STILL_S
+        for name in usual_unchanged_time_s
     }
     return {
-        name: max(min_still_s[name], _STILL_TIME_FACTOR * usual_still_s[name]) for name in samples.still_s
+        name: max(min_unchanged_time_s[name], _UNCHANGED_TIME_FACTOR * usual_unchanged_time_s[name])
+        for name in samples.still_s
     }
 
 
-def is_dead_sample(samples: Samples, model: Model) -> Mask:
+def is_frozen_or_clipped_sample(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
     is_dead = np.zeros(len(samples.t_s), dtype=bool)
-    for name, max_still_s in _max_still_s(samples, model).items():
-        is_dead |= samples.still_s[name] > max_still_s
+    for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
+        is_dead |= samples.still_s[name] > max_unchanged_time_s
     return is_dead if samples.is_rate_clipped is None else is_dead | samples.is_rate_clipped
 
 
-def with_dead_rates_unknown(samples: Samples, model: Model) -> Samples:
+def with_rates_unknown_where_frozen_or_clipped(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live."""
-    is_dead = is_dead_sample(samples, model)
+    is_dead = is_frozen_or_clipped_sample(samples, model)
     if not is_dead.any():
         return samples
     return replace(samples, rates=np.where(is_dead[:, None], np.nan, samples.rates))

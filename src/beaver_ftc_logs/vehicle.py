@@ -271,7 +271,7 @@ class Vehicle(Section):
             if one.unit is not None and UNITS[one.unit][0] != kind:
                 says = f"{one.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 conflicts.append(((*location, "unit"), says))
-        conflicts += self._duplicate_columns()
+        conflicts += self._duplicate_column_conflicts()
         refuse(conflicts)
         return self
 
@@ -297,7 +297,7 @@ class Vehicle(Section):
                 quantities.append((("flow", name), ANGLE, self.flow[name]))
         return quantities
 
-    def _duplicate_columns(self) -> list[Conflict]:
+    def _duplicate_column_conflicts(self) -> list[Conflict]:
         """One column read in two ways."""
         first_quantity: dict[str, Quantity] = {}
         for location, one in [
@@ -345,7 +345,7 @@ class Vehicle(Section):
         return [float(self.airspeed_powers.get(name, 2.0)) for name in self.surfaces]
 
     @property
-    def past_regressor_names(self) -> list[str]:
+    def signal_regressor_names(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.scale_by_dynamic_pressure`)."""
         rates = [getattr(self.rates, axis).column for axis in "pqr"]

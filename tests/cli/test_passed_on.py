@@ -194,7 +194,7 @@ MISMATCH = {
 IDENTIFY = {
     "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
     "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
-    "beaver_ftc_logs__identification__scale_commands_by_pressure": (
+    "beaver_ftc_logs__identification__scale_commands_by_dynamic_pressure": (
         [SimpleNamespace(name="pressed", n_parts=2, notes=["long"])],
         "described",
     ),
@@ -208,11 +208,11 @@ IDENTIFY = {
     "beaver_ftc_logs__pages__refuse_to_replace_foreign_file": None,
 }
 DIAGNOSE = {
-    "beaver_ftc_logs__detectors__check_detector": None,
+    "beaver_ftc_logs__detectors__check_detector_name": None,
     "beaver_ftc_logs__model__load_model": SimpleNamespace(vehicle="vehicle", groups="groups"),
     "beaver_ftc_logs__samples__stream_flights": ["one", "two"],
     "beaver_ftc_logs__findings__as_text": lambda each: each["flight"],
-    "beaver_ftc_logs__detectors__diagnose_with": "rows",
+    "beaver_ftc_logs__detectors__diagnose_with_detector": "rows",
     "beaver_ftc_logs__findings__verdict_document": lambda of, *_: {"flight": of},
     "beaver_ftc_logs__scoring__score_diagnosis": 0.5,
     "beaver_ftc_logs__pages__write_diagnosis": "folder",

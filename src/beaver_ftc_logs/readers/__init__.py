@@ -8,7 +8,7 @@ from typing import Any
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import RecordedFlight
 
-PART_ROWS = 100_000
+ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
 READERS = ("table", "alfa", "ulog", "ardupilot")
 _READER_OF_SUFFIX = {
@@ -43,7 +43,7 @@ def read_parts(
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read(path, reader, time, {"columns": columns, "rows_per_part": PART_ROWS})
+    return _read(path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART})
 
 
 def _read(

@@ -24,12 +24,12 @@ from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFli
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"
 _GYRO_TOPIC = "mavros-imu-data_raw"
-_STATUS_PREFIX = "failure_status-"
+_FAILURE_STATUS_PREFIX = "failure_status-"
 
 TopicTable = dict[str, Floats]
 
 
-def _share_of_pulse_width(values: Floats) -> Floats:
+def _travel_share_of_pulse_width(values: Floats) -> Floats:
     """Pulse width about its neutral, as a share of the half range of 400 us."""
     return (values - 1500.0) / 400.0
 
@@ -37,12 +37,12 @@ def _share_of_pulse_width(values: Floats) -> Floats:
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
     "": np.asarray,
     "deg": np.deg2rad,
-    "us": _share_of_pulse_width,
+    "us": _travel_share_of_pulse_width,
 }
 
 
 @cache
-def _load_topic_table() -> dict[str, dict[str, Any]]:
+def _load_topic_of_column() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
     found: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
@@ -66,10 +66,10 @@ def read(path: Path) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    wanted = {topic for topic, _, _ in _load_topic_table()["columns"].values()}
+    wanted = {topic for topic, _, _ in _load_topic_of_column()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
-        if topic in wanted or topic.startswith(_STATUS_PREFIX):
+        if topic in wanted or topic.startswith(_FAILURE_STATUS_PREFIX):
             table = read_numbers(file)
             if np.isfinite(table.get(_TIME_FIELD, np.empty(0))).any():
                 yield topic, table
@@ -78,7 +78,7 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 def _read_columns(
     topics: dict[str, TopicTable], ordered: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
 ) -> Iterator[tuple[str, Column]]:
-    for name, (topic, field, unit) in _load_topic_table()["columns"].items():
+    for name, (topic, field, unit) in _load_topic_of_column()["columns"].items():
         if field in topics.get(topic, {}):
             kept_rows, note = ordered[topic]
             t_s = (topics[topic][_TIME_FIELD][kept_rows] - origin_ns) * _S_PER_NS
@@ -110,11 +110,11 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
 
 def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
     for topic, table in topics.items():
-        if topic.startswith(_STATUS_PREFIX):
-            part = topic.removeprefix(_STATUS_PREFIX)
+        if topic.startswith(_FAILURE_STATUS_PREFIX):
+            part = topic.removeprefix(_FAILURE_STATUS_PREFIX)
             stamps = table[_TIME_FIELD]
             codes = np.where(np.isfinite(stamps), table.get("field.data", np.nan), np.nan)
             for code in sorted(set(codes[np.isfinite(codes)])):
                 first = int(np.argmax(codes == code))
                 t_s = float((stamps[first] - origin_ns) * _S_PER_NS)
-                yield LoggedFailure(t_s, _load_topic_table()["failures"].get(f"{part} {int(code)}", part))
+                yield LoggedFailure(t_s, _load_topic_of_column()["failures"].get(f"{part} {int(code)}", part))

@@ -20,7 +20,7 @@ from beaver_ftc_logs.recording import Floats
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 _LAYOUT_HEAD_BYTES, _MAX_LAYOUT_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
-_MAX_BROKEN_SHARE = 0.1
+_MAX_BROKEN_LINE_SHARE = 0.1
 """Share of lines with another number of cells that a table may have."""
 
 
@@ -139,7 +139,7 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
             column_names=layout.column_names, skip_rows=layout.header_line + 1, block_size=_BLOCK_BYTES
         ),
         "parse_options": csv.ParseOptions(
-            delimiter=layout.delimiter, invalid_row_handler=_record_broken_lines(broken_lines)
+            delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken_lines)
         ),
         "convert_options": _all_text_conversion(layout.column_names, wanted),
     }
@@ -159,14 +159,14 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
 def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
     """Raise BadInput where too many lines have another number of cells than the header."""
     n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
-    if n_broken > _MAX_BROKEN_SHARE * n_lines:
+    if n_broken > _MAX_BROKEN_LINE_SHARE * n_lines:
         text = f"{n_broken} of {n_lines} lines have another number of cells than the header"
         raise _unreadable_error(
             path, f"{text}, {len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
         )
 
 
-def _record_broken_lines(broken_lines: list[str]) -> Callable[[Any], str]:
+def _broken_line_recorder(broken_lines: list[str]) -> Callable[[Any], str]:
     def record_line(row: Any) -> str:
         broken_lines.append((row.text or "")[:60])
         return "skip"

@@ -19,13 +19,13 @@ from beaver_ftc.results import Document, as_json
 from beaver_ftc.studies.engine import poisson
 from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with
+from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with_detector
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.fitting import (
     Stretch,
     add_validity_range,
     fit_model,
-    score_folds,
+    score_folds_and_choose_credible_mass,
     usable_stretches,
     validation_folds,
 )
@@ -125,7 +125,7 @@ def _compare_methods(data: FlightDataSet) -> Document:
         recording = next(one for one in data.recordings if one.name == kept.samples.name)
         flights += [
             {"left_out": name, "method": method, **_score_against_log(kept, rows, model)}
-            for method, rows in _rows_of_methods(recording, kept, model)
+            for method, rows in _diagnosis_rows_of_methods(recording, kept, model)
         ]
     labelled = "classes" in flights[0]
     summarise = summarize_labels if labelled else summarize_failures
@@ -142,12 +142,15 @@ def _compare_methods(data: FlightDataSet) -> Document:
     }
 
 
-def _rows_of_methods(
+def _diagnosis_rows_of_methods(
     recording: RecordedFlight, kept: Stretch, model: Model
 ) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
-        yield METHOD_TITLES.get(name, f"{name}, of the loop"), diagnose_with(name, kept.samples, model)
+        yield (
+            METHOD_TITLES.get(name, f"{name}, of the loop"),
+            diagnose_with_detector(name, kept.samples, model),
+        )
     frozen = diagnose_by_freeze_rule(recording, kept.samples, model)
     if frozen is not None:
         yield FREEZE_RULE_TITLE, frozen
@@ -158,7 +161,9 @@ def settings_of_whole_flight(stretches: list[Stretch], data: FlightDataSet) -> F
     model = fit_model(stretches, data.vehicle)
     if len(stretches) > 1:
         return model.settings
-    return model.settings.model_copy(update={"bounds": score_folds(stretches, model)[1]})
+    return model.settings.model_copy(
+        update={"bounds": score_folds_and_choose_credible_mass(stretches, model)[1]}
+    )
 
 
 def _score_against_log(kept: Stretch, rows: DiagnosisRows, model: Model) -> Document:

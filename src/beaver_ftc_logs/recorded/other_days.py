@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.detectors import BANK_OF_FILTERS, diagnose_with
+from beaver_ftc_logs.detectors import BANK_OF_FILTERS_DETECTOR, diagnose_with_detector
 from beaver_ftc_logs.fitting import Stretch, fit_model, usable_stretches, validation_folds
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
@@ -32,16 +32,17 @@ _TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
 class DayChanges:
     """Changes from the recorded day to another one.
 
-    trim_commands (S,): moment of another loading or rigging, in commands of each surface, behind the fault: a
-    weak surface needs more command for it. neutral_commands (S,): the same ahead of the fault. common_gain:
-    of all surfaces on the motion about trim (airspeed). surface_gains (S,). command_delay_s: by which
-    commands act later. motion_scale: of all motion, at the same noise. noise_ratio: standard deviation of the
-    air's share in the rates, over that of the day we have. trim_drift: wander of the trim, in commands.
+    trim_shift_commands (S,): moment of another loading or rigging, in commands of each surface, behind the
+    fault: a weak surface needs more command for it. neutral_shift_commands (S,): the same ahead of the fault.
+    common_gain: of all surfaces on the motion about trim (airspeed). surface_gains (S,). command_delay_s: by
+    which commands act later. motion_scale: of all motion, at the same noise. noise_ratio: standard deviation
+    of the air's share in the rates, over that of the day we have. trim_drift: wander of the trim, in
+    commands.
     """
 
     name: str
-    trim_commands: Floats
-    neutral_commands: Floats
+    trim_shift_commands: Floats
+    neutral_shift_commands: Floats
     surface_gains: Floats
     common_gain: float = 1.0
     command_delay_s: float = 0.0
@@ -63,14 +64,16 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
         for shift in (-0.04, 0.04):
             days.append(
                 replace(
-                    unchanged, name=f"trim of {command} {shift:+.2f}", trim_commands=shift * surface_shares
+                    unchanged,
+                    name=f"trim of {command} {shift:+.2f}",
+                    trim_shift_commands=shift * surface_shares,
                 )
             )
             days.append(
                 replace(
                     unchanged,
                     name=f"neutral of {command} {shift:+.2f}",
-                    neutral_commands=shift * surface_shares,
+                    neutral_shift_commands=shift * surface_shares,
                 )
             )
     days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
@@ -101,8 +104,8 @@ def _draw_day(n_surfaces: int, seed: int) -> DayChanges:
     rng = np.random.default_rng([20, seed])
     return DayChanges(
         name=f"drawn {seed}",
-        trim_commands=0.015 * rng.standard_normal(n_surfaces),
-        neutral_commands=0.01 * rng.standard_normal(n_surfaces),
+        trim_shift_commands=0.015 * rng.standard_normal(n_surfaces),
+        neutral_shift_commands=0.01 * rng.standard_normal(n_surfaces),
         surface_gains=np.exp(0.03 * rng.standard_normal(n_surfaces)),
         common_gain=float(np.exp(0.1 * rng.standard_normal())),
         command_delay_s=float(0.02 * rng.standard_normal()),
@@ -125,7 +128,7 @@ def apply_day_changes(
         day.common_gain * day.surface_gains
     )
     trim_wander = day.trim_drift * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
-    commands = commands + day.neutral_commands + (day.trim_commands + trim_wander) / effectiveness
+    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + trim_wander) / effectiveness
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
     extra_noise = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
@@ -203,7 +206,7 @@ def _day_scores(
         whole_model.coefficient_arrays()[3],
     )
     for day in days:
-        scores: dict[str, list[Document]] = {BANK_OF_FILTERS: [], _RIVAL_DETECTOR: []}
+        scores: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, kept in models:
             altered, labels = (
                 apply_day_changes(day, kept.samples, past_coefficients, noise_covariance),
@@ -211,13 +214,13 @@ def _day_scores(
             )
             for name, method_scores in scores.items():
                 method_scores.append(
-                    scoring.score_against_labels(diagnose_with(name, altered, model), labels)
+                    scoring.score_against_labels(diagnose_with_detector(name, altered, model), labels)
                 )
         rival_classes = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_labels(scores[BANK_OF_FILTERS]),
+            **benchmark.summarize_labels(scores[BANK_OF_FILTERS_DETECTOR]),
             "beside": rival_classes,
         }
 

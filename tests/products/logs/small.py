@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import LoggedFailure
-from beaver_ftc_logs.regression import group_surfaces
+from beaver_ftc_logs.regression import group_surfaces_by_commands
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -39,7 +39,7 @@ def vehicle(of=WING, **changes):
 def model(of=WING, settings=None, history=2, lags=3, **changes):
     """A model whose coefficients differ in everything. of: its vehicle file."""
     its = vehicle(of)
-    groups = group_surfaces(its)
+    groups = group_surfaces_by_commands(its)
     names = list(its.surfaces)
     further = [(-1) ** j * 0.2 * np.eye(3) - 0.01 for j in range(1, history)]
     past = np.vstack([np.diag([0.5, 0.6, 0.7]) + 0.02, *further])
@@ -82,7 +82,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     labels = labels if its.labels else np.full_like(labels, np.nan)
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
-        "stretch_number": run, "dt_s": step, "held_column_age_s": {}, "logged_failures": (),
+        "stretch_number": run, "dt_s": step, "held_column_mean_age_s": {}, "logged_failures": (),
         "log_stamps_s": t_s,
     }  # fmt: skip
     return Samples(**(given | changes))

@@ -9,9 +9,9 @@ from beaver_ftc_logs.bank import (
     NO_RESPONSE,
     PAIR_LOSS,
     UNKNOWN_OFFSET,
-    build_adaptation_limits,
     build_hypothesis_bank,
     build_residual_noise,
+    build_trim_and_gain_state_model,
 )
 from products.logs import small
 
@@ -40,7 +40,7 @@ def test_what_may_differ_from_a_model(changed, name):
     model = MODELS[name]
     assert not changed(
         {
-            "adaptation": build_adaptation_limits(model)._asdict(),
+            "adaptation": build_trim_and_gain_state_model(model)._asdict(),
             "noise": build_residual_noise(model)._asdict(),
         }
     )
@@ -51,14 +51,14 @@ def test_shares_are_those_of_the_settings(name):
     """Of changes a fifth restores health, and the others are all the rest; a flight begins healthy at 0.7."""
     model = MODELS[name]
     bank = build_hypothesis_bank(model)
-    assert bank.change_share[0] == 0.2
-    assert bank.change_share.sum() == pytest.approx(1.0)
+    assert bank.transition_share[0] == 0.2
+    assert bank.transition_share.sum() == pytest.approx(1.0)
     assert (bank.prior_probability[0], bank.prior_probability[-1], bank.prior_probability.sum()) == (
         0.7,
         0.2,
         pytest.approx(1.0),
     )
-    assert bank.change_probability == pytest.approx(9.0 / 36000.0)
+    assert bank.transition_probability == pytest.approx(9.0 / 36000.0)
     assert bank.no_response_index == len(bank.hypothesis_kind) - 1
     assert bank.hypothesis_kind[[0, -1]].tolist() == [HEALTHY, NO_RESPONSE]
     assert bank.is_fault.tolist() == [kind in (GROUP_LOSS, PAIR_LOSS) for kind in bank.hypothesis_kind]
@@ -72,13 +72,13 @@ def test_shares_are_those_of_the_settings(name):
     }
     for group in range(len(model.groups)):
         expected = [left < 1.0 for left in bank.effectiveness[:-1, group]]
-        assert bank.is_fault_of(group).tolist() == [*expected, False]
+        assert bank.is_fault_of_group(group).tolist() == [*expected, False]
 
 
 def test_levels_seen_carry_their_share_of_a_groups_faults():
     bank = build_hypothesis_bank(MODELS["two groups, levels seen of one"])
     left = (bank.hypothesis_kind == GROUP_LOSS) & (bank.effectiveness[:, 1] < 1.0)
-    weight = dict(zip(bank.effectiveness[left, 1].tolist(), bank.change_share[left], strict=True))
+    weight = dict(zip(bank.effectiveness[left, 1].tolist(), bank.transition_share[left], strict=True))
     assert sorted(weight) == [0.0, 0.25, 0.4, 0.5, 0.75]
     assert weight[0.4] / sum(weight.values()) == pytest.approx(0.7)
     assert len({round(share, 12) for level, share in weight.items() if level != 0.4}) == 1
@@ -104,8 +104,8 @@ def test_a_group_of_which_nothing_is_said_has_no_hypothesis():
     told = {"commands": [], "rates": [], "tied": [1.0, 0.2]}
     bank = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told))
     assert (bank.effectiveness[:-1, 0] == 1.0).all()
-    assert bank.change_share.sum() == pytest.approx(1.0)
+    assert bank.transition_share.sum() == pytest.approx(1.0)
     nothing = build_hypothesis_bank(small.model(settings=SETTINGS, fitted=told | {"tied": [1.0, 1.0]}))
-    assert len(nothing.change_share) == len(
-        build_hypothesis_bank(small.model(settings=SETTINGS)).change_share
+    assert len(nothing.transition_share) == len(
+        build_hypothesis_bank(small.model(settings=SETTINGS)).transition_share
     )

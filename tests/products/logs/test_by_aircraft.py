@@ -16,13 +16,13 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDINGS, write_recording
 from beaver_ftc_logs import by_aircraft, stepped
-from beaver_ftc_logs.by_aircraft import diagnose_by_aircraft, load_aircraft
+from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import read_for_vehicle
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 LOSS = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 6.0}
-BEAVER = load_aircraft("beaver")
+BEAVER = load_aircraft_and_declared_errors("beaver")
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     path, vehicle = exported(flown[0], kind, tmp_path)
-    _, rows, verdict = diagnose_by_aircraft(read_for_vehicle(path, vehicle), vehicle, BEAVER)
+    _, rows, verdict = diagnose_with_aircraft_model(read_for_vehicle(path, vehicle), vehicle, BEAVER)
     flight = flown[1]
     assert verdict["detection_s"] == pytest.approx(flight.detection.time_s, abs=1e-9)
     assert verdict["isolation_s"] == pytest.approx(flight.isolation.time_s, abs=1e-9)
@@ -77,20 +77,20 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
 
 def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):
     recording, vehicle = log
-    _, rows, _ = diagnose_by_aircraft(recording, vehicle, BEAVER)
+    _, rows, _ = diagnose_with_aircraft_model(recording, vehicle, BEAVER)
     truth = np.ones((len(rows.t_s), 4))
     truth[rows.t_s >= 6.0 - 1e-9, 1] = 0.6
     held = (rows.effectiveness_low <= truth) & (truth <= rows.effectiveness_high)
     wrong = rows.t_s[~held.all(axis=1)]
-    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.EXCLUSION_MEMORY_S)).all()
+    assert ((wrong >= 6.0 - 1e-9) & (wrong < 6.0 + stepped.EFFECTIVENESS_BOUND_WINDOW_S)).all()
     later = rows.t_s > 7.0
     assert np.median((rows.effectiveness_high - rows.effectiveness_low)[later, 1]) < 0.1
 
 
 def test_a_flight_cut_short_says_the_same_up_to_the_cut(log):
     recording, vehicle = log
-    _, whole, _ = diagnose_by_aircraft(recording, vehicle, BEAVER)
-    _, cut, _ = diagnose_by_aircraft(only(recording, slice(0, 700)), vehicle, BEAVER)
+    _, whole, _ = diagnose_with_aircraft_model(recording, vehicle, BEAVER)
+    _, cut, _ = diagnose_with_aircraft_model(only(recording, slice(0, 700)), vehicle, BEAVER)
     for name in (
         "faulty",
         "named_surfaces",
@@ -106,7 +106,7 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
     recording, vehicle = log
     rows = np.r_[0:300, 330:900]
     holed = changed(only(recording, rows), p_rad_s=lambda p: np.where(np.arange(len(p)) == 100, np.nan, p))
-    _, found, verdict = diagnose_by_aircraft(holed, vehicle, BEAVER)
+    _, found, verdict = diagnose_with_aircraft_model(holed, vehicle, BEAVER)
     assert found.credible[100] == 0
     assert (found.credible == 0).sum() == 1
     assert (
@@ -119,7 +119,7 @@ def test_nothing_is_said_across_a_gap_and_where_a_number_is_missing(log):
 def test_outside_the_envelope_nothing_is_said(log):
     recording, vehicle = log
     fast = changed(recording, airspeed_mps=lambda v: 2.0 * v, qdyn_pa=lambda q: 4.0 * q)
-    _, rows, verdict = diagnose_by_aircraft(fast, vehicle, BEAVER)
+    _, rows, verdict = diagnose_with_aircraft_model(fast, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert rows.credible.mean() < 0.02
     assert verdict["detection_s"] is None
@@ -131,7 +131,7 @@ def test_a_log_of_another_aircraft_is_not_credible(log):
     recording, vehicle = log
     turned = changed(recording, **dict.fromkeys(("p_rad_s", "q_rad_s", "r_rad_s"), lambda rate: 2.0 * rate))
     vehicle = vehicle.model_copy(update={"attitude": None})
-    _, rows, verdict = diagnose_by_aircraft(turned, vehicle, BEAVER)
+    _, rows, verdict = diagnose_with_aircraft_model(turned, vehicle, BEAVER)
     assert not rows.faulty.any()
     assert "another aircraft" in verdict["credible"]["reasons"][0]["says"]
 
@@ -157,12 +157,12 @@ def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_p
     path, vehicle = exported(tmp_path / "swung", "table", tmp_path)
     recording = read_for_vehicle(path, vehicle)
     turned = changed(recording, rudder_command=np.negative)
-    assert diagnose_by_aircraft(recording, vehicle, BEAVER)[2]["faulty"] is False
+    assert diagnose_with_aircraft_model(recording, vehicle, BEAVER)[2]["faulty"] is False
     with pytest.raises(BadInput, match=r"answer the command of rudder the other way round.*`scale: -1` fit"):
-        diagnose_by_aircraft(turned, vehicle, BEAVER)
+        diagnose_with_aircraft_model(turned, vehicle, BEAVER)
     (tmp_path / "moving.yaml").write_text("name: moving\nfdi: {bounds: {turbulence: light}}\n")
-    moving = load_aircraft("beaver", str(tmp_path / "moving.yaml"))
-    assert diagnose_by_aircraft(turned, vehicle, moving)[2]["faulty"] in (False, True)
+    moving = load_aircraft_and_declared_errors("beaver", str(tmp_path / "moving.yaml"))
+    assert diagnose_with_aircraft_model(turned, vehicle, moving)[2]["faulty"] in (False, True)
 
 
 def without(vehicle, **keys):
@@ -184,7 +184,7 @@ def test_what_a_log_lacks_is_said(log, keys, factors, says):
     recording, vehicle = log
     scaled = {name: (lambda values, by=by: values * by) for name, by in factors.items()}
     with pytest.raises(BadInput, match=says):
-        diagnose_by_aircraft(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
+        diagnose_with_aircraft_model(changed(recording, **scaled), without(vehicle, **keys), BEAVER)
 
 
 @pytest.mark.parametrize(("rate_hz", "taken"), [(20.0, True), (19.98, False), (1e3, True), (1001.0, False)])
@@ -202,26 +202,26 @@ def test_a_log_too_slow_or_uneven_is_refused(log):
     with pytest.raises(
         BadInput, match="is logged at 10 Hz, allowed: an aircraft's model takes 20 to 1000 Hz"
     ):
-        diagnose_by_aircraft(only(recording, slice(0, None, 10)), vehicle, BEAVER)
+        diagnose_with_aircraft_model(only(recording, slice(0, None, 10)), vehicle, BEAVER)
     rng = np.random.default_rng(3)
     uneven = only(recording, np.flatnonzero(rng.uniform(size=900) < 0.7))
     with pytest.raises(BadInput, match="no 50 samples in turn, evenly spaced"):
-        diagnose_by_aircraft(uneven, vehicle, BEAVER)
+        diagnose_with_aircraft_model(uneven, vehicle, BEAVER)
 
 
 def test_turbulence_wants_the_attitude(log, tmp_path):
     recording, vehicle = log
     (tmp_path / "rough.yaml").write_text("name: rough\nfdi: {bounds: {turbulence: light}}\n")
-    rough = load_aircraft("beaver", str(tmp_path / "rough.yaml"))
+    rough = load_aircraft_and_declared_errors("beaver", str(tmp_path / "rough.yaml"))
     level = without(vehicle, attitude={"roll": "roll_rad", "pitch": "pitch_rad"})
     with pytest.raises(BadInput, match=r"attitude.yaw: is missing, allowed: its column, where fdi.bounds"):
-        diagnose_by_aircraft(recording, level, rough)
+        diagnose_with_aircraft_model(recording, level, rough)
 
 
 def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch):
     elsewhere = bf.load("fault-free").model_copy(update={"aircraft": "./elsewhere"})
     monkeypatch.setattr("beaver_ftc.scenario.load_scenario", lambda given: elsewhere)
-    assert load_aircraft("beaver", "any").aircraft.name == "beaver"
+    assert load_aircraft_and_declared_errors("beaver", "any").aircraft.name == "beaver"
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_a_scenario_is_of_its_aircraft_by_name_whatever_it_calls_it(monkeypatch)
 def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
     (tmp_path / "other.yaml").write_text(f"name: other\n{text}")
     with pytest.raises(BadInput, match=says):
-        load_aircraft("beaver", str(tmp_path / "other.yaml"))
+        load_aircraft_and_declared_errors("beaver", str(tmp_path / "other.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -355,7 +355,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
 def test_an_alarm_raised_where_nothing_is_said_is_none_in_its_stretch():
     rows = SimpleNamespace(t_s=np.arange(8.0), faulty=np.array([0, 1, 1, 0, 0, 1, 0, 1]))
     reasons = {name: np.arange(8) == at for name, at in (("one", 1), ("six", 6), ("none", 9))}
-    found = by_aircraft._add_doubtful_alarm_reason([(0, 4), (4, 8)], rows, reasons)
+    found = by_aircraft._add_rows_after_doubtful_alarm([(0, 4), (4, 8)], rows, reasons)
     says = "the alarm was raised where nothing can be said"
     assert {name: true(mask) for name, mask in found.items()} == {"one": [1], "six": [6], says: [2, 3]}
 
@@ -365,12 +365,12 @@ def test_the_loss_that_shows_is_the_median_of_the_rows_that_are_quiet_and_credib
     rows = SimpleNamespace(
         faulty=np.array([0, 0, 0, 1, 0]), credible=np.array([1, 1, 1, 1, 0]), effectiveness_low=low
     )
-    assert by_aircraft._excluded_loss_lines(rows, ["right", "left"]) == [
+    assert by_aircraft._excluded_loss_sentences(rows, ["right", "left"]) == [
         "right: a loss of more than 20 % shows within a second in half of the flight.",
         "left: in half of the flight not even a complete loss would show within a second.",
     ]
     rows.credible = np.array([0, 0, 0, 1, 0])
-    assert by_aircraft._excluded_loss_lines(rows, ["right", "left"]) == []
+    assert by_aircraft._excluded_loss_sentences(rows, ["right", "left"]) == []
 
 
 @pytest.mark.parametrize(("alpha", "beta", "density", "command", "says"), [

@@ -344,7 +344,7 @@ def test_names_as_the_patterns_have_them():
     (0.7, "tell nothing of one another"), (0.71, "agree"), (-0.71, "agree"), (-0.7, "tell nothing"),
 ])  # fmt: skip
 def test_rate_and_angle_agree_from_seven_tenths_on(correlation, says):
-    said = check._angle_rate_line(physics.AngleRateFit(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
+    said = check._angle_rate_fit_text(physics.AngleRateFit(1.25, correlation, 9, 2.0, 3.0), "roll", "p")
     told = f"the change of roll is 1.250 times the integral of p (correlation {correlation:.2f}): they {says}"
     assert said.startswith(told)
 

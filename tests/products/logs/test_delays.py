@@ -38,12 +38,12 @@ def test_delays_are_weighed_by_the_evidence_of_ten_minutes():
     """What was 600 s ago counts 1/e."""
     rng = np.random.default_rng(1)
     evidence = [0.1 * rng.standard_normal(2000) for _ in range(3)]
-    found = filtering._delay_probabilities(evidence, 2.0)
+    found = filtering._model_probabilities_with_forgetting(evidence, 2.0)
     for k in (0, 10, 1999):
         age_s = 0.5 * np.arange(k, -1, -1)
         total = np.array([(np.exp(-age_s / 600.0) * one[: k + 1]).sum() for one in evidence])
         np.testing.assert_allclose(found[:, k], np.exp(total) / np.exp(total).sum(), rtol=1e-9)
-    huge = filtering._delay_probabilities([1000.0 * np.ones(3), np.ones(3)], 2.0)
+    huge = filtering._model_probabilities_with_forgetting([1000.0 * np.ones(3), np.ones(3)], 2.0)
     np.testing.assert_allclose(huge, [[1.0] * 3, [0.0] * 3], atol=1e-12)
 
 
@@ -55,7 +55,7 @@ def test_what_all_delays_say_together(changed):
         filtering._run_bank_on_flight(filtering._with_command_delay(samples, delay_s), MODEL, bank)
         for delay_s in DELAYS_S
     ]
-    weights = filtering._delay_probabilities([run[3] for run in runs], 10.0)
+    weights = filtering._model_probabilities_with_forgetting([run[3] for run in runs], 10.0)
     for part, found in enumerate(together):
         each = np.stack([run[part] for run in runs])
         weight = weights.reshape(*weights.shape, *[1] * (each.ndim - 2))

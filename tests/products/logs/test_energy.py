@@ -36,21 +36,21 @@ WING = {
     ],
 )
 def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected):
-    climb = energy.energy_climb_mps(T_S, altitude, airspeed, ONE)
+    climb = energy.energy_height_rate_mps(T_S, altitude, airspeed, ONE)
     assert np.isnan(climb[T_S < 4.9]).all()
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
 def test_a_gap_ends_what_is_known():
     run = (T_S >= 10.0).astype(int)
-    climb = energy.energy_climb_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
+    climb = energy.energy_height_rate_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
     assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
     np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
 
 
 def named_of(faulty, falls, since_s=0.0):
     names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.without_surfaces_after_engine_failure(
+    return energy.withdraw_surfaces_after_engine_failure(
         T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s
     )
 
@@ -77,11 +77,11 @@ def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_
     falls = (T_S >= 8.0) & (T_S < 10.0)
     climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
     names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.without_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S - 6.0)
+    named = energy.withdraw_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S - 6.0)
     assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
     assert set(named[T_S > 16.05]) == {"left"}
     assert set(
-        energy.without_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]
+        energy.withdraw_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]
     ) == {"left"}
 
 
@@ -92,8 +92,8 @@ def test_a_name_uses_nothing_later(rows, data):
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
     cut = data.draw(st.integers(1, len(rows)))
     since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.without_surfaces_after_engine_failure(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.without_surfaces_after_engine_failure(
+    whole = energy.withdraw_surfaces_after_engine_failure(t_s, faulty, names, climb, -1.0, since_s)
+    short = energy.withdraw_surfaces_after_engine_failure(
         t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut]
     )
     assert whole[:cut].tolist() == short.tolist()
@@ -109,9 +109,9 @@ def recording(**columns):
 def test_samples_have_it_in_si_where_it_is_logged():
     vehicle = Vehicle.model_validate(WING)
     logged = {"alt": (100.0 - 2.0 * T_S) / 0.3048, "tas": np.full(len(T_S), 72.0)}
-    climb = resample(recording(**logged), vehicle).energy_climb_mps
+    climb = resample(recording(**logged), vehicle).energy_height_rate_mps
     np.testing.assert_allclose(climb[T_S > 5.05], -2.0, atol=1e-9)
-    assert resample(recording(alt=logged["alt"]), vehicle).energy_climb_mps is None
+    assert resample(recording(alt=logged["alt"]), vehicle).energy_height_rate_mps is None
 
 
 def test_a_unit_of_another_kind_is_refused(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes, fitting
 from beaver_ftc_logs.bank import build_hypothesis_bank
-from beaver_ftc_logs.filtering import fault_evidence_gains, page_sum
+from beaver_ftc_logs.filtering import fault_evidence_increments, page_cusum
 from beaver_ftc_logs.vehicle import with_false_alarm_rate
 from products.logs import small
 
@@ -32,7 +32,7 @@ def test_the_interval_holds_the_true_rate(tail, hours, asked):
     for _ in range(20):
         found = extremes.fit_peak_tail(parts_of(quantile, rng, hours))
         threshold = extremes.threshold_for_false_alarms(found, asked)
-        rate = extremes.expected_false_alarms(found, threshold)
+        rate = extremes.expected_false_alarms_per_hour(found, threshold)
         true = PER_HOUR * survival(threshold)
         held += rate.low <= true <= rate.high
         rates.append(true)
@@ -54,7 +54,7 @@ def test_flights_that_differ_count_for_less():
     calm, wild = extremes.fit_peak_tail(alike), extremes.fit_peak_tail(apart)
     assert calm.dispersion < 2.0 < wild.dispersion
     rates = [
-        extremes.expected_false_alarms(wild.model_copy(update={"dispersion": d}), 20.0)
+        extremes.expected_false_alarms_per_hour(wild.model_copy(update={"dispersion": d}), 20.0)
         for d in (1.0, wild.dispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
@@ -71,7 +71,7 @@ def test_too_little_flight_says_what_is_missing():
 def test_peaks_are_of_stretches_above_zero():
     values = np.array([0.0, 1.0, 3.0, 0.0, 0.0, 2.0, 0.0, 4.0, 5.0])
     assert extremes.peaks_between_zeros(values).tolist() == [3.0, 2.0, 5.0]
-    assert page_sum(np.array([1.0, 2.0, -4.0, -1.0, 2.0, 9.0]), 6.0).tolist() == [1, 3, 0, 0, 2, 6]
+    assert page_cusum(np.array([1.0, 2.0, -4.0, -1.0, 2.0, 9.0]), 6.0).tolist() == [1, 3, 0, 0, 2, 6]
 
 
 def test_the_evidence_is_what_changes_alone_do_not_bring():
@@ -79,18 +79,22 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
     its odds are tenfold that, log 10."""
     bank = build_hypothesis_bank(small.model(small.TAIL))
     first = float(bank.prior_probability[bank.is_fault].sum())
-    change = bank.change_probability * float(bank.change_share[bank.is_fault].sum() / bank.change_share.sum())
-    second = (1.0 - bank.change_probability) * first + change
+    change = bank.transition_probability * float(
+        bank.transition_share[bank.is_fault].sum() / bank.transition_share.sum()
+    )
+    second = (1.0 - bank.transition_probability) * first + change
     odds = (
         10.0
-        * ((1.0 - bank.change_probability) * second + change)
-        / (1.0 - ((1.0 - bank.change_probability) * second + change))
+        * ((1.0 - bank.transition_probability) * second + change)
+        / (1.0 - ((1.0 - bank.transition_probability) * second + change))
     )
-    posterior = np.zeros((3, len(bank.change_share)))
+    posterior = np.zeros((3, len(bank.transition_share)))
     place = int(np.flatnonzero(bank.is_fault)[0])
     posterior[:, place] = first, second, odds / (1.0 + odds)
     posterior[:, 0] = 1.0 - posterior[:, place]
-    np.testing.assert_allclose(fault_evidence_gains(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12)
+    np.testing.assert_allclose(
+        fault_evidence_increments(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12
+    )
 
 
 def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
@@ -101,10 +105,12 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     walk = np.cumsum(rng.standard_normal((n, 3)), axis=0)
     series = np.column_stack([white[:, 0], coloured[:, 1], white[:, 2] + 0.05 * walk[:, 2]])
     series = series * np.sqrt(np.diag(np.array(model.noise)))
-    monkeypatch.setattr(fitting, "fit_with_order_of", lambda fitted, like: like)
-    monkeypatch.setattr(fitting, "whitened_residual", lambda like, kept: (np.arange(n), series, None))
+    monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
+    monkeypatch.setattr(
+        fitting, "whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
+    )
     stretches = fitting.usable_stretches([small.flight(model, 60)])
-    found = fitting._trim_drift(stretches, model)
+    found = fitting._trim_drift_sd(stretches, model)
     assert max(found[:2]) < 0.01
     assert found[2] == pytest.approx(0.05, rel=0.15)
 
@@ -128,8 +134,8 @@ def test_a_true_likelihood_ratio_alarms_once_in_exp_h_samples_or_less_often(thre
     assert waited.mean() > np.exp(threshold)
     rate_hz = 20.0
     per_hour = 3600.0 * rate_hz / np.exp(threshold)
-    assert extremes.guaranteed_threshold(rate_hz, per_hour) == pytest.approx(threshold)
-    assert extremes.guaranteed_threshold(rate_hz, 1e9) == 0.0
+    assert extremes.threshold_by_lorden_bound(rate_hz, per_hour) == pytest.approx(threshold)
+    assert extremes.threshold_by_lorden_bound(rate_hz, 1e9) == 0.0
 
 
 def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
@@ -156,6 +162,6 @@ def test_the_interval_holds_nine_tenths_of_a_posterior_that_is_known(n):
     scale [Coles2001, section 4.3], a logarithm of the rate of variance (1 + 1/4 + 2 - 1) / n."""
     excess = TAILS["exponential"][0]((np.arange(n) + 0.5) / n)
     tail = extremes.PeakTail(level=5.0, excess=excess.tolist(), minutes=30.0)
-    found = extremes.expected_false_alarms(tail, 7.0)
+    found = extremes.expected_false_alarms_per_hour(tail, 7.0)
     assert np.log(found.high / found.low) == pytest.approx(2.0 * 1.645 * 1.5 / np.sqrt(n), rel=0.05)
     assert np.sqrt(found.high * found.low) == pytest.approx(2.0 * n / np.e, rel=0.02)

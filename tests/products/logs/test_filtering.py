@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import filtering
-from beaver_ftc_logs.bank import ResidualNoise, build_adaptation_limits, build_hypothesis_bank
+from beaver_ftc_logs.bank import ResidualNoise, build_hypothesis_bank, build_trim_and_gain_state_model
 from beaver_ftc_logs.filtering import (
-    _delay_probabilities,
+    _model_probabilities_with_forgetting,
     _update_gaussian,
     _with_command_delay,
     hypothesis_posterior,
@@ -33,7 +33,7 @@ def delays_of(samples, model):
     evidence = [
         _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3] for d in model.settings.delays_s
     ]
-    return _delay_probabilities(evidence, model.rate_hz)
+    return _model_probabilities_with_forgetting(evidence, model.rate_hz)
 
 
 @pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
@@ -66,16 +66,16 @@ def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(
-        build_adaptation_limits(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
+        build_trim_and_gain_state_model(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
     )
 
 
 def test_gains_return_in_their_time(wing_model):
     """After a long time the spread of each gain is that of the settings, whatever it was."""
-    own = build_adaptation_limits(wing_model)
+    own = build_trim_and_gain_state_model(wing_model)
     variance = np.zeros(len(own.initial_mean))
     for _ in range(200_000):
-        variance = own.deviation_retention**2 * variance + own.walk_variance
+        variance = own.deviation_retention**2 * variance + own.random_walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
     assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_sd, rel=1e-3)
 
@@ -99,10 +99,10 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = build_adaptation_limits(with_settings(wing_model, trim_walk=walk))
+    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_walk=walk))
     noise_sd = np.sqrt(np.diag(np.array(wing_model.noise)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
-    np.testing.assert_allclose(np.sqrt(900 * own.walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
+    np.testing.assert_allclose(np.sqrt(900 * own.random_walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
 
 
 def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
@@ -171,7 +171,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         answers = rng.normal(size=(40, 2, 3))
         unexplained = size * (white + constant) + answers.sum(axis=1)
         monkeypatch.setattr(
-            filtering, "split_whitened_response", lambda *_, made=(known, unexplained, answers): made
+            filtering, "whitened_rates_and_responses", lambda *_, made=(known, unexplained, answers): made
         )
         colour = SimpleNamespace(average=of, noise=(size**2 * noise).tolist())
         found.append(filtering._noise_model_log_likelihood(None, model, colour))
@@ -184,14 +184,14 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
 def test_evidence_is_the_log_of_a_likelihood_ratio():
     """Two of three levels are faults; what a change at random brings is no evidence."""
     bank = SimpleNamespace(
-        is_fault=np.array([False, True, True]), change_probability=0.1,
-        prior_probability=np.array([0.8, 0.15, 0.05]), change_share=np.array([3.0, 1.0, 2.0]),
+        is_fault=np.array([False, True, True]), transition_probability=0.1,
+        prior_probability=np.array([0.8, 0.15, 0.05]), transition_share=np.array([3.0, 1.0, 2.0]),
     )  # fmt: skip
     fault = np.array([0.3, 0.6, 0.45])
     posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
     before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
-    assert filtering.fault_evidence_gains(posterior, bank) == pytest.approx(expected)
+    assert filtering.fault_evidence_increments(posterior, bank) == pytest.approx(expected)
     assert np.isfinite(
-        filtering.fault_evidence_gains(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
+        filtering.fault_evidence_increments(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
     ).all()

@@ -11,12 +11,12 @@ from beaver_ftc_logs.findings import (
     as_text,
     duration_in_words,
     fault_events,
+    isolability_document,
+    isolability_sentences,
     lasting_events,
-    separability_sentences,
-    separability_statement,
     verdict_document,
 )
-from beaver_ftc_logs.regression import split_response
+from beaver_ftc_logs.regression import unexplained_rates_and_responses
 from products.logs import small
 
 NAMES = ["right", "left"]
@@ -69,7 +69,7 @@ WORLD = {
     "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
     "tail": (
         small.model(small.TAIL, settings={"alarm": 0.9}),
-        {"gap": 150, "notes": ("a remark",), "held_column_age_s": {"roll": 0.123456}},
+        {"gap": 150, "notes": ("a remark",), "held_column_mean_age_s": {"roll": 0.123456}},
     ),
 }
 
@@ -131,7 +131,7 @@ def test_what_a_flight_can_separate_in_words():
         {"surfaces": [["right"], ["rudder"]], "cosine": 0.1, "separable": True},
     ]
     together = [{"surfaces": ["left", "flap"], "says": "They move together."}]
-    assert separability_sentences({"together": together, "groups": groups, "alike": pairs}) == [
+    assert isolability_sentences({"together": together, "groups": groups, "alike": pairs}) == [
         "They move together.",
         "right: the smallest loss that shows on average is 50% within 20 s, 12% within 60 s.",
         "left, flap: not even a complete loss would show within 60 s by the mean of this flight's commands.",
@@ -143,18 +143,18 @@ def test_what_a_flight_can_separate_in_words():
 def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
     """The Schur complement of the whole information matrix, trim of each axis and the other groups out."""
     model, samples = flown
-    ok_answers = _whitened_answers(samples, model)
+    ok_answers = _whitened_group_responses(samples, model)
     n, groups, _ = ok_answers.shape
     design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
     flat = design.reshape(-1, groups + 3)
     covariance = np.linalg.inv(flat.T @ flat)
-    for group, entry in enumerate(separability_statement(samples, model)["groups"]):
+    for group, entry in enumerate(isolability_document(samples, model)["groups"]):
         left = 1.0 / covariance[group, group] / n / samples.dt_s
         assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
 
 
-def _whitened_answers(samples, model):
-    ok, _, answers = split_response(samples, model)
+def _whitened_group_responses(samples, model):
+    ok, _, answers = unexplained_rates_and_responses(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
     return answers[ok] @ root.T
 
@@ -162,7 +162,7 @@ def _whitened_answers(samples, model):
 def test_where_nothing_can_be_predicted_nothing_shows():
     model = WORLD["wing"][0]
     samples = small.flight(model, 40)
-    found = separability_statement(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
+    found = isolability_document(replace(samples, commands=np.full_like(samples.commands, np.nan)), model)
     nothing = {"5": None, "20": None, "60": None}
     assert [entry["information_per_s"] for entry in found["groups"]] == [0.0, 0.0]
     assert all(entry["smallest_loss"] == nothing for entry in found["groups"])
@@ -176,7 +176,7 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
     response = [[[1.0, 0.0, 0.0]], [[share, float(np.sqrt(1.0 - share**2)), 0.0]]]
     model = small.model(lags=1, response=response, response_sd=response, noise=noise)
     samples = small.flight(small.model(), 60)
-    (pair,) = separability_statement(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
+    (pair,) = isolability_document(replace(samples, commands=samples.commands[:, [0, 0]]), model)["alike"]
     assert pair["cosine"] == pytest.approx(share)
     assert pair["separable"] is separable
 
@@ -190,23 +190,29 @@ def test_nearly_proportional_is_a_cosine_of_nine_tenths(share, separable):
 )  # fmt: skip
 def test_that_nothing_shows_is_said_of_the_rows_that_are_credible(share, says):
     """Of all of them without a word more; of hardly any there is no verdict."""
-    assert findings._no_event_line({"credible": {"share": share}}) == says
+    assert findings._no_event_text({"credible": {"share": share}}) == says
     little = findings._MIN_CREDIBLE_ROW_SHARE
-    assert findings._no_event_line({"credible": {"share": 0.99 * little}}) == "no verdict"
-    assert findings._no_event_line({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
+    assert findings._no_event_text({"credible": {"share": 0.99 * little}}) == "no verdict"
+    assert findings._no_event_text({"credible": {"share": 1.01 * little}}).startswith("no fault shows where")
 
 
 def test_the_smallest_loss_passes_the_odds_by_the_information_gathered():
     """Half of the square of the loss times the information; a complete loss is one."""
-    assert findings._smallest_losses(0.5, 5.0) == {"5": None, "20": 1.0, "60": pytest.approx(3.0**-0.5)}
-    assert findings._smallest_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
+    assert findings._smallest_detectable_losses(0.5, 5.0) == {
+        "5": None,
+        "20": 1.0,
+        "60": pytest.approx(3.0**-0.5),
+    }
+    assert findings._smallest_detectable_losses(0.0, 5.0) == {"5": None, "20": None, "60": None}
 
 
 def test_odds_against_a_change_are_those_of_its_median_share():
     weight = np.array([0.5, 0.2, 0.1, 0.3])
     bank = SimpleNamespace(
-        change_share=weight, is_fault_of=lambda group: np.arange(4) % 2 == (1 if group else 5)
+        transition_share=weight, is_fault_of_group=lambda group: np.arange(4) % 2 == (1 if group else 5)
     )
     model = small.model(settings={"alarm": 0.9, "changes_per_hour": 36.0})
-    assert findings._alarm_log_odds(model, bank, 1, 0.1) == pytest.approx(np.log(9.0) - np.log(0.00025))
-    assert findings._alarm_log_odds(model, bank, 0, 0.1) == np.inf
+    assert findings._log_odds_needed_for_alarm(model, bank, 1, 0.1) == pytest.approx(
+        np.log(9.0) - np.log(0.00025)
+    )
+    assert findings._log_odds_needed_for_alarm(model, bank, 0, 0.1) == np.inf

@@ -62,7 +62,7 @@ def test_what_follows_a_failure_is_not_fitted():
 
 def by_hand(samples, vehicle, history, lags):
     """Regressors and rates of one flight, row by row, where there is past enough for the largest order."""
-    groups = regression.group_surfaces(vehicle)
+    groups = regression.group_surfaces_by_commands(vehicle)
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     rows, rates = [], []
     for k in np.flatnonzero(fitting.is_usable_for_fit(samples)):
@@ -86,7 +86,9 @@ def test_regressors_of_several_flights_stand_in_a_row(model, history, lags):
         small.flight(model, 180, gap=110, lost=((0, 50, 90, 0.3),)),
         small.flight(model, 120, seed=2, lost=((1, 40, 80, 0.6),)),
     ]
-    x, y, run = fitting.stacked_regression(fitting.usable_stretches(flights), model.vehicle, history, lags)
+    x, y, run = fitting.stacked_regression_data(
+        fitting.usable_stretches(flights), model.vehicle, history, lags
+    )
     parts = [by_hand(flight, model.vehicle, history, lags) for flight in flights]
     np.testing.assert_allclose(x, np.vstack([part[0] for part in parts]), atol=1e-14)
     np.testing.assert_allclose(y, np.vstack([part[1] for part in parts]), atol=0)
@@ -98,14 +100,14 @@ def test_a_stretch_ends_where_a_sample_is_left_out():
     samples = small.flight(MODEL, 60)
     use = np.ones(60, dtype=bool)
     use[[20, 40, 41]] = False
-    _, y, run = fitting.stacked_regression([Stretch(samples, use)], MODEL.vehicle, 2, 3)
+    _, y, run = fitting.stacked_regression_data([Stretch(samples, use)], MODEL.vehicle, 2, 3)
     assert np.unique(run, return_counts=True)[1].tolist() == [14, 19, 18]
     assert len(y) == 51
 
 
 def score(stretches, vehicle, order):
     """The Bayesian information criterion of an order, of its own fit."""
-    x, y, _ = fitting.stacked_regression(stretches, vehicle, *order)
+    x, y, _ = fitting.stacked_regression_data(stretches, vehicle, *order)
     rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
     return len(y) * np.linalg.slogdet(rest.T @ rest / len(y))[1] + 3 * x.shape[1] * np.log(len(y))
 
@@ -118,7 +120,7 @@ ORDERS = [(history, lags) for history in (1, 2, 3, 4) for lags in (2, 3, 4, 6)]
 def test_the_order_is_the_one_of_the_least_criterion(of, true):
     model = small.model(of, history=true[0], lags=true[1])
     stretches = fitting.usable_stretches([small.flight(model, 400), small.flight(model, 300, seed=3)])
-    found = fitting.choose_order(stretches, model.vehicle)
+    found = fitting.choose_model_order(stretches, model.vehicle)
     assert found == min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
     if of is small.WING:
         assert found == true
@@ -132,14 +134,14 @@ def test_the_order_of_a_flight_too_short_to_tell(seed):
     model = small.model(response=(3.0 * response).tolist())
     stretches = fitting.usable_stretches([small.flight(model, 120 + 10 * seed, seed=seed)])
     least = min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
-    assert fitting.choose_order(stretches, model.vehicle) == least
+    assert fitting.choose_model_order(stretches, model.vehicle) == least
 
 
 def test_columns_of_an_order():
     """One, the past, the signal, then the lags of each group, of 1 + 12 + 1 + 6 + 6."""
-    assert fitting._columns_of_model_order(TAIL.vehicle, 4, 6) == list(range(26))
-    assert fitting._columns_of_model_order(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
-    assert fitting._columns_of_model_order(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
+    assert fitting._regressor_columns_of_order(TAIL.vehicle, 4, 6) == list(range(26))
+    assert fitting._regressor_columns_of_order(TAIL.vehicle, 1, 2) == [0, 1, 2, 3, 13, 14, 15, 20, 21]
+    assert fitting._regressor_columns_of_order(MODEL.vehicle, 3, 3) == [*range(10), 13, 14, 15, 19, 20, 21]
 
 
 def test_a_fit_wants_ten_samples_a_coefficient():
@@ -147,11 +149,13 @@ def test_a_fit_wants_ten_samples_a_coefficient():
     samples = small.flight(MODEL, 146)
     use = np.ones(146, dtype=bool)
     use[136:] = False
-    assert fitting.fit_order([Stretch(samples, use)], MODEL.vehicle, 2, 3).coefficients.shape == (13, 3)
+    assert fitting.fit_least_squares_of_order(
+        [Stretch(samples, use)], MODEL.vehicle, 2, 3
+    ).coefficients.shape == (13, 3)
     use[135] = False
     says = "129 samples known to be healthy, allowed: at least 130 to fit 13 coefficients an axis"
     with pytest.raises(BadInput, match=says):
-        fitting.fit_order([Stretch(samples, use)], MODEL.vehicle, 2, 3)
+        fitting.fit_least_squares_of_order([Stretch(samples, use)], MODEL.vehicle, 2, 3)
 
 
 @pytest.mark.parametrize(("size", "moves"), [(0.9e-6, False), (1.1e-6, True)])
@@ -161,16 +165,16 @@ def test_a_rate_that_stands_still_is_refused(size, moves):
     rates[6:, 1] = 0.3 + size * np.where(np.arange(194) % 2, 1.0, -1.0)
     stretches = [Stretch(changed(samples, rates=rates), np.ones(200, dtype=bool))]
     if moves:
-        assert fitting.fit_order(stretches, MODEL.vehicle, 2, 3) is not None
+        assert fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3) is not None
         return
     with pytest.raises(BadInput, match="rate q does not move, allowed: flights in which every rate does"):
-        fitting.fit_order(stretches, MODEL.vehicle, 2, 3)
+        fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
 
 
 def test_standard_errors_hold_for_colour_of_two_seconds():
     stretches = fitting.usable_stretches([small.flight(MODEL, 400)])
-    x, y, run = fitting.stacked_regression(stretches, MODEL.vehicle, 2, 3)
-    found = fitting.fit_order(stretches, MODEL.vehicle, 2, 3)
+    x, y, run = fitting.stacked_regression_data(stretches, MODEL.vehicle, 2, 3)
+    found = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
     expected = regression.least_squares(x, y, run, 20)
     np.testing.assert_array_equal(found.standard_errors, expected.standard_errors)
 
@@ -196,7 +200,7 @@ ARRAYS = ("intercept", "past", "response", "response_sd", "noise")
 
 def test_a_model_is_what_was_fitted(changed, fitted, stretches):
     assert not changed(in_numbers(fitted))
-    fit = fitting.fit_order(stretches, MODEL.vehicle, fitted.history, fitted.lags)
+    fit = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, fitted.history, fitted.lags)
     past = 1 + 3 * fitted.history
     assert fitted.intercept == fit.coefficients[0].tolist()
     assert fitted.past == fit.coefficients[1:past].tolist()
@@ -221,13 +225,13 @@ def test_settings_by_hand(fitted):
     assert settings.changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
     assert settings.delays_s == pytest.approx([-0.04, 0.0, 0.04])
-    stuck = fitting.prior_settings(fitting.usable_stretches([small.flight(TAIL, 400)]), TAIL)
+    stuck = fitting.estimate_filter_settings(fitting.usable_stretches([small.flight(TAIL, 400)]), TAIL)
     assert (stuck.alarm, stuck.hold_s, stuck.levels) == (0.995, 0.3, {})
     assert 0.0 < stuck.power <= 0.9
     given = settings.model_copy(update={"alarm": 0.7})
     stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
     assert fitting.fit_model(stretches, MODEL.vehicle, given).settings == given
-    assert fitting.fit_with_order_of(stretches, fitted).settings == settings
+    assert fitting.fit_with_same_order(stretches, fitted).settings == settings
 
 
 def days(gains):
@@ -241,17 +245,18 @@ def days(gains):
 
 def test_flights_that_are_alike_tell_all_that_their_noise_allows():
     """The squares of Gaussian gains are as many as these, on average: 12 of them, within three sd of that."""
-    alike = fitting.gain_dispersion(days([1.0] * 6), MODEL)
+    alike = fitting.gain_error_overdispersion(days([1.0] * 6), MODEL)
     assert alike == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 12.0))
 
 
 def test_days_that_differ_let_a_sample_tell_less():
     """Differences far above what the noise allows: the larger they are, the less."""
     none, some, more = (
-        fitting.gain_dispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL) for size in (0.0, 0.15, 0.3)
+        fitting.gain_error_overdispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL)
+        for size in (0.0, 0.15, 0.3)
     )
     assert more > 1.5 * some > 5.0 * none
-    assert fitting.prior_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2
+    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2
 
 
 def test_levels_of_a_label_in_their_order():
@@ -271,7 +276,7 @@ def test_settings_of_flights_that_change_in_every_way():
     labels = np.ones((400, 2))
     labels[100:200, 0], labels[200:300, 0], labels[200:, 1] = 0.6, 0.2, 0.8
     stretches = fitting.usable_stretches([rate, weak, changed(rate, labels=labels)])
-    settings = fitting.prior_settings(stretches, MODEL)
+    settings = fitting.estimate_filter_settings(stretches, MODEL)
     assert settings.levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
     hours = sum(stretch.usable.sum() for stretch in stretches) / 36000.0
     assert settings.changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
@@ -304,7 +309,9 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
 
 def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
     quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
-    entries, bounds = fitting.score_folds(stretches, fitted.model_copy(update={"settings": quick}))
+    entries, bounds = fitting.score_folds_and_choose_credible_mass(
+        stretches, fitted.model_copy(update={"settings": quick})
+    )
     assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
     assert all(0.8 < share < 1.0 for entry in entries for share in entry["explained"].values())
@@ -315,7 +322,7 @@ def test_without_labels_bounds_stay_as_they_are():
     flights = [small.flight(TAIL, 200, seed=seed) for seed in range(3)]
     settings = TAIL.settings.model_copy(update={"bounds": 0.77})
     model = TAIL.model_copy(update={"settings": settings})
-    entries, bounds = fitting.score_folds(fitting.usable_stretches(flights), model)
+    entries, bounds = fitting.score_folds_and_choose_credible_mass(fitting.usable_stretches(flights), model)
     assert bounds == 0.77
     assert [set(entry) for entry in entries] == [{"left_out", "samples", "explained", "residual_rad_s"}] * 3
 
@@ -330,7 +337,7 @@ def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatc
         by_mass = dict(zip((0.5, 0.6, 0.7, 0.8, 0.9, 0.95), told, strict=True))
         monkeypatch.setattr(fitting, "_diagnosis_by_credible_mass", lambda *given, by_mass=by_mass: by_mass)
         monkeypatch.setattr(fitting, "score_against_labels", lambda held, labels: {"held_by_bounds": held})
-        assert fitting.score_folds(stretches, fitted)[1] == chosen
+        assert fitting.score_folds_and_choose_credible_mass(stretches, fitted)[1] == chosen
 
 
 def test_what_one_step_prediction_explains(stretches):
@@ -372,13 +379,13 @@ def test_each_part_left_out_is_held_against_what_the_others_ask_for(monkeypatch)
     )
     monkeypatch.setattr(fitting, "_total_healthy_minutes", lambda of: sum(minutes for _, minutes in of))
     # at two an hour: 2 + 9, 5 + 9, 5 + 2 over two
-    found = fitting._test_left_out_alarms(parts, 2.0, None)
+    found = fitting._cross_validate_alarm_threshold(parts, 2.0, None)
     assert found == {"parts": 3, "minutes": 12.0, "alarmed": 1, "alarms": 1}
     parts[0] = (np.array([5.5, 5.0]), 3.0)
-    assert fitting._test_left_out_alarms(parts, 2.0, None)["alarmed"] == 2
+    assert fitting._cross_validate_alarm_threshold(parts, 2.0, None)["alarmed"] == 2
     assert (
-        fitting._test_left_out_alarms(parts, None, None)
-        == fitting._test_left_out_alarms(parts[:1], 2.0, None)
+        fitting._cross_validate_alarm_threshold(parts, None, None)
+        == fitting._cross_validate_alarm_threshold(parts[:1], 2.0, None)
         == {}
     )
 
@@ -387,19 +394,19 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     """The noisiest of all parts, and of the first four the one that is read wrongly most easily."""
     noise, misread = {1: 0.7, 2: 2.5, 3: 1.4, 4: 1.1, 5: 0.9}, {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
     left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
-    monkeypatch.setattr(fitting, "_fit_without_parts", lambda *of: left_out)
+    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *of: left_out)
     monkeypatch.setattr(
         fitting, "_healthy_alarm_statistics", lambda tested, one: (noise[one], (np.array([1.0]), one / 60))
     )
-    monkeypatch.setattr(fitting, "_misread_log_likelihood", lambda tested, one: misread[one])
+    monkeypatch.setattr(fitting, "_max_column_mistake_log_likelihood_gain", lambda tested, one: misread[one])
     monkeypatch.setattr(
         fitting, "_total_healthy_minutes", lambda parts: 60 * sum(hours for _, hours in parts)
     )
-    monkeypatch.setattr(fitting, "fit_order", lambda *of: "fit")
-    monkeypatch.setattr(fitting, "group_gain_sd", lambda fit, model: 0.25)
-    monkeypatch.setattr(fitting.trust, "explained_effect_share", lambda used, model: np.zeros(2))
+    monkeypatch.setattr(fitting, "fit_least_squares_of_order", lambda *of: "fit")
+    monkeypatch.setattr(fitting, "group_gain_standard_error", lambda fit, model: 0.25)
+    monkeypatch.setattr(fitting.trust, "effect_share_explained_by_others", lambda used, model: np.zeros(2))
 
-    monkeypatch.setattr(fitting, "column_gain_sd", lambda fit, model, between: {"p": between})
+    monkeypatch.setattr(fitting, "column_gain_standard_error", lambda fit, model, between: {"p": between})
 
     def copied(known):
         return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))
@@ -425,6 +432,6 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     assert found["settings"] == {"false_alarms_per_hour": None, "threshold": None}
     assert found["identified"] == {}
     vehicle.false_alarms_per_hour = 0.5
-    more = fitting.extremes.EXPECTED_ALARMS_RULED_OUT * 120 - 15
+    more = fitting.extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 120 - 15
     with pytest.raises(BadInput, match=f"_per_hour 0.5: 15.0 min .* allowed: {more:.0f} min more"):
         fitting.add_validity_range([], model)

@@ -9,7 +9,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import detectors
 from beaver_ftc_logs.recording import Column, RecordedFlight
-from beaver_ftc_logs.regression import split_response
+from beaver_ftc_logs.regression import unexplained_rates_and_responses
 from kept import in_short
 from products.logs import small
 
@@ -22,7 +22,7 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
-    ok, unexplained, answers = split_response(samples, model)
+    ok, unexplained, answers = unexplained_rates_and_responses(samples, model)
     sd = np.sqrt(np.diag(model.noise))
     whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
@@ -43,7 +43,7 @@ def batch(samples, model, k, forget):
 def test_least_squares_by_one_batch(name):
     """Levels of a flight are those seen, or the nearest of the grid; bounds 1.645 sd away and around them."""
     samples = small.flight(WING, 400, lost=LOST, gap=250)
-    rows = detectors.diagnose_with(METHODS[name], samples, WING)
+    rows = detectors.diagnose_with_detector(METHODS[name], samples, WING)
     for k in (60, 199, 200, 230, 399):
         value, sd = batch(samples, WING, k, name == "forgetting")
         levels = ([0.0, 0.25, 0.5, 0.75, 1.0], [0.4, 0.8, 1.0])
@@ -68,7 +68,7 @@ def test_least_squares_by_one_batch(name):
 def test_without_labels_a_loss_is_sure_by_five_sd(name):
     model = small.model(settings={"trim_sd": 0.3})
     samples = small.flight(model, 400, lost=LOST)
-    rows = detectors.diagnose_with(METHODS[name], samples, model)
+    rows = detectors.diagnose_with_detector(METHODS[name], samples, model)
     sure = []
     for k in range(0, 400, 25):
         value, sd = batch(samples, model, k, name == "forgetting")
@@ -83,7 +83,7 @@ def test_without_labels_a_loss_is_sure_by_five_sd(name):
 @pytest.mark.parametrize("of", ["wing", "tail"])
 def test_rows_of_least_squares(changed, name, of):
     model = {"wing": WING, "tail": TAIL}[of]
-    rows = detectors.diagnose_with(METHODS[name], small.flight(model, 300, lost=LOST), model)
+    rows = detectors.diagnose_with_detector(METHODS[name], small.flight(model, 300, lost=LOST), model)
     said = {name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()}
     assert not changed(said | {"faulty": in_short(rows.faulty), "named": rows.named_surfaces[::25]})
 
@@ -126,7 +126,7 @@ def test_what_a_detector_of_the_loop_is_given(model):
     samples = small.flight(model, 60, gap=30)
     samples.rates[45, 2] = samples.commands[50, 0] = np.nan
     stream = detectors.loop_detector_inputs(samples, model)
-    ok, unexplained, answers = split_response(samples, model)
+    ok, unexplained, answers = unexplained_rates_and_responses(samples, model)
     intercept, x = np.array(model.intercept), np.nan_to_num(samples.rates)
     members = [[0], [1]] if model is WING else [[0, 2], [1]]
     for k, (now, command) in enumerate(stream):
@@ -234,9 +234,9 @@ def test_detectors_of_flights_come_first_and_others_are_refused():
     assert names[:3] == ["bank-of-filters", "sliding-least-squares", "forgetting-least-squares"]
     assert len(names) > 3
     with pytest.raises(BadInput, match="--detector banc: is not known"):
-        detectors.check_detector("banc")
+        detectors.check_detector_name("banc")
     for name in names:
-        detectors.check_detector(name)
+        detectors.check_detector_name(name)
     slow = small.flight(BARE, 60, dt_s=0.2)
     with pytest.raises(BadInput, match="allowed: within 25% of the 10 Hz"):
-        detectors.diagnose_with(names[1], slow, BARE)
+        detectors.diagnose_with_detector(names[1], slow, BARE)

@@ -17,7 +17,7 @@ from beaver_ftc_logs.identification import (
     identify,
     regressor_names,
     residual_spectrum,
-    scale_commands_by_pressure,
+    scale_commands_by_dynamic_pressure,
 )
 from beaver_ftc_logs.pages import load_template
 from beaver_ftc_logs.samples import Samples, scale_by_dynamic_pressure
@@ -43,15 +43,15 @@ def pressed(flight, seed=3):
 
 def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    (anew,), described = scale_commands_by_pressure([pressed(flight)], its)
+    (anew,), described = scale_commands_by_dynamic_pressure([pressed(flight)], its)
     assert described.reference_airspeed_mps == pytest.approx(20.0, rel=0.02)
     ratio = (20.0 / described.reference_airspeed_mps) ** 2
     assert anew.commands == pytest.approx(ratio * flight.commands)
     wind = replace(flight, airspeed=pressed(flight).airspeed)
     for plain in ([wind], [flight]):
-        assert scale_commands_by_pressure(plain, its) == (plain, its)
+        assert scale_commands_by_dynamic_pressure(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
-    assert scale_commands_by_pressure([pressed(flight)], told)[1] == told
+    assert scale_commands_by_dynamic_pressure([pressed(flight)], told)[1] == told
 
 
 def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
@@ -60,12 +60,12 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
     by_speed = (flown.airspeed / 20.0)[:, None] ** np.array([[1.0, 2.0]])
     mixed = replace(flown, commands=flight.commands / by_speed)
     told = its.model_copy(update={"other_laws": True})
-    (anew,), described = scale_commands_by_pressure([mixed], told)
+    (anew,), described = scale_commands_by_dynamic_pressure([mixed], told)
     assert described.airspeed_powers == {"right": 1.0}
     ratio = 20.0 / described.reference_airspeed_mps
     assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
-    assert scale_commands_by_pressure([flown], told)[1].airspeed_powers == {}
-    assert scale_commands_by_pressure([mixed], its)[1].airspeed_powers == {}
+    assert scale_commands_by_dynamic_pressure([flown], told)[1].airspeed_powers == {}
+    assert scale_commands_by_dynamic_pressure([mixed], its)[1].airspeed_powers == {}
     said = identification_text(MODEL.model_copy(update={"vehicle": described, "identified": SAYS_LITTLE}))
     assert "right with airspeed^1\n" in said
     with pytest.raises(ValueError, match="contradictory"):
@@ -83,7 +83,7 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
     )
     monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
     its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    assert scale_commands_by_pressure(flights, its) == (flights, its)
+    assert scale_commands_by_dynamic_pressure(flights, its) == (flights, its)
     assert asked == [12.5, 12.5]
 
 
@@ -201,7 +201,7 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
 
 def test_inflation_is_of_the_regressors_without_the_constant():
     stretches = fitting.usable_stretches([small.flight(MODEL, 200)])
-    x = fitting.stacked_regression(stretches, MODEL.vehicle, MODEL.history, MODEL.lags)[0]
+    x = fitting.stacked_regression_data(stretches, MODEL.vehicle, MODEL.history, MODEL.lags)[0]
     found = {
         one["regressor"]: one["inflation"] for one in identification.collinear_regressors(stretches, MODEL)
     }
@@ -216,7 +216,7 @@ def test_inflation_is_of_the_regressors_without_the_constant():
 
 def test_colour_is_the_median_over_the_responses():
     stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
-    fit = fitting.fit_order(stretches, MODEL.vehicle, 2, 3)
+    fit = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
     found = identification.standard_error_inflation(stretches, MODEL)
     assert found == dict(zip("pqr", np.median(fit.standard_error_inflation[7:], axis=0), strict=True))
 
@@ -409,4 +409,4 @@ def test_a_flight_without_a_healthy_sample_is_refused_by_its_name():
     with pytest.raises(
         BadInput, match=r"^identify: lost: 0 samples known to be healthy, allowed: at least 2$"
     ):
-        identification._choose_noise_average(lost, model.vehicle, (4, 4))
+        identification._choose_noise_ma_coefficients(lost, model.vehicle, (4, 4))

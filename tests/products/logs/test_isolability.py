@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc_logs.bank import build_hypothesis_bank
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.findings import separability_sentences, separability_statement
+from beaver_ftc_logs.findings import isolability_document, isolability_sentences
 from beaver_ftc_logs.identification import identify
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
@@ -38,7 +38,7 @@ def shares_found(wing, folder, model, loss):
 
 def test_the_smallest_loss_is_where_flights_begin_to_show_it(wing, wing_folder, wing_model):
     healthy = sampled(wing, wing_folder, "said", duration_s=160.0, seed=49)
-    said = {tuple(one["surfaces"]): one for one in separability_statement(healthy, wing_model)["groups"]}
+    said = {tuple(one["surfaces"]): one for one in isolability_document(healthy, wing_model)["groups"]}
     smallest = said[("left",)]["smallest_loss"]["60"]
     assert 0.02 < smallest < 0.4
     assert shares_found(wing, wing_folder, wing_model, min(3.0 * smallest, 1.0)) > 0.8
@@ -58,7 +58,7 @@ def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder)
     named = []
     for part in ((80, 160, 0.2, 1.0), (80, 160, 1.0, 0.2)):
         samples = sampled(slaved, wing_folder, "one", duration_s=160.0, parts=(part,), seed=62)
-        assert separability_statement(samples, model)["together"][0]["surfaces"] == ["right", "left"]
+        assert isolability_document(samples, model)["together"][0]["surfaces"] == ["right", "left"]
         rows = diagnose(samples, model)
         named.append(set(rows.named_surfaces[rows.faulty == 1]) - {"unknown"})
         suspected = rows.faulty == 1
@@ -73,15 +73,15 @@ def test_groups_that_act_alike_or_opposed_are_not_separable(wing, wing_folder, w
     right = np.array(wing_model.response[0])
     model = wing_model.model_copy(update={"response": [right.tolist(), (sign * right).tolist()]})
     moved = replace(samples, commands=samples.commands[:, [0, 0]])
-    found = separability_statement(moved, model)
+    found = isolability_document(moved, model)
     (pair,) = found["alike"]
     assert pair["separable"] is False
     assert pair["cosine"] == pytest.approx(sign)
     assert (
         f"nearly proportional (cosine {named}): one may be named for the other."
-        in separability_sentences(found)[-1]
+        in isolability_sentences(found)[-1]
     )
-    assert separability_statement(samples, wing_model)["alike"][0]["separable"] is True
+    assert isolability_document(samples, wing_model)["alike"][0]["separable"] is True
 
 
 def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
@@ -97,12 +97,14 @@ def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
         information.append(moved @ inverse @ moved)
     settings = wing_model.settings
     for rate_hz in (10.0, 20.0):
-        found = separability_statement(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
+        found = isolability_document(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
         per_s = settings.power * np.mean(information) * rate_hz
         assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
         odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
         share = np.median(
-            build_hypothesis_bank(wing_model).change_share[build_hypothesis_bank(wing_model).is_fault_of(0)]
+            build_hypothesis_bank(wing_model).transition_share[
+                build_hypothesis_bank(wing_model).is_fault_of_group(0)
+            ]
         )
         change = settings.changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(np.log(settings.alarm / (1.0 - settings.alarm) / change), rel=1e-9)

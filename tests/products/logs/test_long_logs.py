@@ -32,7 +32,7 @@ print("PEAK", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 @pytest.fixture
 def parted(monkeypatch):
     """Parts of 500 rows, fits of 600 samples in stretches of 100."""
-    monkeypatch.setattr(readers, "PART_ROWS", 500)
+    monkeypatch.setattr(readers, "ROWS_PER_PART", 500)
     monkeypatch.setattr(samples, "MAX_FIT_SAMPLES", 600)
     monkeypatch.setattr(samples, "_STRETCH_SAMPLES", 100)
 

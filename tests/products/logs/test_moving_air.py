@@ -10,7 +10,7 @@ from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, sampl
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_residual_noise
 from beaver_ftc_logs.filtering import _update_gaussian, hypothesis_posterior
 from beaver_ftc_logs.model import FittedRanges, NoiseModel, as_text, load_model
-from beaver_ftc_logs.regression import split_response, split_whitened_response
+from beaver_ftc_logs.regression import unexplained_rates_and_responses, whitened_rates_and_responses
 from beaver_ftc_logs.samples import whiten_samples
 from products.logs import small
 
@@ -62,7 +62,7 @@ def test_a_fit_finds_the_colours_that_a_law_answers():
     """The response is 0.5. A fit that takes coloured noise for white is farther off."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.1 * i, 4000, i) for i in range(4)]
     white = identification.whiten_flights(flights, VEHICLE)
-    colours = [one.noise_average for one in white]
+    colours = [one.noise_ma_coefficients for one in white]
     assert colours == colours[:2] * 2
     assert len(set(colours)) == 2
     assert abs(first_response(white) - 0.5) < 0.5 * abs(first_response(flights) - 0.5)
@@ -82,7 +82,7 @@ def test_a_model_of_two_colours_takes_the_likelier():
     assert all(one.wider >= 1.0 for one in model.colours)
     for i in (0, 1):
         new = flown(AVERAGE if i else (1.0,), 0.5, 1500, 9 + i)
-        own = [one for one in model.colours if tuple(one.average) == white[i].noise_average]
+        own = [one for one in model.colours if tuple(one.average) == white[i].noise_ma_coefficients]
         alone = model.model_copy(update={"colours": own})
         both = hypothesis_posterior(new, model, build_hypothesis_bank(model))[0][300:]
         np.testing.assert_allclose(
@@ -130,15 +130,15 @@ def in_colour(before):
     plain = small.model()
     colour = NoiseModel(average=[1.0], noise=plain.noise, before=np.reshape(before, (-1, 3)).tolist())
     model = plain.model_copy(update={"colours": [colour]})
-    return model, replace(small.flight(model, 60), noise_average=(1.0,))
+    return model, replace(small.flight(model, 60), noise_ma_coefficients=(1.0,))
 
 
 def test_answers_and_constant_are_whitened_as_the_residual_is():
     """Of a steady flight by hand: what is foretold of a constant is its share; without a past nothing is."""
     by = np.diag([0.5, 0.2, 0.0])
     model, flight = in_colour([by, 0.1 * np.eye(3)])
-    ok, left, answers = split_whitened_response(flight, model)
-    known, plain, heard = split_response(flight, model)
+    ok, left, answers = whitened_rates_and_responses(flight, model)
+    known, plain, heard = unexplained_rates_and_responses(flight, model)
     np.testing.assert_allclose(left[7], plain[7] - plain[6] @ by - 0.1 * plain[5])
     np.testing.assert_allclose(answers[7], heard[7] - heard[6] @ by - 0.1 * heard[5])
     assert ok.sum() == known.sum() - 2
@@ -163,7 +163,7 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
     """Five memories long: else the scale takes back what was taken wider."""
     model, _ = in_colour(np.zeros((1, 3, 3)))
     model = model.model_copy(update={"colours": [model.colours[0].model_copy(update={"wider": wider})]})
-    flight = replace(small.flight(model, 3000, seed=3), noise_average=(1.0,))
+    flight = replace(small.flight(model, 3000, seed=3), noise_ma_coefficients=(1.0,))
     scale = hypothesis_posterior(flight, model, build_hypothesis_bank(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
     assert build_residual_noise(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
@@ -176,17 +176,17 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
     """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
     plain = small.model(small.WING | {"moving_air": True})
     colour = NoiseModel(average=list(average), noise=plain.noise)
-    monkeypatch.setattr(fitting, "_fit_without_parts", lambda *_: [(model, stretches)])
+    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *_: [(model, stretches)])
     found = []
     for laws in (False, True):
         vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
         model = plain.model_copy(update={"colours": [colour], "vehicle": vehicle})
-        flight = replace(small.flight(model, 400, seed=5), noise_average=average)
+        flight = replace(small.flight(model, 400, seed=5), noise_ma_coefficients=average)
         stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
         found.append(fitting._with_inflated_noise(stretches, model).noise_inflation(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
-    monkeypatch.setattr(fitting, "_squared_gain_error", lambda *_: (1e6, 1))
+    monkeypatch.setattr(fitting, "_normalized_squared_gain_error", lambda *_: (1e6, 1))
     assert fitting._with_inflated_noise(stretches, model).noise_inflation(average) == pytest.approx(
         200.0 * factor
     )
@@ -204,15 +204,15 @@ def moving():
 def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
-    trust.check_columns(flight, moving)
+    trust.check_columns_as_identified(flight, moving)
     found = [trust._bound_part_gains(whiten_samples(flight, one.average), moving) for one in moving.colours]
     likeliest = max(zip(found, moving.colours, strict=True), key=lambda pair: pair[0].log_likelihoods.mean())
-    assert likeliest[0].min_noise_scale == pytest.approx(1.0, abs=0.3)
+    assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
     assert all(1.0 < gain < 1.6 for gain in likeliest[0].max_group_gains)
     plain = trust._bound_part_gains(flight, moving.model_copy(update={"colours": []}))
     assert colour == (1.0,) or min(plain.max_group_gains) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
-        trust.check_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
+        trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 
 
 def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
@@ -221,9 +221,9 @@ def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
         commands=trust.central_range(flight.commands), rates=trust.central_range(flight.rates)
     )
     moving = moving.model_copy(update={"fitted": known})
-    trust.check_columns(flight, moving)
+    trust.check_columns_as_identified(flight, moving)
     with pytest.raises(BadInput, match=r"likely with `scale: 0.01745` on p_rad_s"):
-        trust.check_columns(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
+        trust.check_columns_as_identified(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
 
 
 @pytest.mark.parametrize(("keys", "rate_hz"), [
@@ -247,7 +247,7 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     gyros, others = found.colours[-len(samples.UNSEEN_GYRO_NOISE_RAD_S) :], found.colours[1:]
     others = others[: -len(gyros)]
     assert found.colours[0] == model.colours[0]
-    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE_AVERAGES} - {
+    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE_MA_COEFFICIENTS} - {
         tuple(model.colours[0].average)
     }
     for one in others:
@@ -264,7 +264,7 @@ def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     predictor of w[k] has the coefficients -(-g1 / S)^j."""
     model, gyro = small.model(history=1, past=(a * np.eye(3)).tolist()), 0.05
     process = np.diag([1.0, 4.0, 9.0]) * 1e-4
-    before, noise = gyro_noise.fit_residual_predictor(model, process, gyro, 40)
+    before, noise = gyro_noise.residual_predictor_by_yule_walker(model, process, gyro, 40)
     g0, g1 = np.diag(process) + gyro**2 * (1.0 + a**2), -a * gyro**2
     innovation = 0.5 * (g0 + np.sqrt(g0**2 - 4.0 * g1**2))
     np.testing.assert_allclose(noise, np.diag(innovation), rtol=1e-6, atol=1e-12)

@@ -7,7 +7,7 @@ from pyarrow import parquet
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, pages
 from beaver_ftc_logs.findings import verdict_document
-from beaver_ftc_logs.fitting import Stretch, fit_order, usable_stretches
+from beaver_ftc_logs.fitting import Stretch, fit_least_squares_of_order, usable_stretches
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.samples import Samples
 from kept import page, picture
@@ -93,7 +93,7 @@ def test_the_page_of_a_flight(changed, monkeypatch, flown, name):
 def test_the_page_of_a_flight_with_gaps_and_surfaces_together(changed, monkeypatch):
     monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
     ages = {"roll": 0.126, "pitch": 0.05}
-    samples = small.flight(TAIL, gap=100, held_column_age_s=ages, notes=("a < remark",), name="a & b")
+    samples = small.flight(TAIL, gap=100, held_column_mean_age_s=ages, notes=("a < remark",), name="a & b")
     rows = small.rows([(20, "", [1.0] * 3), (20, "left_aileron+right_aileron", [0.5, 1.0, 0.5])], 3)
     assert not changed(
         page(pages.render_diagnosis(samples, TAIL, rows, verdict_document(samples, TAIL, rows)))
@@ -203,9 +203,9 @@ def test_the_pictures_of_an_identification(changed):
     spectrum = pages._spectrum_figure(stretches, model)
     assert not changed(picture(spectrum), part="spectrum")
     assert spectrum.get_size_inches().tolist() == pytest.approx([7.5, 3.2])
-    fit = fit_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
-    correlation = pages._correlation_figure(fit, names)
+    correlation = pages._coefficient_correlation_figure(fit, names)
     assert not changed(picture(correlation), part="correlation")
     assert correlation.get_size_inches().tolist() == pytest.approx([3.3 + 0.19 * 13, 2.5 + 0.19 * 13])
 
@@ -245,12 +245,12 @@ def test_the_liveliest_window():
     rates[[2, 3, 8, 9]] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
     rates[6] = np.nan
     known = np.array([0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11])
-    assert pages._start_of_liveliest_window(rates, known, 2) == 8
-    assert pages._start_of_liveliest_window(rates, known[:6], 2) == 2
-    assert pages._start_of_liveliest_window(rates, known, 3) == 7
-    assert pages._start_of_liveliest_window(rates, known, 11) == 0
-    assert pages._start_of_liveliest_window(rates, known, 12) == 0
-    assert pages._start_of_liveliest_window(rates[1:], known[:-1] - 0, 10) == 0
+    assert pages._start_of_most_active_window(rates, known, 2) == 8
+    assert pages._start_of_most_active_window(rates, known[:6], 2) == 2
+    assert pages._start_of_most_active_window(rates, known, 3) == 7
+    assert pages._start_of_most_active_window(rates, known, 11) == 0
+    assert pages._start_of_most_active_window(rates, known, 12) == 0
+    assert pages._start_of_most_active_window(rates[1:], known[:-1] - 0, 10) == 0
 
 
 def test_a_prediction_is_shown_over_forty_seconds():

@@ -15,7 +15,7 @@ def log():
     vehicle = small.vehicle(small.TAIL | NAMED)
     samples = small.flight(small.model(small.TAIL), n=4)
     rates = np.array([[1.0, 2.0, 3.0]]) * [[1.0], [1.1], [1.3], [1.7]]
-    assert vehicle.past_regressor_names == [
+    assert vehicle.signal_regressor_names == [
         "alpha",
         "beta",
         *(f"{n} by airspeed" for n in (*small.RATES.values(), "alpha", "beta")),
@@ -26,7 +26,7 @@ def log():
 
 
 def column(samples, vehicle, name):
-    names = [*small.RATES.values(), *vehicle.past_regressor_names]
+    names = [*small.RATES.values(), *vehicle.signal_regressor_names]
     return np.column_stack([samples.rates, samples.signals])[:, names.index(name)]
 
 
@@ -36,7 +36,7 @@ def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
     for name in ("q_rad_s", "beta"):
         scaled = found[f"`scale: 57.3` on {name}"]
         assert scaled.log_density == pytest.approx(np.log(57.29578) if name == "q_rad_s" else 0.0)
-        for other in (*small.RATES.values(), *vehicle.past_regressor_names):
+        for other in (*small.RATES.values(), *vehicle.signal_regressor_names):
             factor = 57.29577951 if other.removesuffix(" by airspeed") == name else 1.0
             np.testing.assert_allclose(
                 column(scaled.samples, vehicle, other), factor * column(samples, vehicle, other)
@@ -51,7 +51,7 @@ def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
         found["the commands of left_aileron and right_aileron exchanged"],
     )
     pairs = {"p_rad_s": "r_rad_s", "r_rad_s": "p_rad_s"}
-    for name in (*small.RATES.values(), *vehicle.past_regressor_names):
+    for name in (*small.RATES.values(), *vehicle.signal_regressor_names):
         stem = name.removesuffix(" by airspeed")
         source = name.replace(stem, pairs.get(stem, stem))
         np.testing.assert_array_equal(column(rates, vehicle, name), column(samples, vehicle, source))

@@ -21,7 +21,9 @@ def test_surfaces_whose_commands_are_proportional_are_one_group(off, together):
         "d": {"pitch": 0.1},
     }
     vehicle = small.vehicle(small.WING, surfaces=table, labels={})
-    assert regression.group_surfaces(vehicle) == ([[0, 2], [1, 3]] if together else [[0], [1, 3], [2]])
+    assert regression.group_surfaces_by_commands(vehicle) == (
+        [[0, 2], [1, 3]] if together else [[0], [1, 3], [2]]
+    )
 
 
 @pytest.mark.parametrize("history", [1, 2, 4])
@@ -65,9 +67,12 @@ def test_a_flight_shorter_than_the_past():
 def test_columns_of_groups_become_those_of_surfaces():
     values = np.array([[0.2, 0.4], [0.6, 0.8]])
     assert regression.surface_indices_by_group(TAIL) == [[0, 2], [1]]
-    assert regression.columns_by_surface(values, TAIL).tolist() == [[0.2, 0.4, 0.2], [0.6, 0.8, 0.6]]
+    assert regression.group_values_by_surface(values, TAIL).tolist() == [[0.2, 0.4, 0.2], [0.6, 0.8, 0.6]]
     apart = TAIL.model_copy(update={"groups": [["elevator"]]})
-    assert regression.columns_by_surface(values[:, :1], apart).tolist() == [[1.0, 0.2, 1.0], [1.0, 0.6, 1.0]]
+    assert regression.group_values_by_surface(values[:, :1], apart).tolist() == [
+        [1.0, 0.2, 1.0],
+        [1.0, 0.6, 1.0],
+    ]
 
 
 def drawn(n=40, m=4, seed=1):
@@ -181,7 +186,7 @@ def test_what_a_model_predicts_does_not_depend_on_later_samples():
         samples,
         **{k: getattr(samples, k)[:40] for k in ("rates", "commands", "signals", "labels", "stretch_number")},
     )
-    whole, cut = (regression.split_response(one, WING) for one in (samples, short))
+    whole, cut = (regression.unexplained_rates_and_responses(one, WING) for one in (samples, short))
     for one, other in zip(whole, cut, strict=True):
         np.testing.assert_array_equal(one[:40], other)
 

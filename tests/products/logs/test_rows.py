@@ -174,7 +174,7 @@ def test_names_under_other_laws(monkeypatch):
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "fault_evidence_gains", lambda posterior, bank: gained)
+    monkeypatch.setattr(diagnose, "fault_evidence_increments", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
     bank = build_hypothesis_bank(model)
 
@@ -196,10 +196,10 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         given.append(of[3:])
         return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
-    monkeypatch.setattr(diagnose.energy, "without_surfaces_after_engine_failure", renamed)
+    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_after_engine_failure", renamed)
     model = SimpleNamespace(fitted=SimpleNamespace(energy_climb=-1.5))
-    found = diagnose._without_names_after_engine_failure(
-        SimpleNamespace(energy_climb_mps="climb"), model, rows
+    found = diagnose._withdraw_isolation_after_engine_failure(
+        SimpleNamespace(energy_height_rate_mps="climb"), model, rows
     )
     assert given[0][:2] == ("climb", -1.5)
     assert found.named_surfaces.tolist() == ["left", UNKNOWN_OFFSET, "right"]
@@ -212,8 +212,8 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         (SimpleNamespace(energy_climb=None), "climb"),
         (model.fitted, None),
     ):
-        alike = diagnose._without_names_after_engine_failure(
-            SimpleNamespace(energy_climb_mps=climb), SimpleNamespace(fitted=fitted), rows
+        alike = diagnose._withdraw_isolation_after_engine_failure(
+            SimpleNamespace(energy_height_rate_mps=climb), SimpleNamespace(fitted=fitted), rows
         )
         assert alike is rows
 

@@ -139,7 +139,7 @@ def test_a_log_on_one_time_base():
     label = np.where(t_s < 0.99, np.nan, np.where(t_s < 2.99, 1.0, 0.5))
     np.testing.assert_array_equal(found.labels[:, 1], label)
     assert (found.name, found.dt_s, found.signals.shape) == ("log", pytest.approx(0.1), (60, 0))
-    assert found.held_column_age_s == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
+    assert found.held_column_mean_age_s == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
     assert found.notes == ("said of the log", "a row is left out")
     assert (found.logged_failures, found.log_stamps_s is given.columns["p_rad_s"].t_s) == (
         given.logged_failures,
@@ -236,7 +236,7 @@ def test_two_flights_of_one_name_are_refused(tmp_path):
     (3e-8, " (time in ns would be 30 Hz)"), (5e-9, ""),
 ])  # fmt: skip
 def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
-    assert of._other_time_units(rate_hz) == says
+    assert of._other_time_unit_hint(rate_hz) == says
 
 
 def test_labels_are_the_last_ones_of_each_surface_that_has_them():
@@ -254,10 +254,14 @@ def test_airspeed_and_energy_are_known_where_their_columns_are():
     for altitude, speed, there in (("alt", "V", True), ("alt", "W", False), ("one", "V", False)):
         vehicle = small.vehicle(energy={"altitude": altitude, "airspeed": speed}, airspeed=speed)
         climb, airspeed = (
-            of._sampled_energy_climb_mps(log, vehicle, base),
+            of._sampled_energy_height_rate_mps(log, vehicle, base),
             of._sampled_airspeed(log, vehicle, t_s, 1.0),
         )
         assert (climb is not None, airspeed is not None) == (there, speed == "V")
         if there:
             np.testing.assert_allclose(climb, [np.nan] * 5 + [3.0] * 3)
-    assert of._sampled_energy_climb_mps(log, WING, base) is of._sampled_airspeed(log, WING, t_s, 1.0) is None
+    assert (
+        of._sampled_energy_height_rate_mps(log, WING, base)
+        is of._sampled_airspeed(log, WING, t_s, 1.0)
+        is None
+    )

@@ -19,12 +19,12 @@ def noise(seed=1):
 def test_for_how_long_a_signal_stands_still():
     values = noise()
     values[200:261] = values[200]
-    still = signals.still_time_s(Column(T_S, values))
+    still = signals.unchanged_time_s(Column(T_S, values))
     assert still[211] == 0.0
     assert still[212] == pytest.approx(0.6)
     assert still[260] == pytest.approx(3.0)
     assert not still[261:].any()
-    assert signals.column_mistakes("p", Column(T_S, values), measured=True) == [
+    assert signals.column_defect_texts("p", Column(T_S, values), measured=True) == [
         "p: frozen, the same to the last bit for 3.0 s"
     ]
 
@@ -35,7 +35,7 @@ def test_a_clipped_rate_and_one_that_is_not():
         rows = signals.is_clipped(side * np.clip(free, -9.0, 2.0))
         assert rows.sum() > 100
         assert (free[rows] >= 2.0).all()
-        said = signals.column_mistakes("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), measured=True)
+        said = signals.column_defect_texts("p", Column(T_S, side * np.clip(free, -9.0, 2.0)), measured=True)
         assert said[-1] == f"p: clipped at 2 in {rows.sum()} rows"
     assert not signals.is_clipped(free).any()
     assert not signals.is_clipped(np.zeros(500)).any()
@@ -52,22 +52,22 @@ def test_jumps_are_single_rows_that_come_back():
     values = noise()
     values[[100, 700]] += 50.0
     values[900:] += 50.0
-    assert signals.find_jump_rows(values).tolist() == [100, 700]
-    assert not len(signals.find_jump_rows(noise()))
-    assert signals.find_jump_rows(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
+    assert signals.find_spike_rows(values).tolist() == [100, 700]
+    assert not len(signals.find_spike_rows(noise()))
+    assert signals.find_spike_rows(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
     held = np.repeat(noise(), 3)
     held[[400, 2200]] -= 50.0
-    assert signals.find_jump_rows(held).tolist() == [400, 2200]  # a log of more rows than readings
-    said = signals.column_mistakes("p", Column(T_S, values), measured=True)
+    assert signals.find_spike_rows(held).tolist() == [400, 2200]  # a log of more rows than readings
+    said = signals.column_defect_texts("p", Column(T_S, values), measured=True)
     assert said == ["p: 2 jumps, the first at 5.00 s"]
 
 
 def test_rows_without_a_number_are_counted():
     values = noise()
     values[3:10] = np.nan
-    (said,) = signals.column_mistakes("p", Column(T_S, values, ""), measured=True)
+    (said,) = signals.column_defect_texts("p", Column(T_S, values, ""), measured=True)
     assert said == "p: rows without a number: 7 of 1200"
-    assert signals.column_mistakes("u", Column(T_S, np.full(1200, 0.1)), measured=False)[-1].startswith(
+    assert signals.column_defect_texts("u", Column(T_S, np.full(1200, 0.1)), measured=False)[-1].startswith(
         "u: does not move"
     )
 
@@ -97,11 +97,11 @@ def test_a_wrong_unit_of_rate_or_roll_is_found_by_kinematics(rate, angle, says):
     phi, theta, rates = turning()
     columns = [Column(T_S, rate * one) for one in rates]
     pitch = Column(T_S, theta) if angle == 1.0 else None
-    found = physics.fit_roll(columns, Column(T_S, angle * phi), pitch)
+    found = physics.fit_roll_angle_to_rates(columns, Column(T_S, angle * phi), pitch)
     if pitch is not None:
         assert found.slope == pytest.approx(1.0 / rate, rel=2e-3)
         assert abs(found.correlation) > 0.9999
-    said = physics.angle_remark(found, "p", "roll")
+    said = physics.angle_rate_remark(found, "p", "roll")
     assert (said is None) if says is None else (says in said)
 
 
@@ -115,13 +115,13 @@ def test_of_a_short_log_more_is_needed(seconds, rate, says):
     kept = T_S - T_S[0] <= seconds
     t_s = T_S[kept]
     columns = [Column(t_s, rate * one[kept]) for one in rates]
-    found = physics.fit_roll(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
-    assert (found is not None and physics.angle_remark(found, "p", "roll") is not None) is says
+    found = physics.fit_roll_angle_to_rates(columns, Column(t_s, phi[kept]), Column(t_s, theta[kept]))
+    assert (found is not None and physics.angle_rate_remark(found, "p", "roll") is not None) is says
 
 
 def test_nothing_is_said_of_a_roll_that_does_not_move():
     still = Column(T_S, np.zeros(len(T_S)))
-    assert physics.fit_roll([still] * 3, still, None) is None
+    assert physics.fit_roll_angle_to_rates([still] * 3, still, None) is None
 
 
 @pytest.mark.parametrize(("mean", "says"), [
@@ -152,7 +152,9 @@ def test_swapped_rates_are_found_by_the_roll_they_make():
 ])  # fmt: skip
 def test_a_wrong_pitch_rate_alone_is_found_by_the_pitch_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
-    found = physics.fit_pitch([Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta))
+    found = physics.fit_pitch_angle_to_rates(
+        [Column(T_S, one) for one in (p, q, r)], Column(T_S, phi), Column(T_S, theta)
+    )
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": Column(T_S, p), "gy": Column(T_S, factor * q), "gz": Column(T_S, r)}
     angles = [("roll", Column(T_S, phi)), ("pitch", Column(T_S, angle * theta)), None]
@@ -175,7 +177,9 @@ def yawed(seed=1):
 def test_a_wrong_yaw_rate_is_found_by_the_yaw_angle(factor, angle, says):
     phi, theta, (p, q, r) = turning()
     columns = [Column(T_S, one) for one in (p, q, r)]
-    found = physics.fit_yaw(columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed()))
+    found = physics.fit_yaw_angle_to_rates(
+        columns, Column(T_S, phi), Column(T_S, theta), Column(T_S, yawed())
+    )
     assert (found.slope, found.correlation) == (pytest.approx(1.0, rel=2e-3), pytest.approx(1.0, abs=1e-3))
     rates = {"gx": columns[0], "gy": columns[1], "gz": Column(T_S, factor * r)}
     angles = [
@@ -210,7 +214,7 @@ def test_nothing_is_said_where_the_nose_is_steep():
     rates = {"gx": still, "gy": Column(t_s, np.full(len(t_s), 0.3)), "gz": still}
     angles = [("roll", Column(t_s, phi)), ("pitch", Column(t_s, theta)), ("yaw", Column(t_s, psi))]
     assert physics.find_attitude_mistake(rates, angles, {}) is None
-    assert physics.fit_roll(list(rates.values()), angles[0][1], angles[1][1]) is None
+    assert physics.fit_roll_angle_to_rates(list(rates.values()), angles[0][1], angles[1][1]) is None
 
 
 def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
@@ -221,5 +225,5 @@ def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
     late = t_s >= 10.0
     t_s, roll = t_s + 5.0 * late, roll + 1.0 * late
     zero = Column(t_s, np.zeros(len(t_s)))
-    found = physics.fit_roll([Column(t_s, p), zero, zero], Column(t_s, roll), None)
+    found = physics.fit_roll_angle_to_rates([Column(t_s, p), zero, zero], Column(t_s, roll), None)
     assert (found.slope, found.correlation) == (pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=1e-3))

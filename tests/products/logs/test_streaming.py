@@ -7,7 +7,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import (
     detector_names,
-    diagnose_with,
+    diagnose_with_detector,
     loop_detector_context,
     loop_detector_inputs,
     rows_of_verdicts,
@@ -63,7 +63,7 @@ def test_the_design_model_answers_the_rates_as_the_fit_does(flown, wing_model):
 
 @pytest.mark.parametrize("name", ["multiple-models", "sliding-least-squares"])
 def test_a_rival_finds_a_large_loss(flown, wing_model, name):
-    rows = diagnose_with(name, flown, wing_model)
+    rows = diagnose_with_detector(name, flown, wing_model)
     late = rows.t_s > 90.0
     assert rows.faulty[late].mean() > 0.8
     assert np.mean(rows.named_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
@@ -72,7 +72,7 @@ def test_a_rival_finds_a_large_loss(flown, wing_model, name):
 
 def test_every_detector_gives_rows(flown, wing_model):
     for name in detector_names():
-        rows = diagnose_with(name, flown, wing_model)
+        rows = diagnose_with_detector(name, flown, wing_model)
         assert len(rows.t_s) == len(flown.t_s)
         assert (
             (rows.effectiveness_low <= rows.effectiveness) & (rows.effectiveness <= rows.effectiveness_high)
@@ -93,4 +93,4 @@ def test_verdicts_become_rows(flown, wing_model):
 
 def test_an_unknown_detector(flown, wing_model):
     with pytest.raises(BadInput, match="--detector ekf: is not known"):
-        diagnose_with("ekf", flown, wing_model)
+        diagnose_with_detector("ekf", flown, wing_model)

@@ -8,9 +8,9 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
-from beaver_ftc_logs.bank import build_adaptation_limits
-from beaver_ftc_logs.diagnose import diagnose, without_rows_not_credible
-from beaver_ftc_logs.findings import as_text, separability_statement, verdict_document
+from beaver_ftc_logs.bank import build_trim_and_gain_state_model
+from beaver_ftc_logs.diagnose import blank_rows_not_credible, diagnose
+from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.readings import CorrectedReading
 from products.logs import small
@@ -141,7 +141,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = trust.explained_effect_share(
+    share = trust.effect_share_explained_by_others(
         [(small.flight(model, n=2000, commands=commands, rates=flown.rates), np.ones(2000, bool))],
         small.model(history=4, lags=3),
     )
@@ -151,7 +151,10 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
     assert (
-        trust.explained_effect_share([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[0] == 0.0
+        trust.effect_share_explained_by_others([(far, np.ones(2000, bool))], small.model(history=4, lags=3))[
+            0
+        ]
+        == 0.0
     )
 
 
@@ -159,16 +162,16 @@ def test_a_surface_that_never_moved_is_not_claimed(model):
     still = small.flight(model, n=1200, seed=2)
     still.commands[:, 0] = 0.2
     known = trusted(still)
-    assert trust.groups_with_known_effect(known) == [False, True]
+    assert trust.is_group_effect_known(known) == [False, True]
     rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
     assert (rows.effectiveness_low[:, 0] == 0.0).all()
     assert (rows.effectiveness_high[:, 0] == 1.0).all()
     assert set(rows.named_surfaces) <= {"", "unknown", "right+left"}
     assert not (rows.faulty & (rows.named_surfaces == "")).any()
-    (line,) = trust.unknown_effect_lines(known)
+    (line,) = trust.unknown_effect_sentences(known)
     assert line.startswith("of what right does, 100.0%")
     with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
-        right, left = separability_statement(still, known)["groups"]
+        right, left = isolability_document(still, known)["groups"]
     assert set(right["smallest_loss"].values()) == {None}
     assert left["smallest_loss"]["60"] < 0.5
 
@@ -191,11 +194,11 @@ def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
     flown = small.flight(small.model(), n=3000, seed=6)
     model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle(other_laws=True))
     stretches = fitting.usable_stretches([flown])
-    x, _, _ = fitting.stacked_regression(stretches, model.vehicle, model.history, model.lags)
-    fit = fitting.fit_order(stretches, model.vehicle, model.history, model.lags)
+    x, _, _ = fitting.stacked_regression_data(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
     white = replace(fit, standard_errors=fit.standard_errors / fit.standard_error_inflation)
     sd = np.sqrt(np.diag(fit.residual_covariance))
-    for g, found in enumerate(fitting.group_gain_sd(white, model)):
+    for g, found in enumerate(fitting.group_gain_standard_error(white, model)):
         first = x.shape[1] - (len(model.groups) - g) * model.lags
         place = np.arange(x.shape[1])
         own = (place >= first) & (place < first + model.lags)
@@ -226,7 +229,7 @@ def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
     def spread(*errors):
         known = model.fitted.model_copy(update={"gain_sd": list(errors)})
         given = model.model_copy(update={"fitted": known})
-        return np.diag(build_adaptation_limits(given).initial_covariance)[4:]
+        return np.diag(build_trim_and_gain_state_model(given).initial_covariance)[4:]
 
     step, own = model.settings.level_step, model.settings.own_gain_sd
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
@@ -247,7 +250,7 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
 def test_commands_that_nothing_follows_are_not_credible(model):
     flown = small.flight(model, n=600, seed=4)
     still = np.arange(600) >= 400
-    rows = without_rows_not_credible(flown, model, diagnose(flown, model), has_no_response=still)
+    rows = blank_rows_not_credible(flown, model, diagnose(flown, model), has_no_response=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
     assert [reason.split(":")[0] for reason in rows.reasons_not_credible] == ["nothing answers the commands"]
@@ -307,7 +310,7 @@ def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, l
     for value in (low - 0.02, low + 0.02, high - 0.02, high + 0.02):
         flown = {of: np.tile(values, (300, 1)) for of, values in middle.items()}
         flown[kind][:, column] = value
-        found = trust.rows_outside_model(small.flight(model, **flown), known)
+        found = trust.rows_not_credible_by_reason(small.flight(model, **flown), known)
         first, last = SPANS[kind][column]
         says = f"{name} is outside {first:.3g} to {last:.3g}, where the model was fitted"
         assert list(found) == ([] if low < value < high else [says])
@@ -331,29 +334,31 @@ def test_for_how_long_each_column_may_stand_still():
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
-    assert trust._max_still_s(samples, model) == most
-    assert trust._max_still_s(samples, small.model()) == dict(
+    assert trust._max_unchanged_time_s(samples, model) == most
+    assert trust._max_unchanged_time_s(samples, small.model()) == dict(
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
     short = replace(samples, t_s=np.arange(3.0), still_s=still_s)
-    assert trust.is_dead_sample(short, model).tolist() == [False, True, False]
+    assert trust.is_frozen_or_clipped_sample(short, model).tolist() == [False, True, False]
     clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
-    assert trust.is_dead_sample(clipped, model).tolist() == [False, True, True]
+    assert trust.is_frozen_or_clipped_sample(clipped, model).tolist() == [False, True, True]
 
 
 def test_a_group_that_is_tied_to_98_of_a_hundred_is_not_claimed():
     model = small.model(fitted={"commands": [], "rates": [], "tied": [0.98, 0.979]})
-    assert (trust.groups_with_known_effect(model), trust.surfaces_of_unknown_effect(model)) == (
+    assert (trust.is_group_effect_known(model), trust.surfaces_of_unknown_effect(model)) == (
         [False, True],
         {"right"},
     )
     says = (
         "of what right does, 98.0% follows from the rates, signals and other surfaces of the flights fitted"
     )
-    assert trust.unknown_effect_lines(model) == [f"{says}: its effect cannot be told, nothing is said of it"]
+    assert trust.unknown_effect_sentences(model) == [
+        f"{says}: its effect cannot be told, nothing is said of it"
+    ]
     for unknown in (small.model(), small.model(fitted={"commands": [], "rates": []})):
-        assert (trust.groups_with_known_effect(unknown), trust.unknown_effect_lines(unknown)) == (
+        assert (trust.is_group_effect_known(unknown), trust.unknown_effect_sentences(unknown)) == (
             [True, True],
             [],
         )
@@ -364,12 +369,14 @@ def test_what_is_kept_of_the_flights_fitted():
     reach over that of the fit."""
     climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
     use = np.arange(23) != 21
-    one = small.flight(small.model(), 23, energy_climb_mps=climbs, still_s={"roll": np.array([0.3, 0.2])})
+    one = small.flight(
+        small.model(), 23, energy_height_rate_mps=climbs, still_s={"roll": np.array([0.3, 0.2])}
+    )
     other = small.flight(small.model(), 23, still_s={"roll": np.array([0.4]), "air": np.array([0.7])})
     flights = [(other, use), (one, use)]
-    assert trust._unpowered_climb_mps(flights) == pytest.approx(3.0)
-    assert trust._unpowered_climb_mps(flights[:1]) is None
-    assert trust._longest_still_times_s(flights) == {"roll": 0.4, "air": 0.7}
+    assert trust._unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)
+    assert trust._unpowered_energy_height_rate_mps(flights[:1]) is None
+    assert trust._longest_unchanged_times_s(flights) == {"roll": 0.4, "air": 0.7}
     model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
     commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
     flown = replace(other, commands=commands)
@@ -406,7 +413,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
     """Of a rate what its past does to other axes than its own; of a signal what it does to all."""
     model = small.model(small.TAIL)
     flown = small.flight(model, n=7)
-    found, names = trust._column_contributions(flown, model)
+    found, names = trust._column_contributions_to_rates(flown, model)
     past, rates = np.array(model.past), flown.rates
     assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
     for k in range(2, 7):
@@ -428,7 +435,7 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
     monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: moved)
     model = SimpleNamespace(groups=[["right", "left"]], fitted=None)
-    found = trust._PartGains([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
+    found = trust._FlightPartGains([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
     wrong = trust._column_mistakes(None, model, found)
     if not says:
         assert wrong == {}
@@ -452,7 +459,7 @@ def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkey
     found: dict[str, str] = {}
     for most in (-0.31, 0.19):
         found |= trust._column_mistakes(
-            None, model, trust._PartGains([most], [0.0], {"V": 0.1}, 1.0, np.zeros(4))
+            None, model, trust._FlightPartGains([most], [0.0], {"V": 0.1}, 1.0, np.zeros(4))
         )
     assert [what for what in ("sign wing", "unit wing", "columns") if what in found] == refused
 

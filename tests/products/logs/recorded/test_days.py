@@ -38,8 +38,8 @@ def test_drawn_days(changed):
 
 CHANGES = {
     "nothing": {},
-    "trim": {"trim_commands": np.array([0.02, -0.03])},
-    "neutral": {"neutral_commands": np.array([0.02, -0.03])},
+    "trim": {"trim_shift_commands": np.array([0.02, -0.03])},
+    "neutral": {"neutral_shift_commands": np.array([0.02, -0.03])},
     "own": {"surface_gains": np.array([0.9, 1.2])},
     "gain": {"common_gain": 1.25},
     "late": {"command_delay_s": 0.04},
@@ -82,7 +82,7 @@ def test_a_day_by_hand(flown, name):
     commands = mean + (flown.commands - mean) * day.motion_scale / (day.common_gain * day.surface_gains)
     left = np.where(np.isfinite(flown.labels), flown.labels, 1.0)
     np.testing.assert_allclose(
-        other.commands, commands + day.neutral_commands + day.trim_commands / left, atol=1e-12
+        other.commands, commands + day.neutral_shift_commands + day.trim_shift_commands / left, atol=1e-12
     )
     mean = slow(flown.rates)
     rates = mean + day.motion_scale * (flown.rates - mean)
@@ -189,13 +189,14 @@ def test_only_labelled_data_sets_have_other_days(monkeypatch, tmp_path, data):
 def test_a_day_that_nothing_changes_is_its_defaults():
     same = unchanged_day(3)
     assert [
-        values.tolist() for values in (same.trim_commands, same.neutral_commands, same.surface_gains)
+        values.tolist()
+        for values in (same.trim_shift_commands, same.neutral_shift_commands, same.surface_gains)
     ] == [
         [0.0] * 3,
         [0.0] * 3,
         [1.0] * 3,
     ]
-    bare = DayChanges("x", same.trim_commands, same.neutral_commands, same.surface_gains)
+    bare = DayChanges("x", same.trim_shift_commands, same.neutral_shift_commands, same.surface_gains)
     assert (bare.common_gain, bare.command_delay_s, bare.motion_scale, bare.noise_ratio, bare.trim_drift) == (
         1.0,
         0.0,

@@ -33,7 +33,7 @@ def test_drawn_days_differ_as_much_as_is_said():
     days = random_days(4, range(900))
     assert len({day.name for day in days}) == len({day.common_gain for day in days}) == 900
     bells = {
-        "trim_commands": (np.array, 0.015), "neutral_commands": (np.array, 0.01),
+        "trim_shift_commands": (np.array, 0.015), "neutral_shift_commands": (np.array, 0.01),
         "surface_gains": (np.log, 0.03), "common_gain": (np.log, 0.1), "command_delay_s": (np.array, 0.02),
         "motion_scale": (np.log, 0.25),
     }  # fmt: skip

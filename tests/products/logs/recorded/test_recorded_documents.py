@@ -139,7 +139,7 @@ def two_methods(monkeypatch):
 
 
 def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_methods):
-    monkeypatch.setattr(fitting, "_DELAY_CANDIDATES_SAMPLES", (0.0,))  # quick
+    monkeypatch.setattr(fitting, "_COMMAND_DELAY_CANDIDATES_SAMPLES", (0.0,))  # quick
     flight = small.flight(MODEL, 1000, lost=LOST)
     data = data_set(MODEL, [flight])
     document = benchmark._compare_methods(data)
@@ -152,7 +152,7 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
     assert document["rows"][0]["classes"] > document["rows"][1]["classes"] > 0.4
     stretches = fitting.usable_stretches([flight])
     whole = fitting.fit_model(stretches, MODEL.vehicle)
-    bounds = fitting.score_folds(stretches, whole)[1]
+    bounds = fitting.score_folds_and_choose_credible_mass(stretches, whole)[1]
     expected = whole.settings.model_copy(update={"bounds": bounds})
     assert benchmark.settings_of_whole_flight(stretches, data) == expected
 
@@ -185,9 +185,9 @@ def test_settings_of_several_flights_are_those_of_the_fit():
 
 def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
-    monkeypatch.setattr(benchmark, "diagnose_with", lambda name, samples, model: name)
+    monkeypatch.setattr(benchmark, "diagnose_with_detector", lambda name, samples, model: name)
     stretch = Stretch(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._rows_of_methods(recording(stretch.samples), stretch, MODEL))
+    found = list(benchmark._diagnosis_rows_of_methods(recording(stretch.samples), stretch, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip

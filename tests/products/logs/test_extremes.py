@@ -165,3 +165,21 @@ def test_the_interval_holds_nine_tenths_of_a_posterior_that_is_known(n):
     found = extremes.expected_false_alarms_per_hour(tail, 7.0)
     assert np.log(found.high / found.low) == pytest.approx(2.0 * 1.645 * 1.5 / np.sqrt(n), rel=0.05)
     assert np.sqrt(found.high * found.low) == pytest.approx(2.0 * n / np.e, rel=0.02)
+
+
+def test_few_peaks_move_shape_and_scale_from_the_prior_by_their_likelihood():
+    """Generalised Pareto in closed form, a normal prior of the shape with a standard deviation of 0.2, over
+    shapes from -0.5 to 0.5 and scales from a fifth to five times the mean; each peak counts for 1 / 2.5."""
+    excess = np.array([0.3, 1.1, 7.2])
+    tail = extremes.PeakTail(level=5.0, excess=excess.tolist(), minutes=30.0, dispersion=2.5)
+    shape, scale, weight = extremes._pareto_posterior(tail)
+    assert (shape.min(), shape.max()) == pytest.approx((-0.5, 0.5))
+    assert (scale.min(), scale.max()) == pytest.approx((excess.mean() / 5.0, 5.0 * excess.mean()))
+    expected = np.zeros(len(shape))
+    for i, (xi, sigma) in enumerate(zip(shape, scale, strict=True)):
+        base = 1.0 + xi * excess / sigma
+        if (base <= 0.0).any():
+            continue
+        density = np.exp(-excess / sigma) if abs(xi) < 1e-9 else base ** (-1.0 / xi - 1.0)
+        expected[i] = np.prod(density / sigma) ** (1.0 / 2.5) * np.exp(-0.5 * (xi / 0.2) ** 2)
+    np.testing.assert_allclose(weight, expected / expected.sum(), rtol=1e-6, atol=1e-12)

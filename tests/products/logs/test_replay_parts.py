@@ -25,36 +25,63 @@ SAID = [
 ]
 T_S = np.arange(len(SAID)) * 0.5
 
+# With what candidates and estimates beyond the bounds say; bounds of single faults that differ in each row.
+SAYS = [
+    *SAID,
+    Verdict(True, candidates=("flap", "elevator")),
+    Verdict(True, candidates=("elevator", "unanticipated")),
+    Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.9),
+    Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.1),
+]
+ROW = np.arange(len(SAYS))
+ALONE = (
+    np.array([0.9, 0.5, 0.7, 0.4]) - 0.01 * ROW[:, None],
+    np.array([0.97, 0.7, 0.8, 0.95]) + 0.001 * ROW[:, None],
+)
+BOUNDS = {  # low and high of each row
+    "aileron": ([0.9, 0, 1, 1, 1, 0.85, 0, 1, 0, 1, 1], [1, 1, 1, 1, 1, 0.975, 1, 1, 1, 1, 1]),
+    "elevator": (
+        [0.5, 0, 0.48, 1, 1, 1, 0, 0.43, 0, 0.41, 0.4], [1, 1, 0.702, 1, 1, 1, 1, 1, 1, 0.709, 0.71],
+    ),
+    "rudder": ([0.7, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1], [1] * 11),
+    "flap": ([0.4, 0, 1, 1, 1, 1, 0, 0.33, 0, 1, 1], [1] * 11),
+}  # fmt: skip
 
-ALONE = (np.tile([0.9, 0.5, 0.7, 0.0], (len(SAID), 1)), np.tile([1.0, 0.7, 0.8, 1.0], (len(SAID), 1)))
+
+def columns_of(is_ours=True, pairs=False):
+    fdi = SimpleNamespace(is_ours=is_ours, pairs=pairs)
+    rows = stepped.rows_of_replay(
+        0.5 * ROW, stepped.ReplayedVerdicts(SAYS, *ALONE, np.ones(4)), SURFACES, fdi
+    )
+    return {name: list(values) for name, values in of.diagnosis_columns(rows, SURFACES).items()}
 
 
 def test_verdicts_as_columns():
-    fdi = SimpleNamespace(is_ours=True, pairs=False)
-    rows = stepped.rows_of_replay(T_S, stepped.ReplayedVerdicts(SAID, *ALONE, np.ones(4)), SURFACES, fdi)
-    columns = of.diagnosis_columns(rows, SURFACES)
+    columns = columns_of()
     assert list(columns) == [
         "t_s", "faulty", "named",
         *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
     ]  # fmt: skip
-    columns = {name: list(values) for name, values in columns.items()}
-    assert columns["faulty"] == [0, 1, 1, 1, 1, 1, 1]
-    assert columns["named"] == ["", "unknown", "elevator", "rudder", "rudder", "aileron", "unknown"]
-    assert columns["elevator_effectiveness"] == [1, 1, 0.6, 1, 1, 1, 1]
-    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, 1, 1, 1]
-    assert columns["aileron_effectiveness"] == [1] * 7
-    lows = [
-        [0.9, 0, 1, 1, 1, 0, 0],
-        [0.5, 0, 0.5, 1, 1, 1, 0],
-        [0.7, 0, 1, 0, 0, 1, 0],
-        [0, 0, 1, 1, 1, 1, 0],
-    ]
-    highs = [[1] * 7, [1, 1, 0.7, 1, 1, 1, 1], [1] * 7, [1] * 7]
-    highs[0][5], lows[0][5] = 1.0, 0.9
-    for name, low, high in zip(SURFACES, lows, highs, strict=True):
-        assert columns[f"{name}_low"] == low, name
-        assert columns[f"{name}_high"] == high, name
-    assert columns["credible"] == [1] * 7
+    assert columns["t_s"] == [0.5 * k for k in range(11)]
+    assert columns["faulty"] == [0] + [1] * 10
+    assert columns["named"] == [
+        "", "unknown", "elevator", "rudder", "rudder", "aileron", *["unknown"] * 3, "elevator", "elevator",
+    ]  # fmt: skip
+    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.41, 0.71])
+    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, *[1] * 7]
+    assert columns["aileron_effectiveness"] == columns["flap_effectiveness"] == [1] * 11
+    for name, (low, high) in BOUNDS.items():
+        assert columns[f"{name}_low"] == pytest.approx(low), name
+        assert columns[f"{name}_high"] == pytest.approx(high), name
+    assert columns["credible"] == [1] * 11
+
+
+@pytest.mark.parametrize("fdi", [{"is_ours": False}, {"pairs": True}])
+def test_verdicts_of_pairs_or_of_another_scheme_bound_nothing(fdi):
+    columns = columns_of(**fdi)
+    for name in SURFACES:
+        assert (columns[f"{name}_low"], columns[f"{name}_high"]) == ([0.0] * 11, [1.0] * 11)
+    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.1, 0.9])
 
 
 def scenario(**sensors):

@@ -114,7 +114,7 @@ def test_unanticipated_is_no_wrong_type_of_damage():
 
 
 @pytest.mark.parametrize("case", [0, 2, 4])
-def test_a_turn_that_is_held_is_coordinated_by_gravity(bench, case):
+def test_a_turn_that_is_held_is_coordinated_by_gravity(where, bench, case):
     """Level flight about a vertical axis: the rate of turn is what bank and side force give [Etkin1996]."""
     envelope = Envelope(bench, case)
     for turn in envelope.turns((100.0,), (-30, 0, 30), (0,)):
@@ -126,7 +126,7 @@ def test_a_turn_that_is_held_is_coordinated_by_gravity(bench, case):
     bench.damage(0)
 
 
-def test_slower_than_its_tip_lets_it_there_is_no_level_flight(bench):
+def test_slower_than_its_tip_lets_it_there_is_no_level_flight(where, bench):
     turns = list(Envelope(bench, 4).turns((60.0, 110.0), (0,), (0,)))
     bench.damage(0)
     assert {turn.speed_kt: turn.held for turn in turns} == {60.0: False, 110.0: True}

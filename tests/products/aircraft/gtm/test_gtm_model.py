@@ -82,7 +82,7 @@ def test_mass_properties_of_each_case(bench, specified, case):
     np.testing.assert_allclose(np.abs(found), np.abs(wanted), atol=1e-6)
 
 
-def test_trim_at_the_check_point(bench, specified):
+def test_trim_at_the_check_point(where, bench, specified):
     """Surfaces to the digits given; speed and throttle where the weight is that of JSBSim's Earth."""
     here = bench.steady(Condition(alpha_deg=3.0))
     assert round(here.elevator_deg, 3) == 2.415

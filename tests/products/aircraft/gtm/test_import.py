@@ -17,6 +17,7 @@ from beaver_ftc_aircraft.gtm import aerodynamics, conversion, elements, folder, 
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from beaver_ftc_aircraft.gtm.steady import Steady
+from products.aircraft.gtm import made
 from telling import apart
 
 FAILURES = (
@@ -82,9 +83,28 @@ def test_other_contents_are_refused_in_a_line(tmp_path, content, says):
     assert "\n" not in str(wrong.value)
 
 
+@pytest.mark.parametrize(
+    ("table", "of", "place", "value", "says"),
+    [
+        ("dC6_w", "data", (3, 4, 5, 2), np.nan, "dC6_w.data has values that are not finite"),
+        ("C6_bas", "data", (31, 26, 5), -np.inf, "C6_bas.data has values that are not finite"),
+        ("dC3_ele", "alpha", 31, -5.0, "dC3_ele.alpha does not rise"),
+        ("dC6_rud", "rud", 1, -30.0, "dC6_rud.rud does not rise"),
+        ("flaps", "flaprib", 3, np.nan, "flaprib has values that are not finite"),
+    ],
+)  # fmt: skip
+def test_one_wrong_number_is_refused_by_the_name_of_its_table(tmp_path, table, of, place, value, says):
+    tables = made.tables()
+    tables[table][of] = np.array(tables[table][of])
+    tables[table][of][place] = value
+    savemat(tmp_path / "x.mat", tables)
+    with pytest.raises(BadInput, match=f"x.mat: {says}, allowed"):
+        read(tmp_path / "x.mat")
+
+
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
-def test_half_the_data_base_is_refused(where, tmp_path, share):
-    whole = (where / DATABASE).read_bytes()
+def test_half_the_data_base_is_refused(data, tmp_path, share):
+    whole = (data / DATABASE).read_bytes()
     (tmp_path / "half.mat").write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(BadInput, match=r"is no whole MATLAB file|has no"):
         read(tmp_path / "half.mat")

@@ -51,12 +51,12 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
     vehicle = Vehicle.model_validate(given)
     fitted = [flown(vehicle, 1000 * seed + i, duration_s) for i in range(flights)]
     model = identified(fitted, vehicle)
-    known, threshold = model.fitted, model.settings.threshold
+    known, threshold = model.fitted_ranges, model.settings.alarm_threshold
     assert known is not None
-    assert known.tail is not None
+    assert known.alarm_peak_tail is not None
     assert threshold is not None
     rate, count = (
-        extremes.expected_false_alarms_per_hour(known.tail, threshold),
+        extremes.expected_false_alarms_per_hour(known.alarm_peak_tail, threshold),
         round(hours * 3600.0 / LENGTH_S),
     )
     alarms = sum(

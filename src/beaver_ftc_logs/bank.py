@@ -103,7 +103,9 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
                 )
     rows += _pair_hypotheses(n_groups, known_groups)
     if may_be_stuck:
-        unknown_offset_variance = np.diag(np.array(model.noise)) * settings.jam_sd**2
+        unknown_offset_variance = (
+            np.diag(np.array(model.residual_covariance)) * settings.jam_rate_offset_sd**2
+        )
         rows.append(
             (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_TRANSITION_SHARE, unknown_offset_variance)
         )
@@ -112,7 +114,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         np.array(column) for column in zip(*rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
-    transition_probability = settings.changes_per_hour / (3600.0 * model.rate_hz)
+    transition_probability = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
     group_gain_sensitivity = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
     return HypothesisBank(
         effectiveness,
@@ -135,13 +137,15 @@ def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) ->
 def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled_levels = settings.levels.get("+".join(model.groups[group]), [])
-    even_levels = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
+    labelled_levels = settings.likely_effectiveness_levels.get("+".join(model.groups[group]), [])
+    even_levels = np.arange(
+        0.0, 1.0 - 0.5 * settings.effectiveness_level_step, settings.effectiveness_level_step
+    )
     levels = np.unique(np.round(np.concatenate([even_levels, np.array(labelled_levels, dtype=float)]), 6))
     is_labelled_level = np.isin(levels, np.round(labelled_levels, 6))
     if not is_labelled_level.any() or is_labelled_level.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
-    labelled_level_share = settings.level_share
+    labelled_level_share = settings.share_of_faults_at_likely_levels
     return levels, np.where(
         is_labelled_level,
         labelled_level_share / is_labelled_level.sum(),
@@ -157,7 +161,7 @@ def _rate_offset_variances(model: Model, group: int) -> list[Floats]:
     axis_share = np.clip(response_size / max(response_size.max(), MIN_DIVISOR), 0.3, 1.0)
     variance_of_fault_kind = {
         "loss": np.zeros(3),
-        "stuck": np.diag(noise) * (model.settings.jam_sd * axis_share) ** 2,
+        "stuck": np.diag(noise) * (model.settings.jam_rate_offset_sd * axis_share) ** 2,
     }
     return [variance_of_fault_kind[kind] for kind in model.vehicle.faults]
 
@@ -212,18 +216,22 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     settings, n_groups = model.settings, len(model.groups)
     _, _, response, noise = model.coefficient_arrays()
     noise_variance = np.diag(noise)
-    trim_shift = response.sum(axis=1) * settings.trim_shift
+    trim_shift = response.sum(axis=1) * settings.trim_command_shift_sd
     covariance = np.zeros((4 + n_groups, 4 + n_groups))
     covariance[:3, :3] = np.diag(noise_variance * settings.trim_sd**2) + trim_shift.T @ trim_shift
     covariance[3, 3] = settings.gain_sd**2
     covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
-        settings.own_gain_sd** 2 + _gain_variance_beyond_level_step(model)
+        settings.group_gain_sd** 2 + _gain_variance_beyond_level_step(model)
     )
-    return_times_s = np.array([np.inf] * 3 + [settings.gain_time_s] + [settings.own_gain_time_s] * n_groups)
+    return_times_s = np.array(
+        [np.inf] * 3 + [settings.gain_return_time_s] + [settings.group_gain_return_time_s] * n_groups
+    )
     retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
     random_walk_variance = (1.0 - retention**2) * np.diag(covariance)
-    random_walk_variance[:3] = noise_variance * np.array(settings.trim_walk) ** 2
-    max_deviation_sd = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n_groups))
+    random_walk_variance[:3] = noise_variance * np.array(settings.trim_random_walk_sd) ** 2
+    max_deviation_sd = np.array(
+        [settings.max_trim_deviation_sd] * 3 + [settings.max_gain_deviation_sd] * (1 + n_groups)
+    )
     mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
     return TrimAndGainStateModel(
         mean, covariance, np.sqrt(np.diag(covariance)) * max_deviation_sd, retention, random_walk_variance
@@ -233,9 +241,9 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
 def _gain_variance_beyond_level_step(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
     gain_variance = np.zeros(len(model.groups))
-    if model.fitted is not None and model.fitted.gain_sd:
-        gain_variance += np.array(model.fitted.gain_sd) ** 2
-    return np.maximum(gain_variance - model.settings.level_step**2, 0.0)
+    if model.fitted_ranges is not None and model.fitted_ranges.group_gain_standard_error:
+        gain_variance += np.array(model.fitted_ranges.group_gain_standard_error) ** 2
+    return np.maximum(gain_variance - model.settings.effectiveness_level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):
@@ -265,10 +273,10 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
         model.settings,
         _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_ma_coefficients)) else np.inf,
     )
-    memory_samples = settings.noise_memory_s * model.rate_hz
+    memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(
         model.whitened_intercept(noise_ma_coefficients), model.coefficient_arrays()[3],
-        settings.power, settings.tail, memory_samples,
+        settings.effective_sample_share, settings.t_degrees_of_freedom, memory_samples,
         _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
         model.noise_inflation(noise_ma_coefficients),
     )  # fmt: skip

@@ -77,8 +77,8 @@ def identify(
     document = {
         "model": str(out),
         "page": str(page),
-        "identified": model.identified,
-        "settings": model.settings.model_dump(),
+        "identified": model.identification_results,
+        "settings": model.settings.model_dump(by_alias=True),
     }
     long_log_lines = [f"  {one.name}: {one.notes[0]}" for one in loaded_flights if one.n_parts > 1]
     answer(

@@ -117,9 +117,9 @@ def _least_squares_rows(
         np.clip(effectiveness, 0.0, 1.0),
         effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
     )
-    if model.settings.levels:
+    if model.settings.likely_effectiveness_levels:
         for g, group in enumerate(model.groups):
-            labelled_levels = model.settings.levels.get("+".join(group))
+            labelled_levels = model.settings.likely_effectiveness_levels.get("+".join(group))
             levels = (
                 np.array([*labelled_levels, 1.0]) if labelled_levels else np.unique(bank.effectiveness[:, g])
             )

@@ -96,8 +96,8 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     posterior, _, _ = hypothesis_posterior(live_samples, model, bank)
     has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = rows_of_posterior(samples, model, bank, posterior)
-    if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
-        rows = _withdraw_contradicted_isolation(live_samples, model, rows, model.settings.threshold)
+    if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
+        rows = _withdraw_contradicted_isolation(live_samples, model, rows, model.settings.alarm_threshold)
     return blank_rows_not_credible(samples, model, rows, has_no_response)
 
 
@@ -151,7 +151,7 @@ def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: Diagno
         is_named = np.array([one in named_group or bool(may_join[k, i]) for i, one in enumerate(surfaces)])
         named[k] = "+".join(compress(surfaces, is_named))
         if is_named.sum() > len(named_group) or (
-            model.settings.one_group and not _are_in_one_group(named_group, model)
+            model.settings.isolates_single_group and not _are_in_one_group(named_group, model)
         ):
             high[k, is_named] = 1.0
     return replace(rows, named_surfaces=named, effectiveness_high=high)
@@ -166,7 +166,9 @@ def _withdraw_isolation_after_engine_failure(
     samples: Samples, model: Model, rows: DiagnosisRows
 ) -> DiagnosisRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_energy_height_rate_mps = model.fitted.energy_climb if model.fitted is not None else None
+    unpowered_energy_height_rate_mps = (
+        model.fitted_ranges.unpowered_energy_height_rate_mps if model.fitted_ranges is not None else None
+    )
     if unpowered_energy_height_rate_mps is None or samples.energy_height_rate_mps is None:
         return rows
     climb_mps = samples.energy_height_rate_mps
@@ -199,7 +201,7 @@ def _withdraw_contradicted_isolation(
     window_begin = np.maximum(
         np.arange(len(cumulated)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
     )
-    log_likelihood_gain = 0.5 * model.settings.power * (cumulated - cumulated[window_begin])
+    log_likelihood_gain = 0.5 * model.settings.effective_sample_share * (cumulated - cumulated[window_begin])
     best_gain, is_contradicted = log_likelihood_gain.max(axis=1), np.zeros(len(residual), dtype=bool)
     for group_index, group in enumerate(model.groups):
         is_contradicted |= _rows_isolating_any(rows.named_surfaces, set(group)) & (
@@ -234,7 +236,7 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    trust.check_rate_units(samples, model.fitted)
+    trust.check_rate_units(samples, model.fitted_ranges)
     trust.check_columns_as_identified(samples, model)
 
 
@@ -249,14 +251,14 @@ def rows_of_posterior(
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
     )
     is_healthier = posterior[:, 0] + no_response_probability > 0.5
-    threshold = model.settings.threshold
+    threshold = model.settings.alarm_threshold
     evidence_increments = fault_evidence_increments(posterior, bank)
     evidence = page_cusum(evidence_increments, threshold or np.inf)
     is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
-        probability >= model.settings.alarm, model
+        probability >= model.settings.alarm_probability, model
     )
     if threshold is not None:
-        naming_threshold = model.settings.name_evidence * threshold
+        naming_threshold = model.settings.isolation_evidence_factor * threshold
         is_alarm_raised = (evidence >= threshold) & ~is_healthier
         has_isolation_evidence = (
             page_cusum(evidence_increments, naming_threshold) >= naming_threshold
@@ -300,7 +302,7 @@ def _group_effectiveness_and_bounds(
             / _marginal_distribution(bank, bank.prior_probability[None, : bank.no_response_index], group)[1]
         )
         level_probability /= level_probability.sum(axis=1, keepdims=True)
-    low, high = _credible_bounds(levels, level_probability, model.settings.bounds)
+    low, high = _credible_bounds(levels, level_probability, model.settings.credible_mass)
     if len(model.groups[group]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     return _median_level(levels, level_probability), low, high
@@ -308,7 +310,7 @@ def _group_effectiveness_and_bounds(
 
 def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    min_samples = round(model.settings.hold_s * model.rate_hz)
+    min_samples = round(model.settings.alarm_hold_s * model.rate_hz)
     held_samples = np.arange(len(condition)) - np.maximum.accumulate(
         np.where(condition, -1, np.arange(len(condition)))
     )
@@ -372,7 +374,7 @@ def _surfaces_at_fault(
     ]
     group_share = np.column_stack(group_shares)
     is_likely = (group_share > _MIN_ISOLATION_PROBABILITY) & has_isolation_evidence[:, None]
-    if model.settings.one_group:
+    if model.settings.isolates_single_group:
         is_single_loss = bank.hypothesis_kind == GROUP_LOSS
         single_loss_probability = np.column_stack(
             [
@@ -389,7 +391,7 @@ def _surfaces_at_fault(
     likely_names = join_flagged_names(is_likely, ["+".join(group) for group in model.groups])
     named = np.full(len(posterior), "", dtype=object)
     is_unknown_offset = posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
-    rename_samples, unchanged_samples = round(model.settings.rename_s * model.rate_hz), 0
+    rename_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
         new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
         unchanged_samples = (
@@ -413,7 +415,7 @@ def _surfaces_at_fault(
 def _still_names_all_surfaces(new_name: str, last_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.one_group and (
+    return model.settings.isolates_single_group and (
         new_name == UNKNOWN_SURFACE or set(last_name.split("+")) <= set(new_name.split("+"))
     )
 

@@ -42,10 +42,14 @@ PeaksAndHours = tuple[Floats, float]
 class PeakTail(Section):
     """The highest peaks of the alarm statistic on parts not fitted."""
 
-    level: Number = Field(description="the level, in natural logarithms of odds")
-    excess: list[Number] = Field(min_length=1, description="by how much each peak is over it")
-    minutes: Number = Field(gt=0, description="of healthy flight they were seen in")
-    dispersion: Number = Field(1.0, ge=1, description="how much more the flights differ than by chance")
+    threshold_level: Number = Field(description="the level, in natural logarithms of odds", alias="level")
+    excess_over_level: list[Number] = Field(
+        min_length=1, description="by how much each peak is over it", alias="excess"
+    )
+    healthy_minutes: Number = Field(gt=0, description="of healthy flight they were seen in", alias="minutes")
+    overdispersion: Number = Field(
+        1.0, ge=1, description="how much more the flights differ than by chance", alias="dispersion"
+    )
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
     """False alarms an hour at a threshold not below the tail's level."""
     shape, scale, weight = _pareto_posterior(tail)
     false_alarm_rates = (
-        _exceedance_probability(threshold - tail.level, shape, scale)[:, None]
+        _exceedance_probability(threshold - tail.threshold_level, shape, scale)[:, None]
         * _peak_rate_quantiles(tail)[None, :]
     ).ravel()
     by_rate, rate_probability = (
@@ -131,7 +135,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
 
     low_excess, high_excess = 0.0, 1.0
     if not has_too_many_alarms(low_excess):
-        return tail.level
+        return tail.threshold_level
     while has_too_many_alarms(high_excess) and high_excess < _MAX_THRESHOLD:
         low_excess, high_excess = high_excess, 2.0 * high_excess
     for _ in range(40):
@@ -141,7 +145,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
             if has_too_many_alarms(middle_excess)
             else (low_excess, middle_excess)
         )
-    return tail.level + high_excess
+    return tail.threshold_level + high_excess
 
 
 def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> float:
@@ -152,16 +156,20 @@ def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> f
 
 def missing_healthy_minutes(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """Minutes of health by which the rate asked would show without any tail, less those there are."""
-    return max(60.0 * EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM / false_alarms_per_hour - tail.minutes, 0.0)
+    return max(
+        60.0 * EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM / false_alarms_per_hour - tail.healthy_minutes, 0.0
+    )
 
 
 def _peak_rate_quantiles(tail: PeakTail) -> Floats:
     """Peaks over the level an hour, at even steps of their posterior."""
     from scipy.stats import gamma
 
-    gamma_shape = len(tail.excess) / tail.dispersion + 0.5
+    gamma_shape = len(tail.excess_over_level) / tail.overdispersion + 0.5
     return np.asarray(
-        gamma.ppf(_PEAK_RATE_QUANTILE_PROBABILITIES, gamma_shape) * tail.dispersion / (tail.minutes / 60.0)
+        gamma.ppf(_PEAK_RATE_QUANTILE_PROBABILITIES, gamma_shape)
+        * tail.overdispersion
+        / (tail.healthy_minutes / 60.0)
     )
 
 
@@ -169,10 +177,10 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     """Shape, scale and the weight of both, each over the whole grid."""
     from scipy.stats import genpareto
 
-    excess = np.array(tail.excess)
+    excess = np.array(tail.excess_over_level)
     scales = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
     shape, scale = (part.ravel() for part in np.meshgrid(_SHAPE_GRID, scales, indexing="ij"))
-    log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.dispersion
+    log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.overdispersion
     log_posterior -= 0.5 * (shape / _SHAPE_PRIOR_SD) ** 2
     weight = np.exp(log_posterior - log_posterior.max())
     return shape, scale, weight / weight.sum()

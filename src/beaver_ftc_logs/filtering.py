@@ -49,11 +49,11 @@ def hypothesis_posterior(
     The mean over the delays of the model's settings, and the colours of its noise where the flight is not yet
     whitened, each weighted by how well it explains the last minutes.
     """
-    if model.colours and not samples.noise_ma_coefficients:
+    if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
     noise_model_of_flight, delays_s = (
         model.with_noise_model(samples.noise_ma_coefficients),
-        model.settings.delays_s,
+        model.settings.command_delay_candidates_s,
     )
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), noise_model_of_flight, bank)
@@ -70,10 +70,11 @@ def _posterior_averaged_over_noise_models(
     """The mean over the colours of the noise. A colour is filtered up to the last sample at which its weight
     counts: within a second most are far less likely than another, and stay so."""
     whitened_flights = [
-        (whiten_samples(samples, one.average), model.with_single_noise_model(one)) for one in model.colours
+        (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
+        for one in model.noise_models
     ]
     log_likelihoods = [
-        _noise_model_log_likelihood(flight, single_model, single_model.colours[0])
+        _noise_model_log_likelihood(flight, single_model, single_model.noise_models[0])
         for flight, single_model in whitened_flights
     ]
     weights = _model_probabilities_with_forgetting(log_likelihoods, model.rate_hz)
@@ -111,14 +112,19 @@ def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: Nois
     its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
     is_predictable, unexplained, responses = whitened_rates_and_responses(flight, model)
     residual = np.nan_to_num(
-        unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.average)
+        unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.ma_coefficients)
     )
-    squared_residual = np.einsum("na,ab,nb->n", residual, np.linalg.inv(noise_model.noise), residual)
-    dof, log_determinant = model.settings.tail, np.linalg.slogdet(noise_model.noise)[1]
+    squared_residual = np.einsum(
+        "na,ab,nb->n", residual, np.linalg.inv(noise_model.residual_covariance), residual
+    )
+    dof, log_determinant = (
+        model.settings.t_degrees_of_freedom,
+        np.linalg.slogdet(noise_model.residual_covariance)[1],
+    )
     log_likelihood = -0.5 * ((dof + 3.0) * np.log1p(squared_residual / dof) + log_determinant) + 3.0 * np.log(
-        sum(noise_model.average)
+        sum(noise_model.ma_coefficients)
     )
-    return np.where(is_predictable, model.settings.power * log_likelihood, 0.0)
+    return np.where(is_predictable, model.settings.effective_sample_share * log_likelihood, 0.0)
 
 
 def fault_evidence_increments(posterior: Floats, bank: HypothesisBank) -> Floats:

@@ -48,7 +48,7 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(found)],
         "isolability": found,
-        "settings": model.settings.model_dump(),
+        "settings": model.settings.model_dump(by_alias=True),
         "notes": list(samples.notes),
     }
 
@@ -195,9 +195,9 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
 def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     ok, _, answers = unexplained_rates_and_responses(samples, model)
-    answers, noise = answers[ok], np.array(model.noise)
+    answers, noise = answers[ok], np.array(model.residual_covariance)
     whitened = np.linalg.solve(np.linalg.cholesky(noise), answers.reshape(-1, 3).T).T
-    return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.power))
+    return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.effective_sample_share))
 
 
 def _group_fisher_information(
@@ -233,8 +233,8 @@ def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, d
     settings, shares = model.settings, bank.transition_share[bank.is_fault_of_group(group)]
     if not len(shares):
         return float("inf")
-    change = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
-    return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(change))
+    change = settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
+    return float(np.log(settings.alarm_probability / (1.0 - settings.alarm_probability)) - np.log(change))
 
 
 def _smallest_detectable_losses(information: float, odds: float) -> dict[str, float | None]:

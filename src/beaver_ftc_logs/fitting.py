@@ -151,13 +151,15 @@ def fit_model(
     history, lags = choose_model_order(stretches, vehicle)
     model = _fit_model_cached(stretches, vehicle, history, lags)
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(stretches, model)})
-    return _with_inflated_noise(stretches, model) if model.colours else model
+    return _with_inflated_noise(stretches, model) if model.noise_models else model
 
 
 def fit_with_same_order(stretches: Sequence[Stretch], model: Model) -> Model:
     """Another fit of the same order and settings to other stretches."""
-    fitted = _fit_model_cached(stretches, model.vehicle, model.history, model.lags)
-    noise_inflation_by_ma_coefficients = {tuple(one.average): one.wider for one in model.colours}
+    fitted = _fit_model_cached(stretches, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    noise_inflation_by_ma_coefficients = {
+        tuple(one.ma_coefficients): one.covariance_inflation for one in model.noise_models
+    }
     return _with_noise_inflation(
         fitted.model_copy(update={"settings": model.settings}), noise_inflation_by_ma_coefficients
     )
@@ -167,10 +169,16 @@ def _with_noise_inflation(
     model: Model, noise_inflation_by_ma_coefficients: dict[tuple[float, ...], float]
 ) -> Model:
     colours = [
-        one.model_copy(update={"wider": noise_inflation_by_ma_coefficients.get(tuple(one.average), 1.0)})
-        for one in model.colours
+        one.model_copy(
+            update={
+                "covariance_inflation": noise_inflation_by_ma_coefficients.get(
+                    tuple(one.ma_coefficients), 1.0
+                )
+            }
+        )
+        for one in model.noise_models
     ]
-    return model.model_copy(update={"colours": colours})
+    return model.model_copy(update={"noise_models": colours})
 
 
 def _cross_validation_fits(
@@ -180,12 +188,12 @@ def _cross_validation_fits(
     effect_share_explained_by_others: of the whole, as in `FittedRanges`."""
     for fitted, kept in _cross_validation_splits(stretches):
         part_model = fit_with_same_order(fitted, model)
-        fit = fit_least_squares_of_order(fitted, model.vehicle, model.history, model.lags)
+        fit = fit_least_squares_of_order(fitted, model.vehicle, model.n_rate_lags, model.n_command_lags)
         gain_sd = group_gain_standard_error(fit, model).tolist()
         part_ranges = FittedRanges(
             commands=[], rates=[], gain_sd=gain_sd, tied=effect_share_explained_by_others
         )
-        yield part_model.model_copy(update={"fitted": part_ranges}), kept
+        yield part_model.model_copy(update={"fitted_ranges": part_ranges}), kept
 
 
 def choose_model_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
@@ -322,7 +330,7 @@ def _fit_model_uncached(stretches: Sequence[Stretch], vehicle: Vehicle, history:
         response_sd=fit.standard_errors[first_command_row:].reshape(shape).tolist(),
         noise=fit.residual_covariance.tolist(),
     )
-    return model.model_copy(update={"colours": _fit_noise_models(stretches, model)})
+    return model.model_copy(update={"noise_models": _fit_noise_models(stretches, model)})
 
 
 def _fit_noise_models(stretches: Sequence[Stretch], model: Model) -> list[NoiseModel]:
@@ -406,7 +414,9 @@ def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> Filt
         return FilterSettings(**alarm, **law_settings, power=power, trim_walk=trim_walk, delays_s=delays_s)
     return FilterSettings(
         levels=levels,
-        changes_per_hour=float(np.sqrt((changes + 1) / hours * FilterSettings().changes_per_hour)),
+        changes_per_hour=float(
+            np.sqrt((changes + 1) / hours * FilterSettings().effectiveness_changes_per_hour)
+        ),
         **(_FILTER_SETTINGS_FOR_OTHER_DAYS | law_settings),
         delays_s=delays_s,
         repair_share=(repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
@@ -512,7 +522,9 @@ def _standardized_group_responses(model: Model, kept: Stretch) -> tuple[Floats, 
     both in sd of the noise, without means."""
     _, residual, rate_responses = whitened_residual_and_responses(model, kept)
     whitening = np.linalg.inv(
-        np.linalg.cholesky(np.array(model.with_noise_model(kept.samples.noise_ma_coefficients).noise))
+        np.linalg.cholesky(
+            np.array(model.with_noise_model(kept.samples.noise_ma_coefficients).residual_covariance)
+        )
     ).T
     responses, standardized_residual = (
         np.einsum("nga,ab->nbga", rate_responses, whitening),
@@ -541,7 +553,9 @@ def _trim_drift_sd(stretches: Sequence[Stretch], model: Model) -> list[float]:
         part_model = fit_with_same_order(fitted, model)
         for one in kept:
             rows, residual, _ = whitened_residual_and_responses(part_model, one)
-            noise = np.array(part_model.with_noise_model(one.samples.noise_ma_coefficients).noise)
+            noise = np.array(
+                part_model.with_noise_model(one.samples.noise_ma_coefficients).residual_covariance
+            )
             standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise), MIN_DIVISOR))
             for begin, end in _consecutive_runs(rows):
                 for i, short_span in enumerate(span_samples.astype(int).tolist()):
@@ -552,7 +566,7 @@ def _trim_drift_sd(stretches: Sequence[Stretch], model: Model) -> list[float]:
                     )
                     squares[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
                     counts[i] += max(len(means) - 1, 0)
-    usual_drift = np.array(FilterSettings().trim_walk)
+    usual_drift = np.array(FilterSettings().trim_random_walk_sd)
     if not counts.all():
         return usual_drift.tolist()
     short_variance, long_variance = squares / counts[:, None]
@@ -619,7 +633,7 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
             parts.append(part)
             if len(stretches) > 1 and model.vehicle.other_laws:
                 gain_deviations.append(_squared_gain_deviation(part_model, one))
-    fit = fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fit_least_squares_of_order(stretches, model.vehicle, model.n_rate_lags, model.n_command_lags)
     gain_variance = np.zeros(len(model.groups))
     if model.vehicle.other_laws:
         gain_variance = _gain_variance_between_laws(
@@ -630,12 +644,12 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
     )
     column_gain_errors = column_gain_standard_error(fit, model, float(gain_variance.max()))
     fitted_ranges = trust.fitted_ranges(flights, model, gain_standard_errors, scale).model_copy(
-        update={"column_sd": column_gain_errors}
+        update={"column_gain_standard_error": column_gain_errors}
     )
     asked_per_hour = model.vehicle.false_alarms_per_hour
     false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
-        if asked_per_hour is None and not model.settings.levels
+        if asked_per_hour is None and not model.settings.likely_effectiveness_levels
         else asked_per_hour
     )
     tail = extremes.fit_peak_tail(parts)
@@ -653,12 +667,19 @@ def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
         if false_alarms_per_hour and has_threshold
         else None
     )
-    settings = {"false_alarms_per_hour": false_alarms_per_hour, "threshold": threshold}
+    settings = {"false_alarms_per_hour": false_alarms_per_hour, "alarm_threshold": threshold}
     return model.model_copy(
         update={
-            "fitted": fitted_ranges.model_copy(update={"tail": tail, "misread": misread_log_likelihood}),
+            "fitted_ranges": fitted_ranges.model_copy(
+                update={
+                    "alarm_peak_tail": tail,
+                    "max_column_mistake_log_likelihood_gain": misread_log_likelihood,
+                }
+            ),
             "settings": model.settings.model_copy(update=settings),
-            "identified": dict(_cross_validate_alarm_threshold(parts, false_alarms_per_hour, model)),
+            "identification_results": dict(
+                _cross_validate_alarm_threshold(parts, false_alarms_per_hour, model)
+            ),
         }
     )
 
@@ -670,19 +691,20 @@ def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> 
     law feeds it back to the surfaces, and least squares takes it for their answer, at most so much of it as
     the standard deviation of one is of the other's; a law that feeds back otherwise shows the difference.
     """
-    if not model.colours:
+    if not model.noise_models:
         return np.zeros(len(model.groups))
     lacking_share = 0.0
-    for colour in model.colours:
+    for colour in model.noise_models:
         flight_residuals = [
             one_step_residuals(model, one)[1]
             for one in stretches
-            if list(one.samples.noise_ma_coefficients) == colour.average
+            if list(one.samples.noise_ma_coefficients) == colour.ma_coefficients
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
-        chance_share = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if colour.before else 0.0
+        chance_share = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if colour.ar_coefficients else 0.0
         log_variance_ratio = (
-            np.linalg.slogdet(np.array(colour.noise))[1] - np.linalg.slogdet(np.cov(residuals.T))[1]
+            np.linalg.slogdet(np.array(colour.residual_covariance))[1]
+            - np.linalg.slogdet(np.cov(residuals.T))[1]
         )
         lacking_share = max(lacking_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - chance_share)
     effect_power = trust.unexplained_effect_power([(one.samples, one.usable) for one in stretches], model)
@@ -802,7 +824,7 @@ def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> F
 
     Responses b with errors of covariance V tell their factor with the variance 1 / (b' V^-1 b).
     """
-    groups, lags = len(model.groups), model.lags
+    groups, lags = len(model.groups), model.n_command_lags
     first_command_row = len(fit.coefficients) - groups * lags
     noise_sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
     summed_response_sd, information = np.zeros(groups), np.full(groups, MIN_DIVISOR)
@@ -842,7 +864,7 @@ def column_gain_standard_error(
     ties commands to these columns.
     """
     noise_inflation, noise_sd = (
-        max((one.wider for one in model.colours), default=1.0),
+        max((one.covariance_inflation for one in model.noise_models), default=1.0),
         np.sqrt(np.diag(fit.residual_covariance)),
     )
     sd_of_column = {}
@@ -884,7 +906,7 @@ def score_folds_and_choose_credible_mass(
         labels = np.where(kept.usable[:, None], kept.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
             by_mass = _diagnosis_by_credible_mass(part_model, kept)
-            entry["score"] = score_against_labels(by_mass[model.settings.bounds], labels)
+            entry["score"] = score_against_labels(by_mass[model.settings.credible_mass], labels)
             coverage_by_mass.append(
                 [
                     score_against_labels(by_mass[mass], labels)["held_by_bounds"]
@@ -893,7 +915,7 @@ def score_folds_and_choose_credible_mass(
             )
         entries.append(entry)
     if not coverage_by_mass:
-        return entries, model.settings.bounds
+        return entries, model.settings.credible_mass
     return entries, _CREDIBLE_MASS_CANDIDATES[
         int(np.argmin(np.abs(np.mean(coverage_by_mass, axis=0) - _CREDIBLE_COVERAGE_GOAL)))
     ]
@@ -903,11 +925,11 @@ def _diagnosis_by_credible_mass(model: Model, kept: Stretch) -> dict[float, Diag
     bank = build_hypothesis_bank(model)
     posterior, _, _ = hypothesis_posterior(kept.samples, model, bank)
     settings = [
-        model.settings.model_copy(update={"bounds": m})
-        for m in {*_CREDIBLE_MASS_CANDIDATES, model.settings.bounds}
+        model.settings.model_copy(update={"credible_mass": m})
+        for m in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}
     ]
     return {
-        one.bounds: rows_of_posterior(
+        one.credible_mass: rows_of_posterior(
             kept.samples, model.model_copy(update={"settings": one}), bank, posterior
         )
         for one in settings

@@ -61,22 +61,22 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "spectrum": residual_spectrum(stretches, model),
         "output_error": fit_output_error(stretches, surface_indices_by_group(model)),
     }
-    settings = model.settings.model_copy(update={"bounds": bounds})
-    return model.model_copy(update={"settings": settings, "identified": identified})
+    settings = model.settings.model_copy(update={"credible_mass": bounds})
+    return model.model_copy(update={"settings": settings, "identification_results": identified})
 
 
 def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
     much of it, the flight itself shows (`filtering.least_scale`)."""
-    if not model.colours:
+    if not model.noise_models:
         return model
     known_averages, max_inflation = (
-        [tuple(one.average) for one in model.colours],
-        max(one.wider for one in model.colours),
+        [tuple(one.ma_coefficients) for one in model.noise_models],
+        max(one.covariance_inflation for one in model.noise_models),
     )
-    quietest_noise = min((np.array(one.noise) for one in model.colours), key=np.linalg.det)
-    colours = list(model.colours)
+    quietest_noise = min((np.array(one.residual_covariance) for one in model.noise_models), key=np.linalg.det)
+    colours = list(model.noise_models)
     for average in UNSEEN_NOISE_MA_COEFFICIENTS:
         if average not in known_averages:
             whitened_flights = fitting.usable_stretches([whiten_samples(one, average) for one in flights])
@@ -90,7 +90,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
         )
         predictor_and_noise = {"before": predictor.tolist(), "noise": noise.tolist()}
         colours.append(NoiseModel(average=[1.0], wider=max_inflation, **predictor_and_noise))
-    return model.model_copy(update={"colours": colours})
+    return model.model_copy(update={"noise_models": colours})
 
 
 def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
@@ -204,18 +204,24 @@ def expected_performance_on_another_day(tests: list[Document], model: Model) -> 
         key: {"mean": float(np.mean(values)), "worst": float((max if key == "mean_error" else min)(values))}
         for key, values in values_of_score.items()
     }
-    fitted_ranges, settings = model.fitted, model.settings
-    if fitted_ranges is None or fitted_ranges.tail is None or settings.threshold is None:
+    fitted_ranges, settings = model.fitted_ranges, model.settings
+    if fitted_ranges is None or fitted_ranges.alarm_peak_tail is None or settings.alarm_threshold is None:
         return expected
     false_alarms_per_hour = settings.false_alarms_per_hour or 0.0
     return expected | {
         "false_alarms_per_hour": {
             "asked": false_alarms_per_hour,
-            **asdict(extremes.expected_false_alarms_per_hour(fitted_ranges.tail, settings.threshold)),
+            **asdict(
+                extremes.expected_false_alarms_per_hour(
+                    fitted_ranges.alarm_peak_tail, settings.alarm_threshold
+                )
+            ),
         },
-        "minutes_left_out": fitted_ranges.tail.minutes,
-        "minutes_missing": extremes.missing_healthy_minutes(fitted_ranges.tail, false_alarms_per_hour),
-        **model.identified,
+        "minutes_left_out": fitted_ranges.alarm_peak_tail.healthy_minutes,
+        "minutes_missing": extremes.missing_healthy_minutes(
+            fitted_ranges.alarm_peak_tail, false_alarms_per_hour
+        ),
+        **model.identification_results,
     }
 
 
@@ -353,7 +359,9 @@ def _used_samples_entry(stretch: fitting.Stretch) -> Document:
 def collinear_regressors(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    regressors, _, _ = fitting.stacked_regression_data(stretches, model.vehicle, model.history, model.lags)
+    regressors, _, _ = fitting.stacked_regression_data(
+        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
     factors = variance_inflation_factors(regressors[:, 1:])
     worst = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     inflated = [
@@ -366,17 +374,19 @@ def collinear_regressors(stretches: Sequence[fitting.Stretch], model: Model) -> 
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    rates = [f"{rate}[-{k}]" for k in range(1, model.history + 1) for rate in "pqr"]
-    n_signal_lags = range(1, model.vehicle.n_signal_lags(model.history) + 1)
+    rates = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
+    n_signal_lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
     signals = [f"{name}[-{k}]" for k in n_signal_lags for name in model.vehicle.signal_regressor_names]
-    delays, groups = range(1, model.lags + 1), map("+".join, model.groups)
+    delays, groups = range(1, model.n_command_lags + 1), map("+".join, model.groups)
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
 
 def standard_error_inflation(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
-    first_command_row = len(fit.standard_error_inflation) - len(model.groups) * model.lags
+    fit = fitting.fit_least_squares_of_order(
+        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
+    first_command_row = len(fit.standard_error_inflation) - len(model.groups) * model.n_command_lags
     return dict(
         zip("pqr", np.median(fit.standard_error_inflation[first_command_row:], axis=0).tolist(), strict=True)
     )
@@ -398,19 +408,20 @@ def residual_spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> lis
 
 def identification_text(model: Model) -> str:
     """Return the identification as lines of text."""
-    identified: Document = dict(model.identified)
+    identified: Document = dict(model.identification_results)
     n_samples = sum(flight["samples"] for flight in identified["flights"])
     lines = [
         f"{model.vehicle.name}: {n_samples} samples at {model.rate_hz:.3g} Hz, flights: "
         f"{len(identified['flights'])}; "
-        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
+        f"past samples of the rates: {model.n_rate_lags}, of the commands: {model.n_command_lags}",
         *(f"  {line}" for line in identified.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(g)}" for g in model.groups if len(g) > 1),
         *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
-            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.average)}: {one.wider:.2g} times as "
-            "wide, in squares, as gains of 10 s left out differ, and other laws may"
-            for one in model.colours
+            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.ma_coefficients)}: "
+            f"{one.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
+            "differ, and other laws may"
+            for one in model.noise_models
         ),
         *(f"  {line}" for line in trust.unknown_effect_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in identified["flights"] for note in flight["notes"]),

@@ -30,124 +30,229 @@ Share = Annotated[Number, Field(ge=0, lt=1)]
 class FilterSettings(Section):
     """Prior settings of the filter."""
 
-    changes_per_hour: Number = Field(
-        12.0, gt=0, le=_MAX_COEFFICIENT, description="how often a surface changes its effectiveness"
+    effectiveness_changes_per_hour: Number = Field(
+        12.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="how often a surface changes its effectiveness",
+        alias="changes_per_hour",
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    levels: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
-        default={}, description="likelier levels of effectiveness, by group"
+    likely_effectiveness_levels: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
+        default={},
+        description="likelier levels of effectiveness, by group",
+        alias="levels",
     )
-    level_share: Number = Field(0.9, ge=0, le=1, description="share of faults at the likelier levels")
+    share_of_faults_at_likely_levels: Number = Field(
+        0.9, ge=0, le=1, description="share of faults at the likelier levels", alias="level_share"
+    )
     trim_sd: Number = Field(
         0.5, gt=0, le=_MAX_COEFFICIENT, description="free spread of the trim between flights, in residual sd"
     )
-    trim_shift: Number = Field(
-        0.0, ge=0, le=_MAX_COEFFICIENT, description="spread of the trim as a shift of each group's command"
+    trim_command_shift_sd: Number = Field(
+        0.0,
+        ge=0,
+        le=_MAX_COEFFICIENT,
+        description="spread of the trim as a shift of each group's command",
+        alias="trim_shift",
     )
-    trim_walk: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
-        [3e-4] * 3, min_length=3, max_length=3, description="drift of the trim a sample, in residual sd"
+    trim_random_walk_sd: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+        [3e-4] * 3,
+        min_length=3,
+        max_length=3,
+        description="drift of the trim a sample, in residual sd",
+        alias="trim_walk",
     )
     gain_sd: Number = Field(0.15, gt=0, lt=0.5, description="spread of the control gain")
-    gain_time_s: Number = Field(
-        5e4, gt=0, le=_MAX_COEFFICIENT, description="in which the control gain returns to the model's, s"
+    gain_return_time_s: Number = Field(
+        5e4,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="in which the control gain returns to the model's, s",
+        alias="gain_time_s",
     )
-    own_gain_sd: Number = Field(0.0, ge=0, lt=0.5, description="spread of each group's gain about the common")
-    own_gain_time_s: Number = Field(
-        2000.0, gt=0, le=_MAX_COEFFICIENT, description="in which that returns to the common gain, s"
+    group_gain_sd: Number = Field(
+        0.0, ge=0, lt=0.5, description="spread of each group's gain about the common", alias="own_gain_sd"
     )
-    trim_bound: Number = Field(
-        4.0, gt=0, le=_MAX_COEFFICIENT, description="farthest the trim is adapted, in its spread"
+    group_gain_return_time_s: Number = Field(
+        2000.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="in which that returns to the common gain, s",
+        alias="own_gain_time_s",
     )
-    gain_bound: Number = Field(
-        3.0, gt=0, le=_MAX_COEFFICIENT, description="farthest the gain is adapted, in its spread"
+    max_trim_deviation_sd: Number = Field(
+        4.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="farthest the trim is adapted, in its spread",
+        alias="trim_bound",
     )
-    delays_s: Row = Field(
-        [0.0], min_length=1, max_length=9, description="delays tried beside the model's, each under a sample"
+    max_gain_deviation_sd: Number = Field(
+        3.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="farthest the gain is adapted, in its spread",
+        alias="gain_bound",
     )
-    jam_sd: Number = Field(
-        2.0, gt=0, le=_MAX_COEFFICIENT, description="offset of the rates a sample by a stuck surface, in sd"
+    command_delay_candidates_s: Row = Field(
+        [0.0],
+        min_length=1,
+        max_length=9,
+        description="delays tried beside the model's, each under a sample",
+        alias="delays_s",
     )
-    power: Number = Field(1.0, gt=0, le=1, description="share of a white residual's information in this one")
-    tail: Number = Field(
-        8.0, gt=2, le=_MAX_COEFFICIENT, description="degrees of freedom of the residual's t distribution"
+    jam_rate_offset_sd: Number = Field(
+        2.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="offset of the rates a sample by a stuck surface, in sd",
+        alias="jam_sd",
     )
-    noise_memory_s: Number = Field(
-        60.0, gt=0, le=_MAX_COEFFICIENT, description="memory of the running scale of the residual, s"
+    effective_sample_share: Number = Field(
+        1.0, gt=0, le=1, description="share of a white residual's information in this one", alias="power"
     )
-    alarm: Number = Field(0.5, gt=0, lt=1, description="probability of a fault that raises the alarm")
-    hold_s: Number = Field(
-        0.0, ge=0, le=_MAX_COEFFICIENT, description="for how long the probability must stand, s"
+    t_degrees_of_freedom: Number = Field(
+        8.0,
+        gt=2,
+        le=_MAX_COEFFICIENT,
+        description="degrees of freedom of the residual's t distribution",
+        alias="tail",
+    )
+    noise_scale_memory_s: Number = Field(
+        60.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="memory of the running scale of the residual, s",
+        alias="noise_memory_s",
+    )
+    alarm_probability: Number = Field(
+        0.5, gt=0, lt=1, description="probability of a fault that raises the alarm", alias="alarm"
+    )
+    alarm_hold_s: Number = Field(
+        0.0,
+        ge=0,
+        le=_MAX_COEFFICIENT,
+        description="for how long the probability must stand, s",
+        alias="hold_s",
     )
     false_alarms_per_hour: Number | None = Field(
         None, gt=0, le=_MAX_COEFFICIENT, description="the rate that was asked for"
     )
-    threshold: Number | None = Field(
+    alarm_threshold: Number | None = Field(
         None,
         gt=0,
         le=_MAX_COEFFICIENT,
         description="evidence for a fault that raises the alarm, instead of both: for that rate",
+        alias="threshold",
     )
-    name_evidence: Number = Field(
-        1.0, ge=1, le=_MAX_COEFFICIENT, description="evidence for a name, over that for an alarm"
+    isolation_evidence_factor: Number = Field(
+        1.0,
+        ge=1,
+        le=_MAX_COEFFICIENT,
+        description="evidence for a name, over that for an alarm",
+        alias="name_evidence",
     )
-    rename_s: Number = Field(
-        0.0, ge=0, le=_MAX_COEFFICIENT, description="for how long another name stands before it counts, s"
+    isolation_change_hold_s: Number = Field(
+        0.0,
+        ge=0,
+        le=_MAX_COEFFICIENT,
+        description="for how long another name stands before it counts, s",
+        alias="rename_s",
     )
-    one_group: bool = Field(False, description="whether a name is of the likeliest group alone")
-    level_step: Number = Field(0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness")
-    bounds: Number = Field(0.9, gt=0, lt=1, description="posterior mass inside the bounds")
+    isolates_single_group: bool = Field(
+        False, description="whether a name is of the likeliest group alone", alias="one_group"
+    )
+    effectiveness_level_step: Number = Field(
+        0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness", alias="level_step"
+    )
+    credible_mass: Number = Field(
+        0.9, gt=0, lt=1, description="posterior mass inside the bounds", alias="bounds"
+    )
 
 
 class FittedRanges(Section):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible."""
 
-    commands: Matrix = Field(description="least and largest command of each surface, share of travel")
-    rates: Matrix = Field(description="least and largest p, q and r, rad/s")
-    airspeed: Row | None = Field(default=None, description="least and largest airspeed, m/s")
-    spread: Row = Field(default=[], description="standard deviation of p, q and r, rad/s")
-    correlation: Matrix = Field(default=[], description="correlation of the groups' commands")
-    tied: Row = Field(
-        default=[], description="share of each group's effect that past, signals and other groups make up"
+    command_ranges: Matrix = Field(
+        description="least and largest command of each surface, share of travel", alias="commands"
     )
-    gain_sd: Row = Field(default=[], description="standard error of each group's gain")
-    column_sd: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
-        default={}, description="standard error of the gain of what the rates answer to each rate and signal"
+    rate_ranges_rad_s: Matrix = Field(description="least and largest p, q and r, rad/s", alias="rates")
+    airspeed_range_mps: Row | None = Field(
+        default=None, description="least and largest airspeed, m/s", alias="airspeed"
     )
-    still_s: dict[str, Number] = Field(default={}, description="longest time each column stood still, s")
-    scale: Number = Field(
-        1.0, gt=0, le=_MAX_COEFFICIENT, description="largest scale of the noise on parts not fitted"
+    rate_sd_rad_s: Row = Field(
+        default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    misread: Number = Field(
+    command_correlation: Matrix = Field(
+        default=[], description="correlation of the groups' commands", alias="correlation"
+    )
+    effect_share_explained_by_others: Row = Field(
+        default=[],
+        description="share of each group's effect that past, signals and other groups make up",
+        alias="tied",
+    )
+    group_gain_standard_error: Row = Field(
+        default=[], description="standard error of each group's gain", alias="gain_sd"
+    )
+    column_gain_standard_error: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+        default={},
+        description="standard error of the gain of what the rates answer to each rate and signal",
+        alias="column_sd",
+    )
+    longest_unchanged_time_s: dict[str, Number] = Field(
+        default={}, description="longest time each column stood still, s", alias="still_s"
+    )
+    max_noise_variance_scale: Number = Field(
+        1.0,
+        gt=0,
+        le=_MAX_COEFFICIENT,
+        description="largest scale of the noise on parts not fitted",
+        alias="scale",
+    )
+    max_column_mistake_log_likelihood_gain: Number = Field(
         0.0,
         ge=0,
         le=_MAX_COEFFICIENT,
         description="how much likelier at most a sample of a part not fitted was with its columns read "
         "wrongly, in natural logarithms",
+        alias="misread",
     )
-    energy_climb: Number | None = Field(
-        default=None, description="rate of the energy height as without power, m/s"
+    unpowered_energy_height_rate_mps: Number | None = Field(
+        default=None,
+        description="rate of the energy height as without power, m/s",
+        alias="energy_climb",
     )
-    minutes: Number = Field(0.0, ge=0, le=1e9, description="what was fitted, min")
-    tail: PeakTail | None = Field(default=None, description="highest alarm statistic on parts not fitted")
+    fitted_minutes: Number = Field(0.0, ge=0, le=1e9, description="what was fitted, min", alias="minutes")
+    alarm_peak_tail: PeakTail | None = Field(
+        default=None, description="highest alarm statistic on parts not fitted", alias="tail"
+    )
 
 
 class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained."""
 
-    average: Row = Field(
-        min_length=1, max_length=1000, description="1, c1, ...: its moving average, newest first"
+    ma_coefficients: Row = Field(
+        min_length=1,
+        max_length=1000,
+        description="1, c1, ...: its moving average, newest first",
+        alias="average",
     )
-    noise: Matrix = Field(description="covariance of the residual whitened by that, (3, 3), (rad/s)2")
-    before: Matrix = Field(
+    residual_covariance: Matrix = Field(
+        description="covariance of the residual whitened by that, (3, 3), (rad/s)2", alias="noise"
+    )
+    ar_coefficients: Matrix = Field(
         default=[],
         description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
+        alias="before",
     )
-    wider: Number = Field(
+    covariance_inflation: Number = Field(
         1.0,
         ge=1,
         le=_MAX_COEFFICIENT,
         description="how many times as far, in squares, gains left out and other laws' differ",
+        alias="wider",
     )
 
 
@@ -159,30 +264,47 @@ class Model(Section):
     groups: list[Annotated[list[str], Field(min_length=1)]] = Field(
         min_length=1, max_length=_MAX_SURFACE_GROUPS, description="surfaces that move together when healthy"
     )
-    history: Whole = Field(ge=1, le=50)
-    lags: Whole = Field(ge=1, le=50)
+    n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
+    n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
     intercept: Row = Field(min_length=3, max_length=3)
-    past: Matrix = Field(description="(3 history + signal_regressor_names x signal lags, 3)")
-    response: list[Matrix] = Field(description="(groups, lags, 3), a share of command to rad/s a sample")
-    response_sd: list[Matrix] = Field(description="standard errors of `response`, colour included")
-    noise: Matrix = Field(description="covariance of the residual, (3, 3), (rad/s)2")
-    colours: list[NoiseModel] = Field(
-        default=[], description="noises that flights were seen to have, for `moving_air`"
+    past_coefficients: Matrix = Field(
+        description="(3 history + signal_regressor_names x signal lags, 3)", alias="past"
+    )
+    command_response: list[Matrix] = Field(
+        description="(groups, lags, 3), a share of command to rad/s a sample", alias="response"
+    )
+    command_response_standard_error: list[Matrix] = Field(
+        description="standard errors of `response`, colour included", alias="response_sd"
+    )
+    residual_covariance: Matrix = Field(
+        description="covariance of the residual, (3, 3), (rad/s)2", alias="noise"
+    )
+    noise_models: list[NoiseModel] = Field(
+        default=[],
+        description="noises that flights were seen to have, for `moving_air`",
+        alias="colours",
     )
     settings: FilterSettings = FilterSettings()
-    fitted: FittedRanges | None = Field(
-        default=None, description="what it was fitted on; None: nothing is known"
+    fitted_ranges: FittedRanges | None = Field(
+        default=None,
+        description="what it was fitted on; None: nothing is known",
+        alias="fitted",
     )
-    identified: dict[str, object] = Field(default={}, description="what it was found from, and how well")
+    identification_results: dict[str, object] = Field(
+        default={}, description="what it was found from, and how well", alias="identified"
+    )
 
     @model_validator(mode="after")
     def _check_consistent(self) -> "Model":
-        rows = 3 * self.history + len(self.vehicle.signal_regressor_names) * self.vehicle.n_signal_lags(
-            self.history
+        rows = 3 * self.n_rate_lags + len(self.vehicle.signal_regressor_names) * self.vehicle.n_signal_lags(
+            self.n_rate_lags
         )
-        says = f"has {len(self.past)} rows, allowed: {rows}, as `identify` writes them: identify it again"
-        conflicts: list[Conflict] = [(("past",), says)] * (len(self.past) != rows)
-        conflicts += [*self._group_conflicts(), *self._shape_conflicts(len(self.past))]
+        says = (
+            f"has {len(self.past_coefficients)} rows, allowed: {rows}, as `identify` writes them: "
+            "identify it again"
+        )
+        conflicts: list[Conflict] = [(("past",), says)] * (len(self.past_coefficients) != rows)
+        conflicts += [*self._group_conflicts(), *self._shape_conflicts(len(self.past_coefficients))]
         refuse(conflicts)  # before any of it is computed with
         refuse(self._noise_conflicts())
         return self
@@ -197,11 +319,11 @@ class Model(Section):
                     yield ("groups", i, k), f"{name!r:.60} {what}, allowed: each surface once"
                 seen.add(name)
         known = ["+".join(group) for group in self.groups]
-        for name in self.settings.levels:
+        for name in self.settings.likely_effectiveness_levels:
             if name not in known:
                 says = f"{name!r:.60} is no group, allowed: {', '.join(known)}"
                 yield ("settings", "levels", name), says
-        for k, delay_s in enumerate(self.settings.delays_s):
+        for k, delay_s in enumerate(self.settings.command_delay_candidates_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
@@ -209,23 +331,28 @@ class Model(Section):
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         count = len(self.groups)
         shapes: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.past, (rows, 3)),
-            (("response",), self.response, (count, self.lags, 3)),
-            (("response_sd",), self.response_sd, (count, self.lags, 3)),
-            (("noise",), self.noise, (3, 3)),
+            (("past",), self.past_coefficients, (rows, 3)),
+            (("response",), self.command_response, (count, self.n_command_lags, 3)),
+            (("response_sd",), self.command_response_standard_error, (count, self.n_command_lags, 3)),
+            (("noise",), self.residual_covariance, (3, 3)),
         ]
-        for i, colour in enumerate(self.colours):
+        for i, colour in enumerate(self.noise_models):
             at = ("colours", i)
-            lengths = -(-len(colour.before) // 3) * 3
-            shapes += [((*at, "noise"), colour.noise, (3, 3)), ((*at, "before"), colour.before, (lengths, 3))]
-            if colour.average[0] != 1.0:
+            lengths = -(-len(colour.ar_coefficients) // 3) * 3
+            shapes += [
+                ((*at, "noise"), colour.residual_covariance, (3, 3)),
+                ((*at, "before"), colour.ar_coefficients, (lengths, 3)),
+            ]
+            if colour.ma_coefficients[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (fitted := self.fitted) is not None:
+        if (fitted := self.fitted_ranges) is not None:
             optional: list[tuple[str, object, tuple[int, ...]]] = [
-                ("commands", fitted.commands, (len(fitted.commands), 2)), ("rates", fitted.rates, (3, 2)),
-                ("airspeed", fitted.airspeed, (2,)), ("spread", fitted.spread, (3,)),
-                ("correlation", fitted.correlation, (count, count)), ("tied", fitted.tied, (count,)),
-                ("gain_sd", fitted.gain_sd, (count,)),
+                ("commands", fitted.command_ranges, (len(fitted.command_ranges), 2)),
+                ("rates", fitted.rate_ranges_rad_s, (3, 2)),
+                ("airspeed", fitted.airspeed_range_mps, (2,)), ("spread", fitted.rate_sd_rad_s, (3,)),
+                ("correlation", fitted.command_correlation, (count, count)),
+                ("tied", fitted.effect_share_explained_by_others, (count,)),
+                ("gain_sd", fitted.group_gain_standard_error, (count,)),
             ]  # fmt: skip
             shapes += [(("fitted", key), given, shape) for key, given, shape in optional if given]
         for where, given, shape in shapes:
@@ -235,8 +362,11 @@ class Model(Section):
 
     def _noise_conflicts(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        noises: list[tuple[Location, Matrix]] = [(("noise",), self.noise)]
-        noises += [(("colours", i, "noise"), colour.noise) for i, colour in enumerate(self.colours)]
+        noises: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
+        noises += [
+            (("colours", i, "noise"), colour.residual_covariance)
+            for i, colour in enumerate(self.noise_models)
+        ]
         for where, given in noises:
             noise = np.array(given)
             if abs(noise - noise.T).max() > 1e-6 * abs(noise).max():
@@ -249,15 +379,17 @@ class Model(Section):
                     "is singular or nearly so, allowed: a covariance, conditioned to "
                     f"{_MAX_CONDITION_NUMBER:g}",
                 )
-        if np.min(self.response_sd) < 0.0:
+        if np.min(self.command_response_standard_error) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
-        fitted = self.fitted
-        if fitted is not None and any(value < 0.0 for value in (*fitted.gain_sd, *fitted.spread)):
+        fitted = self.fitted_ranges
+        if fitted is not None and any(
+            value < 0.0 for value in (*fitted.group_gain_standard_error, *fitted.rate_sd_rad_s)
+        ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
     def with_single_noise_model(self, colour: NoiseModel) -> "Model":
         """The model with one colour of its noise only."""
-        return self.model_copy(update={"colours": [colour]})
+        return self.model_copy(update={"noise_models": [colour]})
 
     def with_noise_model(self, average: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its `noise_inflation`;
@@ -265,18 +397,31 @@ class Model(Section):
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        known = [np.array(one.noise) for one in self.colours if one.average == list(average)]
+        known = [
+            np.array(one.residual_covariance)
+            for one in self.noise_models
+            if one.ma_coefficients == list(average)
+        ]
         if not known:
             return self
-        return self.model_copy(update={"noise": (self.noise_inflation(average) * known[0]).tolist()})
+        return self.model_copy(
+            update={"residual_covariance": (self.noise_inflation(average) * known[0]).tolist()}
+        )
 
     def noise_inflation(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        return next((float(one.wider) for one in self.colours if one.average == list(average)), 1.0)
+        return next(
+            (
+                float(one.covariance_inflation)
+                for one in self.noise_models
+                if one.ma_coefficients == list(average)
+            ),
+            1.0,
+        )
 
     def noise_predictor(self, average: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        known = [one.before for one in self.colours if one.average == list(average)]
+        known = [one.ar_coefficients for one in self.noise_models if one.ma_coefficients == list(average)]
         return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
 
     def whitened_intercept(self, average: Sequence[float]) -> Floats:
@@ -286,7 +431,12 @@ class Model(Section):
 
     def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
-        return np.array(self.intercept), np.array(self.past), np.array(self.response), np.array(self.noise)
+        return (
+            np.array(self.intercept),
+            np.array(self.past_coefficients),
+            np.array(self.command_response),
+            np.array(self.residual_covariance),
+        )
 
 
 def _has_shape(given: object, shape: tuple[int, ...]) -> bool:
@@ -307,4 +457,4 @@ def load_model(path: Path) -> Model:
 
 def as_text(model: Model) -> str:
     """The model as the text of its file."""
-    return model.model_dump_json(indent=1) + "\n"
+    return model.model_dump_json(indent=1, by_alias=True) + "\n"

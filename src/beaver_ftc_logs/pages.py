@@ -46,10 +46,12 @@ def load_template(name: str) -> "Template":
 
 def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
-    no_alarm_text = f"The probability of a fault stayed below the alarm level of {model.settings.alarm}."
+    no_alarm_text = (
+        f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}."
+    )
     model_text = (
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
-        f"{model.history} of the rates and {model.lags} of the commands."
+        f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands."
     )
     words = {"bounds": "90 % bounds", "quiet": no_alarm_text, "predicts": model_text}
     return _render_flight_page(samples, list(model.vehicle.surfaces), rows, verdict, words)
@@ -229,12 +231,14 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     stretches = fitting.usable_stretches(flights)
-    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fitting.fit_least_squares_of_order(
+        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=IDENTIFICATION_PAGE_MARK,
         model=model,
-        found=model.identified,
+        found=model.identification_results,
         used=sum(int(stretch.usable.sum()) for stretch in stretches),
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encode_png(_prediction_figure(stretches, model)),

@@ -97,7 +97,12 @@ def unexplained_rates_and_responses(
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    order = model.history, model.lags, scales_by_labels, model.vehicle.n_signal_lags(model.history)
+    order = (
+        model.n_rate_lags,
+        model.n_command_lags,
+        scales_by_labels,
+        model.vehicle.n_signal_lags(model.n_rate_lags),
+    )
     past, commands, is_predictable = build_regressors(samples, surface_indices_by_group(model), *order)
     _, past_coefficients, response, _ = model.coefficient_arrays()
     unexplained = samples.rates - np.einsum("nm,mr->nr", past, past_coefficients)

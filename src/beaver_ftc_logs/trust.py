@@ -132,7 +132,12 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
     groups = regression.surface_indices_by_group(model)
-    regressor_order = model.history, model.lags, True, model.vehicle.n_signal_lags(model.history)
+    regressor_order = (
+        model.n_rate_lags,
+        model.n_command_lags,
+        True,
+        model.vehicle.n_signal_lags(model.n_rate_lags),
+    )
     regressor_parts = [regression.build_regressors(one, groups, *regressor_order) for one, _ in flights]
     is_used = [
         mask & is_predictable
@@ -142,7 +147,7 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     commands = np.vstack(
         [part[1][used_rows] for part, used_rows in zip(regressor_parts, is_used, strict=True)]
     )
-    response, noise = np.array(model.response), np.array(model.noise)
+    response, noise = np.array(model.command_response), np.array(model.residual_covariance)
     whiten = np.linalg.inv(np.linalg.cholesky(noise)).T
     effect_power, unexplained_power = np.zeros(len(groups)), np.zeros(len(groups))
     for g in range(len(groups)):
@@ -161,19 +166,25 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
 
 def is_group_effect_known(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
-    if model.fitted is None or not model.fitted.tied:
+    if model.fitted_ranges is None or not model.fitted_ranges.effect_share_explained_by_others:
         return [True] * len(model.groups)
-    return [share < _MAX_EXPLAINED_SHARE for share in model.fitted.tied]
+    return [share < _MAX_EXPLAINED_SHARE for share in model.fitted_ranges.effect_share_explained_by_others]
 
 
 def is_group_gain_known(model: Model) -> list[bool]:
     """Whether the effect of each group is known under any law: the model may not err by all of it."""
     has_known_effect = is_group_effect_known(model)
-    if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
+    if (
+        model.fitted_ranges is None
+        or not model.fitted_ranges.group_gain_standard_error
+        or not model.vehicle.other_laws
+    ):
         return has_known_effect
     return [
         known_effect and regression.BOUND_STANDARD_ERRORS * gain_sd < 1.0
-        for known_effect, gain_sd in zip(has_known_effect, model.fitted.gain_sd, strict=True)
+        for known_effect, gain_sd in zip(
+            has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
+        )
     ]
 
 
@@ -185,13 +196,16 @@ def surfaces_of_unknown_effect(model: Model) -> set[str]:
 
 def unknown_effect_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
-    if model.fitted is None:
+    if model.fitted_ranges is None:
         return []
     says = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
     return [
         f"{says.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
         for group, share, has_known_effect in zip(
-            model.groups, model.fitted.tied, is_group_effect_known(model), strict=False
+            model.groups,
+            model.fitted_ranges.effect_share_explained_by_others,
+            is_group_effect_known(model),
+            strict=False,
         )
         if not has_known_effect
     ]
@@ -200,11 +214,11 @@ def unknown_effect_sentences(model: Model) -> list[str]:
 def check_rate_units(samples: Samples, fitted: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if fitted is None or not fitted.spread:
+    if fitted is None or not fitted.rate_sd_rad_s:
         return
     if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
         return
-    spread_ratio = np.nanstd(samples.rates, axis=0) / np.maximum(fitted.spread, MIN_DIVISOR)
+    spread_ratio = np.nanstd(samples.rates, axis=0) / np.maximum(fitted.rate_sd_rad_s, MIN_DIVISOR)
     mean_ratio = float(np.exp(np.mean(np.log(np.maximum(spread_ratio, MIN_DIVISOR)))))
     for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
         are_axes_alike = spread_ratio.max() < _MAX_RATE_SPREAD_RATIO * spread_ratio.min()
@@ -238,7 +252,7 @@ def check_command_units(
     Shapes: commands (n, S), rates (n, 3).
     """
     rate_width_ratios = _range_widths(central_range(rates)) / np.maximum(
-        _range_widths(fitted.rates), MIN_DIVISOR
+        _range_widths(fitted.rate_ranges_rad_s), MIN_DIVISOR
     )
     move_rates_alike = (
         rate_width_ratios.min() > 1.0 / _ALIKE_MOTION_FACTOR
@@ -246,7 +260,7 @@ def check_command_units(
     )
     max_ratio = _OTHER_UNIT_FACTOR * (1.0 if move_rates_alike else max(rate_width_ratios.max(), 1.0))
     command_width_ratios = _range_widths(central_range(commands)) / np.maximum(
-        _range_widths(fitted.commands), MIN_DIVISOR
+        _range_widths(fitted.command_ranges), MIN_DIVISOR
     )
     for surface, ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
         if max_ratio < ratio < 1e4 or (move_rates_alike and 1e-4 < ratio < 1.0 / _OTHER_UNIT_FACTOR):
@@ -282,7 +296,8 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     if not any(is_group_effect_known(model)):
         return
     whitened_readings = [
-        (whiten_samples(samples, one.average), model.with_single_noise_model(one)) for one in model.colours
+        (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
+        for one in model.noise_models
     ]
     compared = [
         (one, found)
@@ -347,7 +362,11 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGain
 def _min_plausible_column_gain(model: Model, name: str) -> float:
     """The gain of what the rates answer to a column below which it is another: below what the model's error
     explains; none where that may be all of it."""
-    gain_sd = model.fitted.column_sd.get(name, 0.0) if model.fitted is not None else 0.0
+    gain_sd = (
+        model.fitted_ranges.column_gain_standard_error.get(name, 0.0)
+        if model.fitted_ranges is not None
+        else 0.0
+    )
     min_gain = 1.0 - regression.BOUND_STANDARD_ERRORS * gain_sd
     return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
 
@@ -364,7 +383,11 @@ def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
     if not gain_of_mistake:
         return None
     says, largest_gain = max(gain_of_mistake.items(), key=lambda one: one[1])
-    usual_gain = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
+    usual_gain = (
+        2.0 * model.fitted_ranges.max_column_mistake_log_likelihood_gain
+        if model.fitted_ranges is not None
+        else 0.0
+    )
     if (
         largest_gain * n_part_samples
         <= np.log(len(gain_of_mistake) / _MISREAD_PROBABILITY) + usual_gain * n_part_samples
@@ -421,7 +444,11 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
     log_noise_size = float(
         np.log(np.diag(noise_root)).sum() - 3.0 * np.log(sum(samples.noise_ma_coefficients or (1.0,)))
     )
-    return np.linalg.inv(noise_root).T, model.settings.power / noise_inflation, log_noise_size
+    return (
+        np.linalg.inv(noise_root).T,
+        model.settings.effective_sample_share / noise_inflation,
+        log_noise_size,
+    )
 
 
 def _trim_and_gain_regression(
@@ -490,10 +517,10 @@ def _bound_part_gains(samples: Samples, model: Model) -> _FlightPartGains | None
 def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -> float:
     """Return how many times as far as in the flights of the model a group's command moves; 0 where these are
     not known."""
-    if model.fitted is None or not model.fitted.commands:
+    if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
         return 0.0
     width_ratios = _range_widths(central_range(samples.commands)) / np.maximum(
-        _range_widths(model.fitted.commands), MIN_DIVISOR
+        _range_widths(model.fitted_ranges.command_ranges), MIN_DIVISOR
     )
     return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
 
@@ -501,8 +528,8 @@ def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -
 def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floats, list[str]]:
     """Compute the contribution of each column to each predicted sample: rates of the other axes, and signals,
     (n, C, 3); and their names."""
-    n_signal_lags = model.vehicle.n_signal_lags(model.history)
-    past, _, _ = regression.build_regressors(samples, [[0]], model.history, 1, False, n_signal_lags)
+    n_signal_lags = model.vehicle.n_signal_lags(model.n_rate_lags)
+    past, _, _ = regression.build_regressors(samples, [[0]], model.n_rate_lags, 1, False, n_signal_lags)
     parts = cross_axis_coefficients(model)
     return np.stack([past[:, rows] @ coefficients for rows, coefficients in parts.values()], axis=1), list(
         parts
@@ -513,13 +540,13 @@ def cross_axis_coefficients(model: Model) -> dict[str, tuple[list[int], Floats]]
     """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
     rate on its own axis."""
     rates = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-    names = rates * model.history + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(
-        model.history
+    names = rates * model.n_rate_lags + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(
+        model.n_rate_lags
     )
-    coefficients, rows_of_column = np.array(model.past), dict[str, list[int]]()
+    coefficients, rows_of_column = np.array(model.past_coefficients), dict[str, list[int]]()
     for row, name in enumerate(names):
         rows_of_column.setdefault(name.removesuffix(" by airspeed"), []).append(row)
-        if row < 3 * model.history:
+        if row < 3 * model.n_rate_lags:
             coefficients[row, row % 3] = 0.0
     return {name: (column_rows, coefficients[column_rows]) for name, column_rows in rows_of_column.items()}
 
@@ -539,9 +566,9 @@ def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mas
         reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
             samples.is_rate_clipped, samples.dt_s
         )
-    if model.fitted is None:
+    if model.fitted_ranges is None:
         return _drop_empty_reasons(reasons)
-    return _drop_empty_reasons(reasons | _rows_out_of_fitted_ranges(samples, model, model.fitted))
+    return _drop_empty_reasons(reasons | _rows_out_of_fitted_ranges(samples, model, model.fitted_ranges))
 
 
 def _was_clipped_recently(is_clipped: Mask, dt_s: float) -> Mask:
@@ -560,8 +587,8 @@ def _drop_empty_reasons(reasons: dict[str, Mask]) -> dict[str, Mask]:
 def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRanges) -> dict[str, Mask]:
     names = [f"command of {surface}" for surface in model.vehicle.surfaces]
     columns = [
-        *zip(names, samples.commands.T, fitted.commands, strict=False),
-        *zip(_rate_column_names(model), samples.rates.T, fitted.rates, strict=False),
+        *zip(names, samples.commands.T, fitted.command_ranges, strict=False),
+        *zip(_rate_column_names(model), samples.rates.T, fitted.rate_ranges_rad_s, strict=False),
     ]
     reasons = {}
     for name, values, (low, high) in columns:
@@ -569,8 +596,8 @@ def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRan
         reasons[_outside_range_text(name, low, high)] = _mostly_true_recently(
             ~_is_within(values, low - margin, high + margin), samples
         )
-    if fitted.airspeed is not None and samples.airspeed is not None:
-        low, high = fitted.airspeed
+    if fitted.airspeed_range_mps is not None and samples.airspeed is not None:
+        low, high = fitted.airspeed_range_mps
         is_outside = ~_is_within(
             samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * low, (1.0 + _AIRSPEED_MARGIN) * high
         )
@@ -601,7 +628,7 @@ def _rate_column_names(model: Model) -> list[str]:
 def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of STILL_S on."""
-    fitted_unchanged_time_s = model.fitted.still_s if model.fitted else {}
+    fitted_unchanged_time_s = model.fitted_ranges.longest_unchanged_time_s if model.fitted_ranges else {}
     usual_unchanged_time_s = {
         name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.still_s
     } | fitted_unchanged_time_s

@@ -199,7 +199,7 @@ IDENTIFY = {
         "described",
     ),
     "beaver_ftc_logs__identification__identify": SimpleNamespace(
-        identified={"i": 1}, settings=SimpleNamespace(model_dump=lambda: {"s": 2})
+        identification_results={"i": 1}, settings=SimpleNamespace(model_dump=lambda by_alias: {"s": 2})
     ),
     "beaver_ftc_logs__identification__identification_text": "fitted",
     "beaver_ftc_logs__model__as_text": "text",

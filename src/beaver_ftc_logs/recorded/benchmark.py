@@ -162,7 +162,7 @@ def settings_of_whole_flight(stretches: list[Stretch], data: FlightDataSet) -> F
     if len(stretches) > 1:
         return model.settings
     return model.settings.model_copy(
-        update={"bounds": score_folds_and_choose_credible_mass(stretches, model)[1]}
+        update={"credible_mass": score_folds_and_choose_credible_mass(stretches, model)[1]}
     )
 
 

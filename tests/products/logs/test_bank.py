@@ -88,8 +88,8 @@ def test_a_stuck_surface_offsets_the_axes_it_moves_most():
     """0.3 to 1 of 1.7 residual sd, by the sum of its responses; a loss brings none."""
     model = MODELS["slaved, may be stuck"]
     bank = build_hypothesis_bank(model)
-    noise = np.diag(model.noise)
-    moved = np.abs(np.array(model.response)).sum(axis=1) / np.sqrt(noise)
+    noise = np.diag(model.residual_covariance)
+    moved = np.abs(np.array(model.command_response)).sum(axis=1) / np.sqrt(noise)
     for group in range(2):
         mine = (bank.hypothesis_kind == GROUP_LOSS) & (bank.effectiveness[:, group] < 1.0)
         found = np.unique(bank.rate_offset_variance[mine], axis=0)

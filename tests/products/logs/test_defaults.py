@@ -53,7 +53,7 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
 
 
 def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
-    model = small.model(fitted=FittedRanges(commands=[], rates=[], tied=[1.0, 0.0]).model_dump())
+    model = small.model(fitted=FittedRanges(commands=[], rates=[], tied=[1.0, 0.0]).model_dump(by_alias=True))
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))

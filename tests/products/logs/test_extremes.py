@@ -52,10 +52,10 @@ def test_flights_that_differ_count_for_less():
     alike = parts_of(TAILS["exponential"][0], rng, 1.0)
     apart = [(3.0 * alike[0][0], alike[0][1]), *((0.3 * one, hours) for one, hours in alike[1:])]
     calm, wild = extremes.fit_peak_tail(alike), extremes.fit_peak_tail(apart)
-    assert calm.dispersion < 2.0 < wild.dispersion
+    assert calm.overdispersion < 2.0 < wild.overdispersion
     rates = [
-        extremes.expected_false_alarms_per_hour(wild.model_copy(update={"dispersion": d}), 20.0)
-        for d in (1.0, wild.dispersion)
+        extremes.expected_false_alarms_per_hour(wild.model_copy(update={"overdispersion": d}), 20.0)
+        for d in (1.0, wild.overdispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
 
@@ -104,7 +104,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     coloured = np.array([white[max(k - 3, 0) : k + 1].sum(axis=0) for k in range(n)])
     walk = np.cumsum(rng.standard_normal((n, 3)), axis=0)
     series = np.column_stack([white[:, 0], coloured[:, 1], white[:, 2] + 0.05 * walk[:, 2]])
-    series = series * np.sqrt(np.diag(np.array(model.noise)))
+    series = series * np.sqrt(np.diag(np.array(model.residual_covariance)))
     monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
     monkeypatch.setattr(
         fitting, "whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
@@ -148,7 +148,7 @@ def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
         < 3.0
     )
     assert fitting._choose_alarm_threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
-    high = tail.model_copy(update={"level": 50.0})
+    high = tail.model_copy(update={"threshold_level": 50.0})
     assert (
         fitting._choose_alarm_threshold(high, 1.0, other)
         == extremes.threshold_for_false_alarms(high, 1.0)

@@ -31,7 +31,8 @@ def delays_of(samples, model):
     from beaver_ftc_logs.filtering import _run_bank_on_flight
 
     evidence = [
-        _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3] for d in model.settings.delays_s
+        _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3]
+        for d in model.settings.command_delay_candidates_s
     ]
     return _model_probabilities_with_forgetting(evidence, model.rate_hz)
 
@@ -62,7 +63,7 @@ def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     settings = wing_model.settings
     _, _, response, noise = wing_model.coefficient_arrays()
     rng = np.random.default_rng(4)
-    shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
+    shifts = settings.trim_command_shift_sd * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(
@@ -77,7 +78,7 @@ def test_gains_return_in_their_time(wing_model):
     for _ in range(200_000):
         variance = own.deviation_retention**2 * variance + own.random_walk_variance
     assert np.sqrt(variance[3]) == pytest.approx(wing_model.settings.gain_sd, rel=1e-3)
-    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.own_gain_sd, rel=1e-3)
+    assert np.sqrt(variance[4]) == pytest.approx(wing_model.settings.group_gain_sd, rel=1e-3)
 
 
 def test_a_fault_from_the_start_is_not_learnt_away(wing, wing_folder, wing_model):
@@ -99,24 +100,32 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_walk=walk))
-    noise_sd = np.sqrt(np.diag(np.array(wing_model.noise)))
+    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_random_walk_sd=walk))
+    noise_sd = np.sqrt(np.diag(np.array(wing_model.residual_covariance)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
     np.testing.assert_allclose(np.sqrt(900 * own.random_walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
 
 
 def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     """A pitching moment that grows: where the settings let the trim wander it is found there."""
-    sd, past = np.sqrt(np.diag(np.array(wing_model.noise)))[1], np.array(wing_model.past)
+    sd, past = (
+        np.sqrt(np.diag(np.array(wing_model.residual_covariance)))[1],
+        np.array(wing_model.past_coefficients),
+    )
     moment = np.clip((healthy.t_s - 60.0) / 100.0, 0.0, 1.0) * 0.8 * sd
-    answer = np.zeros((len(moment) + wing_model.history, 3))  # of the rates, by the model's own past
-    for k, off in enumerate(moment, wing_model.history):
-        before = np.concatenate([answer[k - lag] for lag in range(1, wing_model.history + 1)])
+    answer = np.zeros((len(moment) + wing_model.n_rate_lags, 3))  # of the rates, by the model's own past
+    for k, off in enumerate(moment, wing_model.n_rate_lags):
+        before = np.concatenate([answer[k - lag] for lag in range(1, wing_model.n_rate_lags + 1)])
         answer[k] = before @ past + [0.0, off, 0.0]
-    drifting = replace(healthy, rates=healthy.rates + answer[wing_model.history :])
+    drifting = replace(healthy, rates=healthy.rates + answer[wing_model.n_rate_lags :])
     found = {}
     for walk in (1e-6, 2e-2):
-        model = with_settings(wing_model, trim_walk=[walk] * 3, trim_bound=40.0, delays_s=[0.0])
+        model = with_settings(
+            wing_model,
+            trim_random_walk_sd=[walk] * 3,
+            max_trim_deviation_sd=40.0,
+            command_delay_candidates_s=[0.0],
+        )
         one, other = (
             hypothesis_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
             for flight in (drifting, healthy)
@@ -133,7 +142,7 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     rng = np.random.default_rng(8)
     rates = healthy.rates.copy()
     rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
-    model = with_settings(wing_model, noise_memory_s=memory_s, delays_s=[0.0])
+    model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delay_candidates_s=[0.0])
     bank = build_hypothesis_bank(model)
     posterior, _, scale = hypothesis_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
@@ -164,7 +173,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
     noise = np.array([[0.0025, 0.0003, -0.0007], [0.0003, 0.0004, 0.0001], [-0.0007, 0.0001, 0.0081]])
     constant, known = np.array([0.3, -0.2, 0.1]), np.arange(40) != 7
     apart(noise=noise[np.triu_indices(3)], constant=constant, average=average)
-    settings = SimpleNamespace(tail=7.0, power=0.4)
+    settings = SimpleNamespace(t_degrees_of_freedom=7.0, effective_sample_share=0.4)
     model = SimpleNamespace(settings=settings, whitened_intercept=lambda average: sum(average) * constant)
     found = []
     for of, size in ((average, gain), ((1.0,), 1.0)):
@@ -173,7 +182,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
         monkeypatch.setattr(
             filtering, "whitened_rates_and_responses", lambda *_, made=(known, unexplained, answers): made
         )
-        colour = SimpleNamespace(average=of, noise=(size**2 * noise).tolist())
+        colour = SimpleNamespace(ma_coefficients=of, residual_covariance=(size**2 * noise).tolist())
         found.append(filtering._noise_model_log_likelihood(None, model, colour))
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
     square = np.einsum("na,ab,nb->n", white, np.linalg.inv(noise), white)

@@ -155,7 +155,9 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
 
 def _whitened_group_responses(samples, model):
     ok, _, answers = unexplained_rates_and_responses(samples, model)
-    root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
+    root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
+        model.settings.effective_sample_share
+    )
     return answers[ok] @ root.T
 
 

@@ -191,7 +191,7 @@ def fitted(stretches):
 
 def in_numbers(model):
     """A model with its arrays in short."""
-    found = model.model_dump(exclude={"vehicle", "settings", "identified"})
+    found = model.model_dump(exclude={"vehicle", "settings", "identification_results"}, by_alias=True)
     return {key: in_short(value) if key in ARRAYS else value for key, value in found.items()}
 
 
@@ -200,35 +200,44 @@ ARRAYS = ("intercept", "past", "response", "response_sd", "noise")
 
 def test_a_model_is_what_was_fitted(changed, fitted, stretches):
     assert not changed(in_numbers(fitted))
-    fit = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, fitted.history, fitted.lags)
-    past = 1 + 3 * fitted.history
+    fit = fitting.fit_least_squares_of_order(
+        stretches, MODEL.vehicle, fitted.n_rate_lags, fitted.n_command_lags
+    )
+    past = 1 + 3 * fitted.n_rate_lags
     assert fitted.intercept == fit.coefficients[0].tolist()
-    assert fitted.past == fit.coefficients[1:past].tolist()
-    for field, values in (("response", fit.coefficients), ("response_sd", fit.standard_errors)):
+    assert fitted.past_coefficients == fit.coefficients[1:past].tolist()
+    for field, values in (
+        ("command_response", fit.coefficients),
+        ("command_response_standard_error", fit.standard_errors),
+    ):
         for group in range(2):
-            begin = past + group * fitted.lags
-            assert getattr(fitted, field)[group] == values[begin : begin + fitted.lags].tolist()
-    assert fitted.noise == fit.residual_covariance.tolist()
+            begin = past + group * fitted.n_command_lags
+            assert getattr(fitted, field)[group] == values[begin : begin + fitted.n_command_lags].tolist()
+    assert fitted.residual_covariance == fit.residual_covariance.tolist()
     assert fitted.rate_hz == pytest.approx(10.0)
-    np.testing.assert_allclose(fitted.response, MODEL.response, atol=0.06)
+    np.testing.assert_allclose(fitted.command_response, MODEL.command_response, atol=0.06)
 
 
 def test_settings_are_what_the_flights_say(changed, fitted):
-    assert not changed(fitted.settings.model_dump())
+    assert not changed(fitted.settings.model_dump(by_alias=True))
 
 
 def test_settings_by_hand(fitted):
     """Two changes to a fault, two repairs, over the time in use; three surfaces of which two move as one."""
     use = sum(fitting.is_usable_for_fit(small.flight(MODEL, 1000, lost=LOST)))
     settings = fitted.settings
-    assert settings.levels == {"right": [0.4], "left": [0.5]}
-    assert settings.changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
+    assert settings.likely_effectiveness_levels == {"right": [0.4], "left": [0.5]}
+    assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
-    assert settings.delays_s == pytest.approx([-0.04, 0.0, 0.04])
+    assert settings.command_delay_candidates_s == pytest.approx([-0.04, 0.0, 0.04])
     stuck = fitting.estimate_filter_settings(fitting.usable_stretches([small.flight(TAIL, 400)]), TAIL)
-    assert (stuck.alarm, stuck.hold_s, stuck.levels) == (0.995, 0.3, {})
-    assert 0.0 < stuck.power <= 0.9
-    given = settings.model_copy(update={"alarm": 0.7})
+    assert (stuck.alarm_probability, stuck.alarm_hold_s, stuck.likely_effectiveness_levels) == (
+        0.995,
+        0.3,
+        {},
+    )
+    assert 0.0 < stuck.effective_sample_share <= 0.9
+    given = settings.model_copy(update={"alarm_probability": 0.7})
     stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
     assert fitting.fit_model(stretches, MODEL.vehicle, given).settings == given
     assert fitting.fit_with_same_order(stretches, fitted).settings == settings
@@ -256,7 +265,7 @@ def test_days_that_differ_let_a_sample_tell_less():
         for size in (0.0, 0.15, 0.3)
     )
     assert more > 1.5 * some > 5.0 * none
-    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2
+    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).effective_sample_share < 0.2
 
 
 def test_levels_of_a_label_in_their_order():
@@ -277,9 +286,9 @@ def test_settings_of_flights_that_change_in_every_way():
     labels[100:200, 0], labels[200:300, 0], labels[200:, 1] = 0.6, 0.2, 0.8
     stretches = fitting.usable_stretches([rate, weak, changed(rate, labels=labels)])
     settings = fitting.estimate_filter_settings(stretches, MODEL)
-    assert settings.levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
+    assert settings.likely_effectiveness_levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
     hours = sum(stretch.usable.sum() for stretch in stretches) / 36000.0
-    assert settings.changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
+    assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
     assert settings.repair_share == pytest.approx((1 + 10) / (4 + 20))
 
 
@@ -308,7 +317,7 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
-    quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
+    quick = fitted.settings.model_copy(update={"command_delay_candidates_s": [0.0]})
     entries, bounds = fitting.score_folds_and_choose_credible_mass(
         stretches, fitted.model_copy(update={"settings": quick})
     )
@@ -320,7 +329,7 @@ def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
 
 def test_without_labels_bounds_stay_as_they_are():
     flights = [small.flight(TAIL, 200, seed=seed) for seed in range(3)]
-    settings = TAIL.settings.model_copy(update={"bounds": 0.77})
+    settings = TAIL.settings.model_copy(update={"credible_mass": 0.77})
     model = TAIL.model_copy(update={"settings": settings})
     entries, bounds = fitting.score_folds_and_choose_credible_mass(fitting.usable_stretches(flights), model)
     assert bounds == 0.77
@@ -350,9 +359,11 @@ def test_what_one_step_prediction_explains(stretches):
     assert rows.tolist() == expected
     for i in (0, 100, len(expected) - 1):
         k = expected[i]
-        past = np.concatenate([samples.rates[k - 1], samples.rates[k - 2]]) @ np.array(MODEL.past)
+        past = np.concatenate([samples.rates[k - 1], samples.rates[k - 2]]) @ np.array(
+            MODEL.past_coefficients
+        )
         moved = sum(
-            samples.commands[k - j, g] * left[k - j, g] * np.array(MODEL.response[g][j - 1])
+            samples.commands[k - j, g] * left[k - j, g] * np.array(MODEL.command_response[g][j - 1])
             for g in (0, 1)
             for j in (1, 2, 3)
         )
@@ -417,20 +428,25 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     monkeypatch.setattr(fitting.trust, "fitted_ranges", fitted_ranges)
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: None)
     vehicle = SimpleNamespace(false_alarms_per_hour=None, other_laws=False)
-    settings = SimpleNamespace(levels={"left": [0.5]}, model_copy=lambda update: update)
+    settings = SimpleNamespace(likely_effectiveness_levels={"left": [0.5]}, model_copy=lambda update: update)
     model = SimpleNamespace(
         vehicle=vehicle,
-        history=2,
-        lags=3,
+        n_rate_lags=2,
+        n_command_lags=3,
         settings=settings,
         groups=[["rudder"]],
         model_copy=lambda update: update,
     )
     found = fitting.add_validity_range([], model)
-    expected = {"tail": None, "misread": 0.6, "of": ([0.25], 2.5), "column_sd": {"p": 0.0}}
-    assert found["fitted"].known == expected
-    assert found["settings"] == {"false_alarms_per_hour": None, "threshold": None}
-    assert found["identified"] == {}
+    expected = {
+        "alarm_peak_tail": None,
+        "max_column_mistake_log_likelihood_gain": 0.6,
+        "of": ([0.25], 2.5),
+        "column_gain_standard_error": {"p": 0.0},
+    }
+    assert found["fitted_ranges"].known == expected
+    assert found["settings"] == {"false_alarms_per_hour": None, "alarm_threshold": None}
+    assert found["identification_results"] == {}
     vehicle.false_alarms_per_hour = 0.5
     more = fitting.extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 120 - 15
     with pytest.raises(BadInput, match=f"_per_hour 0.5: 15.0 min .* allowed: {more:.0f} min more"):

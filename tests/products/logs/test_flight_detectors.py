@@ -23,8 +23,8 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
     ok, unexplained, answers = unexplained_rates_and_responses(samples, model)
-    sd = np.sqrt(np.diag(model.noise))
-    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise)))
+    sd = np.sqrt(np.diag(model.residual_covariance))
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
     for i in range(k + 1):
         age_s = (k - i) * samples.dt_s
@@ -141,7 +141,7 @@ def test_what_a_detector_of_the_loop_is_given(model):
         assert now.contribution[:, 2:].tolist() == [[0.0, 0.0]] * 3
         moved = [samples.commands[k, group].sum() for group in members]
         np.testing.assert_allclose(command, [*np.nan_to_num(moved), 0.0, 0.0], atol=1e-12)
-        np.testing.assert_allclose(now.eta_bar, np.sqrt(np.diag(model.noise)) * 10.0)
+        np.testing.assert_allclose(now.eta_bar, np.sqrt(np.diag(model.residual_covariance)) * 10.0)
     assert stream[3][0].eta_bar is not stream[4][0].eta_bar
 
 
@@ -163,7 +163,7 @@ def test_what_a_detector_is_told_before_the_flight(changed):
     fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
     assert not changed(fields | {"declared": vars(told.declared)})
     x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
-    past = np.array(WING.past)[:3]
+    past = np.array(WING.past_coefficients)[:3]
     np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)
     assert told.model.G(np.zeros(4)).tolist() == [[0.0] * 4] * 3
 

@@ -66,7 +66,9 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
     assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
     assert scale_commands_by_dynamic_pressure([flown], told)[1].airspeed_powers == {}
     assert scale_commands_by_dynamic_pressure([mixed], its)[1].airspeed_powers == {}
-    said = identification_text(MODEL.model_copy(update={"vehicle": described, "identified": SAYS_LITTLE}))
+    said = identification_text(
+        MODEL.model_copy(update={"vehicle": described, "identification_results": SAYS_LITTLE})
+    )
     assert "right with airspeed^1\n" in said
     with pytest.raises(ValueError, match="contradictory"):
         small.vehicle(airspeed_powers={"fin": 1})
@@ -100,9 +102,10 @@ def test_where_the_airspeed_is_unknown_commands_count_as_they_are():
 
 def test_the_account_of_an_identification(changed, identified):
     assert not changed(
-        {what: told for what, told in identified.identified.items() if what != "output_error"}, part="found"
+        {what: told for what, told in identified.identification_results.items() if what != "output_error"},
+        part="found",
     )
-    assert not changed(identified.settings.model_dump(), part="settings")
+    assert not changed(identified.settings.model_dump(by_alias=True), part="settings")
     assert not changed(identification_text(identified).splitlines(), part="summary")
 
 
@@ -191,7 +194,7 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
     found = identification.collinear_regressors(stretches, model)
     assert found[0] == {"regressor": "airspeed_m_s[-1]", "inflation": None}
     assert json.loads(as_json(found)) == found
-    told = model.model_copy(update={"identified": FOUND | {"collinear": found}})
+    told = model.model_copy(update={"identification_results": FOUND | {"collinear": found}})
     assert "most airspeed_m_s[-1] (made up by the others)" in identification_text(told)
     page = load_template("model.html.j2")
     said = {"mark": "", "used": 1, "coefficients": [], "fits": "", "spectrum": "", "correlation": ""}
@@ -201,7 +204,7 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
 
 def test_inflation_is_of_the_regressors_without_the_constant():
     stretches = fitting.usable_stretches([small.flight(MODEL, 200)])
-    x = fitting.stacked_regression_data(stretches, MODEL.vehicle, MODEL.history, MODEL.lags)[0]
+    x = fitting.stacked_regression_data(stretches, MODEL.vehicle, MODEL.n_rate_lags, MODEL.n_command_lags)[0]
     found = {
         one["regressor"]: one["inflation"] for one in identification.collinear_regressors(stretches, MODEL)
     }

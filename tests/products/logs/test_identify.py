@@ -14,18 +14,18 @@ from products.logs import synthetic
 
 def test_the_responses_are_those_of_the_vehicle(wing_model):
     true = np.array([synthetic.RIGHT, synthetic.LEFT])
-    found = np.array(wing_model.response)[:, :3]
-    error = np.abs(found - true) / np.array(wing_model.response_sd)[:, :3]
+    found = np.array(wing_model.command_response)[:, :3]
+    error = np.abs(found - true) / np.array(wing_model.command_response_standard_error)[:, :3]
     assert error.max() < 4.5
     assert np.abs(found - true).max() < 0.06
 
 
 def test_the_noise_is_that_of_the_vehicle(wing_model):
-    assert np.sqrt(np.diag(wing_model.noise)) == pytest.approx(synthetic.NOISE, rel=0.05)
+    assert np.sqrt(np.diag(wing_model.residual_covariance)) == pytest.approx(synthetic.NOISE, rel=0.05)
 
 
 def test_what_is_left_of_white_noise_is_white_in_every_band_up_to_half_the_rate(wing_model):
-    bands = wing_model.identified["spectrum"]
+    bands = wing_model.identification_results["spectrum"]
     ends = [(band["from_hz"], band["to_hz"]) for band in bands]
     assert [ends[0][0], ends[-1][1]] == [0.0, synthetic.RATE_HZ / 2]
     assert all(one[1] == other[0] for one, other in itertools.pairwise(ends))
@@ -33,7 +33,7 @@ def test_what_is_left_of_white_noise_is_white_in_every_band_up_to_half_the_rate(
 
 
 def test_what_the_labels_say_becomes_the_prior(wing_model):
-    assert wing_model.settings.levels == {"right": [0.4], "left": [0.5]}
+    assert wing_model.settings.likely_effectiveness_levels == {"right": [0.4], "left": [0.5]}
 
 
 def test_edges_of_labels_are_not_fitted(wing, wing_folder):

@@ -45,8 +45,8 @@ def test_a_model_comes_back_from_its_file(tmp_path):
     assert lines[1] == ' "vehicle": {'
     assert path.read_text().endswith("}\n")
     intercept, past, response, noise = model.coefficient_arrays()
-    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.past)
-    assert (response.tolist(), noise.tolist()) == (model.response, model.noise)
+    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.past_coefficients)
+    assert (response.tolist(), noise.tolist()) == (model.command_response, model.residual_covariance)
 
 
 @pytest.mark.parametrize(("load", "most"), [(load_model, 20_000_000), (load_vehicle, 1_000_000)])

@@ -40,7 +40,7 @@ def written(tmp_path, *changes):
 
 
 def test_the_model_itself_is_one(tmp_path):
-    assert load_model(written(tmp_path)).lags == LAGS
+    assert load_model(written(tmp_path)).n_command_lags == LAGS
 
 
 SINGULAR = [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -85,7 +85,10 @@ def test_what_is_just_allowed_of_delays_and_covariances(tmp_path):
     settings = {"delays_s": [-0.05, 0.05]}
     noise = [[2e-12, 0, 0], [0, 1, 0], [0, 0, 1.9]]
     found = load_model(written(tmp_path, (("settings",), settings), (("noise",), noise)))
-    assert (list(found.settings.delays_s), found.noise[0][0]) == ([-0.05, 0.05], 2e-12)
+    assert (list(found.settings.command_delay_candidates_s), found.residual_covariance[0][0]) == (
+        [-0.05, 0.05],
+        2e-12,
+    )
     for wrong in ({"delays_s": [-0.06]}, {"delays_s": [0.0501]}):
         with pytest.raises(BadInput, match="up to a sample"):
             load_model(written(tmp_path, (("settings",), wrong)))

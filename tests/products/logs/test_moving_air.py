@@ -55,7 +55,7 @@ VEHICLE = small.vehicle(
 def first_response(flights):
     """Of the roll rate to its own command, by the order that the criterion takes."""
     model = fitting.fit_model(fitting.usable_stretches(flights), VEHICLE)
-    return model.response[0][0][0]
+    return model.command_response[0][0][0]
 
 
 def test_a_fit_finds_the_colours_that_a_law_answers():
@@ -78,12 +78,14 @@ def test_a_model_of_two_colours_takes_the_likelier():
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5, 3000, i) for i in range(4)]
     white = identification.whiten_flights(flights, VEHICLE)
     model = fitting.fit_model(fitting.usable_stretches(white), VEHICLE)
-    assert len(model.colours) == 2
-    assert all(one.wider >= 1.0 for one in model.colours)
+    assert len(model.noise_models) == 2
+    assert all(one.covariance_inflation >= 1.0 for one in model.noise_models)
     for i in (0, 1):
         new = flown(AVERAGE if i else (1.0,), 0.5, 1500, 9 + i)
-        own = [one for one in model.colours if tuple(one.average) == white[i].noise_ma_coefficients]
-        alone = model.model_copy(update={"colours": own})
+        own = [
+            one for one in model.noise_models if tuple(one.ma_coefficients) == white[i].noise_ma_coefficients
+        ]
+        alone = model.model_copy(update={"noise_models": own})
         both = hypothesis_posterior(new, model, build_hypothesis_bank(model))[0][300:]
         np.testing.assert_allclose(
             both, hypothesis_posterior(new, alone, build_hypothesis_bank(model))[0][300:], atol=1e-6
@@ -116,20 +118,22 @@ def test_the_predictor_of_a_residual_is_found():
         e[k] = 0.8 * e[k - 1] + w[k]
     rows = np.concatenate([np.arange(9_000), np.arange(9_500, 20_500)])
     found = fitting._fit_noise_model([1.0], [(rows, e)])
-    before = np.reshape(found.before, (-1, 3, 3))
+    before = np.reshape(found.ar_coefficients, (-1, 3, 3))
     np.testing.assert_allclose(before[0], 0.8 * np.eye(3), atol=0.1)
-    np.testing.assert_allclose(np.diag(found.noise), size**2, rtol=0.05)
+    np.testing.assert_allclose(np.diag(found.residual_covariance), size**2, rtol=0.05)
     np.testing.assert_allclose(before[1:].sum(axis=0), 0.0, atol=0.15)
     few = fitting._fit_noise_model([1.0], [(np.arange(100), e[:100])])
-    assert few.before == []
-    np.testing.assert_allclose(few.noise, np.cov(e[:100].T))
+    assert few.ar_coefficients == []
+    np.testing.assert_allclose(few.residual_covariance, np.cov(e[:100].T))
 
 
 def in_colour(before):
     """A model that has heard one colour, and a flight of it."""
     plain = small.model()
-    colour = NoiseModel(average=[1.0], noise=plain.noise, before=np.reshape(before, (-1, 3)).tolist())
-    model = plain.model_copy(update={"colours": [colour]})
+    colour = NoiseModel(
+        average=[1.0], noise=plain.residual_covariance, before=np.reshape(before, (-1, 3)).tolist()
+    )
+    model = plain.model_copy(update={"noise_models": [colour]})
     return model, replace(small.flight(model, 60), noise_ma_coefficients=(1.0,))
 
 
@@ -162,12 +166,14 @@ def test_a_sample_that_nothing_explains_teaches_nothing(size, learns):
 def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
     """Five memories long: else the scale takes back what was taken wider."""
     model, _ = in_colour(np.zeros((1, 3, 3)))
-    model = model.model_copy(update={"colours": [model.colours[0].model_copy(update={"wider": wider})]})
+    model = model.model_copy(
+        update={"noise_models": [model.noise_models[0].model_copy(update={"covariance_inflation": wider})]}
+    )
     flight = replace(small.flight(model, 3000, seed=3), noise_ma_coefficients=(1.0,))
     scale = hypothesis_posterior(flight, model, build_hypothesis_bank(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
     assert build_residual_noise(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
-        wider * np.array(model.noise)
+        wider * np.array(model.residual_covariance)
     )
 
 
@@ -175,12 +181,12 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
 def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
     """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
     plain = small.model(small.WING | {"moving_air": True})
-    colour = NoiseModel(average=list(average), noise=plain.noise)
+    colour = NoiseModel(average=list(average), noise=plain.residual_covariance)
     monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *_: [(model, stretches)])
     found = []
     for laws in (False, True):
         vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
-        model = plain.model_copy(update={"colours": [colour], "vehicle": vehicle})
+        model = plain.model_copy(update={"noise_models": [colour], "vehicle": vehicle})
         flight = replace(small.flight(model, 400, seed=5), noise_ma_coefficients=average)
         stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
         found.append(fitting._with_inflated_noise(stretches, model).noise_inflation(average))
@@ -205,11 +211,16 @@ def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
     trust.check_columns_as_identified(flight, moving)
-    found = [trust._bound_part_gains(whiten_samples(flight, one.average), moving) for one in moving.colours]
-    likeliest = max(zip(found, moving.colours, strict=True), key=lambda pair: pair[0].log_likelihoods.mean())
+    found = [
+        trust._bound_part_gains(whiten_samples(flight, one.ma_coefficients), moving)
+        for one in moving.noise_models
+    ]
+    likeliest = max(
+        zip(found, moving.noise_models, strict=True), key=lambda pair: pair[0].log_likelihoods.mean()
+    )
     assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
     assert all(1.0 < gain < 1.6 for gain in likeliest[0].max_group_gains)
-    plain = trust._bound_part_gains(flight, moving.model_copy(update={"colours": []}))
+    plain = trust._bound_part_gains(flight, moving.model_copy(update={"noise_models": []}))
     assert colour == (1.0,) or min(plain.max_group_gains) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
@@ -220,7 +231,7 @@ def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
     known = FittedRanges(
         commands=trust.central_range(flight.commands), rates=trust.central_range(flight.rates)
     )
-    moving = moving.model_copy(update={"fitted": known})
+    moving = moving.model_copy(update={"fitted_ranges": known})
     trust.check_columns_as_identified(flight, moving)
     with pytest.raises(BadInput, match=r"likely with `scale: 0.01745` on p_rad_s"):
         trust.check_columns_as_identified(replace(flight, rates=flight.rates * [20.0, 1.0, 1.0]), moving)
@@ -242,20 +253,20 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     """The fitted colours stay as they were; the noise of another gust is what it leaves of the flights, and
     that of noisier gyros grows with them."""
     flights = [flown((1.0,), 0.5, 2000, 31)]
-    model = moving.model_copy(update={"colours": moving.colours[:1]})
+    model = moving.model_copy(update={"noise_models": moving.noise_models[:1]})
     found = identification.add_unseen_noise_models(model, flights)
-    gyros, others = found.colours[-len(samples.UNSEEN_GYRO_NOISE_RAD_S) :], found.colours[1:]
+    gyros, others = found.noise_models[-len(samples.UNSEEN_GYRO_NOISE_RAD_S) :], found.noise_models[1:]
     others = others[: -len(gyros)]
-    assert found.colours[0] == model.colours[0]
-    assert {tuple(one.average) for one in others} == {*samples.UNSEEN_NOISE_MA_COEFFICIENTS} - {
-        tuple(model.colours[0].average)
+    assert found.noise_models[0] == model.noise_models[0]
+    assert {tuple(one.ma_coefficients) for one in others} == {*samples.UNSEEN_NOISE_MA_COEFFICIENTS} - {
+        tuple(model.noise_models[0].ma_coefficients)
     }
     for one in others:
-        white = fitting.usable_stretches([whiten_samples(flights[0], one.average)])[0]
-        assert np.allclose(one.noise, np.cov(fitting.one_step_residuals(model, white)[1].T))
-    assert (np.diff([np.linalg.det(one.noise) for one in gyros]) > 0.0).all()
-    assert {one.wider for one in gyros} == {model.colours[0].wider}
-    assert identification.add_unseen_noise_models(small.model(), flights).colours == []
+        white = fitting.usable_stretches([whiten_samples(flights[0], one.ma_coefficients)])[0]
+        assert np.allclose(one.residual_covariance, np.cov(fitting.one_step_residuals(model, white)[1].T))
+    assert (np.diff([np.linalg.det(one.residual_covariance) for one in gyros]) > 0.0).all()
+    assert {one.covariance_inflation for one in gyros} == {model.noise_models[0].covariance_inflation}
+    assert identification.add_unseen_noise_models(small.model(), flights).noise_models == []
 
 
 @pytest.mark.parametrize("a", [0.9, 0.3])

@@ -203,7 +203,7 @@ def test_the_pictures_of_an_identification(changed):
     spectrum = pages._spectrum_figure(stretches, model)
     assert not changed(picture(spectrum), part="spectrum")
     assert spectrum.get_size_inches().tolist() == pytest.approx([7.5, 3.2])
-    fit = fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
+    fit = fit_least_squares_of_order(stretches, model.vehicle, model.n_rate_lags, model.n_command_lags)
     names = ["constant", *regressor_names(model)]
     correlation = pages._coefficient_correlation_figure(fit, names)
     assert not changed(picture(correlation), part="correlation")

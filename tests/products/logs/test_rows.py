@@ -169,8 +169,14 @@ def test_names_by_hand():
 
 def test_names_under_other_laws(monkeypatch):
     """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
-    settings = WING.settings.model_copy(update={"threshold": 2.0})
-    asks = settings.model_copy(update={"name_evidence": 4.0, "rename_s": 1.0, "one_group": True})
+    settings = WING.settings.model_copy(update={"alarm_threshold": 2.0})
+    asks = settings.model_copy(
+        update={
+            "isolation_evidence_factor": 4.0,
+            "isolation_change_hold_s": 1.0,
+            "isolates_single_group": True,
+        }
+    )
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
@@ -197,7 +203,7 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
     monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_after_engine_failure", renamed)
-    model = SimpleNamespace(fitted=SimpleNamespace(energy_climb=-1.5))
+    model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_energy_height_rate_mps=-1.5))
     found = diagnose._withdraw_isolation_after_engine_failure(
         SimpleNamespace(energy_height_rate_mps="climb"), model, rows
     )
@@ -209,11 +215,11 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         np.testing.assert_array_equal(getattr(found, name), values)
     for fitted, climb in (
         (None, "climb"),
-        (SimpleNamespace(energy_climb=None), "climb"),
-        (model.fitted, None),
+        (SimpleNamespace(unpowered_energy_height_rate_mps=None), "climb"),
+        (model.fitted_ranges, None),
     ):
         alike = diagnose._withdraw_isolation_after_engine_failure(
-            SimpleNamespace(energy_height_rate_mps=climb), SimpleNamespace(fitted=fitted), rows
+            SimpleNamespace(energy_height_rate_mps=climb), SimpleNamespace(fitted_ranges=fitted), rows
         )
         assert alike is rows
 

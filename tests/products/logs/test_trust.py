@@ -69,8 +69,8 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
 
 def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredible(model):
     """Noise of 2.5 times the standard deviation: the rows are credible, and a large loss is still named."""
-    noise = (6.25 * np.array(small.model().noise)).tolist()
-    noisy = model.model_copy(update={"noise": noise})
+    noise = (6.25 * np.array(small.model().residual_covariance)).tolist()
+    noisy = model.model_copy(update={"residual_covariance": noise})
     flown = small.flight(noisy, n=1500, lost=((1, 600, 1500, 0.0),), seed=21)
     rows = diagnose(flown, model)
     assert rows.credible.mean() > 0.9
@@ -91,7 +91,11 @@ def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
 def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most):
     """A filter that follows a dead gyro for longer finds a fault of it."""
     known = model.model_copy(
-        update={"fitted": model.fitted.model_copy(update={"still_s": {"q_rad_s": usual}})}
+        update={
+            "fitted_ranges": model.fitted_ranges.model_copy(
+                update={"longest_unchanged_time_s": {"q_rad_s": usual}}
+            )
+        }
     )
     still = np.zeros(600)
     still[300:320] = 0.1 * np.arange(20)
@@ -100,8 +104,8 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
 
 
 def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
-    trained = model.fitted.model_copy(update={"still_s": {"roll": 4.0}})
-    known = model.model_copy(update={"fitted": trained})
+    trained = model.fitted_ranges.model_copy(update={"longest_unchanged_time_s": {"roll": 4.0}})
+    known = model.model_copy(update={"fitted_ranges": trained})
     for longest, share in ((11.9, 1.0), (12.5, 0.98)):
         flown = small.flight(
             model, n=600, seed=4, still_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
@@ -130,7 +134,7 @@ def test_rows_use_nothing_later(model):
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        trust.check_rate_units(flown, model.fitted)
+        trust.check_rate_units(flown, model.fitted_ranges)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)
@@ -183,7 +187,11 @@ def test_few_minutes_mean_wide_bounds():
         flown = small.flight(small.model(), n=n, seed=6)
         model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle())
         errors.append(
-            np.array(fitting.add_validity_range(fitting.usable_stretches([flown]), model).fitted.gain_sd)
+            np.array(
+                fitting.add_validity_range(
+                    fitting.usable_stretches([flown]), model
+                ).fitted_ranges.group_gain_standard_error
+            )
         )
     assert (errors[0] / errors[1] > 2.0).all()
     assert (errors[0] / errors[1] < 8.0).all()
@@ -194,14 +202,18 @@ def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
     flown = small.flight(small.model(), n=3000, seed=6)
     model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle(other_laws=True))
     stretches = fitting.usable_stretches([flown])
-    x, _, _ = fitting.stacked_regression_data(stretches, model.vehicle, model.history, model.lags)
-    fit = fitting.fit_least_squares_of_order(stretches, model.vehicle, model.history, model.lags)
+    x, _, _ = fitting.stacked_regression_data(
+        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
+    fit = fitting.fit_least_squares_of_order(
+        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
     white = replace(fit, standard_errors=fit.standard_errors / fit.standard_error_inflation)
     sd = np.sqrt(np.diag(fit.residual_covariance))
     for g, found in enumerate(fitting.group_gain_standard_error(white, model)):
-        first = x.shape[1] - (len(model.groups) - g) * model.lags
+        first = x.shape[1] - (len(model.groups) - g) * model.n_command_lags
         place = np.arange(x.shape[1])
-        own = (place >= first) & (place < first + model.lags)
+        own = (place >= first) & (place < first + model.n_command_lags)
         answer, others = x[:, own] @ fit.coefficients[own] / sd, x[:, ~own]
         left = answer - others @ np.linalg.lstsq(others, answer, rcond=None)[0]
         assert found == pytest.approx(1.0 / np.sqrt((left**2).sum()), rel=1e-6)
@@ -227,11 +239,11 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
 
 def test_a_gain_known_worse_than_a_step_of_the_levels_is_free_by_as_much(model):
     def spread(*errors):
-        known = model.fitted.model_copy(update={"gain_sd": list(errors)})
-        given = model.model_copy(update={"fitted": known})
+        known = model.fitted_ranges.model_copy(update={"group_gain_standard_error": list(errors)})
+        given = model.model_copy(update={"fitted_ranges": known})
         return np.diag(build_trim_and_gain_state_model(given).initial_covariance)[4:]
 
-    step, own = model.settings.level_step, model.settings.own_gain_sd
+    step, own = model.settings.effectiveness_level_step, model.settings.group_gain_sd
     assert spread(0.0, step) == pytest.approx([own**2, own**2])
     assert spread(0.3, 0.2) == pytest.approx([own**2 + 0.09 - step**2, own**2 + 0.04 - step**2])
 
@@ -241,8 +253,8 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
     flown = small.flight(model, n=600, lost=((1, 0, 600, 0.5),), seed=8)
     widths = []
     for error in (0.0, 0.3):
-        known = model.fitted.model_copy(update={"gain_sd": [error, error]})
-        rows = diagnose(flown, model.model_copy(update={"fitted": known}))
+        known = model.fitted_ranges.model_copy(update={"group_gain_standard_error": [error, error]})
+        rows = diagnose(flown, model.model_copy(update={"fitted_ranges": known}))
         widths.append((rows.effectiveness_high - rows.effectiveness_low)[100:].mean())
     assert widths[1] > 1.5 * widths[0]
 
@@ -265,8 +277,8 @@ def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
 
 def test_a_model_that_claims_nothing_says_nothing(model):
     """Neither a name nor an alarm in a flight whose surfaces' effects are all made up by the rates."""
-    fitted = model.fitted.model_copy(update={"tied": [0.99, 1.0]})
-    known = model.model_copy(update={"fitted": fitted})
+    fitted = model.fitted_ranges.model_copy(update={"effect_share_explained_by_others": [0.99, 1.0]})
+    known = model.model_copy(update={"fitted_ranges": fitted})
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
     assert not rows.credible.any()
@@ -304,8 +316,10 @@ SPANS = {"commands": [[2.0, 3.0], [-7.0, -6.5]], "rates": [[0.5, 1.1], [-2.2, 0.
 )  # fmt: skip
 def test_a_range_is_passed_by_half_its_span_at_either_end(model, kind, column, low, high, name):
     apart(**SPANS)
-    fitted = model.fitted.model_copy(update=SPANS)
-    known = model.model_copy(update={"fitted": fitted})
+    fitted = model.fitted_ranges.model_copy(
+        update={"command_ranges": SPANS["commands"], "rate_ranges_rad_s": SPANS["rates"]}
+    )
+    known = model.model_copy(update={"fitted_ranges": fitted})
     middle = {of: np.mean(spans, axis=1) for of, spans in SPANS.items()}
     for value in (low - 0.02, low + 0.02, high - 0.02, high + 0.02):
         flown = {of: np.tile(values, (300, 1)) for of, values in middle.items()}
@@ -414,7 +428,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
     model = small.model(small.TAIL)
     flown = small.flight(model, n=7)
     found, names = trust._column_contributions_to_rates(flown, model)
-    past, rates = np.array(model.past), flown.rates
+    past, rates = np.array(model.past_coefficients), flown.rates
     assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
     for k in range(2, 7):
         for i in range(3):
@@ -434,7 +448,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
 def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least, moved, says):
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
     monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: moved)
-    model = SimpleNamespace(groups=[["right", "left"]], fitted=None)
+    model = SimpleNamespace(groups=[["right", "left"]], fitted_ranges=None)
     found = trust._FlightPartGains([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
     wrong = trust._column_mistakes(None, model, found)
     if not says:
@@ -454,8 +468,12 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
 def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkeypatch, sd, refused):
     """Four standard errors of a quarter: by such a model a sound log answers with a gain of 0.19, too."""
     monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: 3.1)
-    known = SimpleNamespace(tied=[0.9], gain_sd=[sd], column_sd={"V": sd})
-    model = SimpleNamespace(groups=[["wing"]], fitted=known, vehicle=SimpleNamespace(other_laws=True))
+    known = SimpleNamespace(
+        effect_share_explained_by_others=[0.9],
+        group_gain_standard_error=[sd],
+        column_gain_standard_error={"V": sd},
+    )
+    model = SimpleNamespace(groups=[["wing"]], fitted_ranges=known, vehicle=SimpleNamespace(other_laws=True))
     found: dict[str, str] = {}
     for most in (-0.31, 0.19):
         found |= trust._column_mistakes(
@@ -469,6 +487,6 @@ def test_of_a_rate_without_a_number_no_unit_is_judged():
     known = small.model(fitted={"commands": [], "rates": [], "spread": [1.0, 1.0, 1.0]})
     rates = np.random.default_rng(1).normal(0.0, 57.3, (200, 3))
     with pytest.raises(BadInput, match="deg/s"):
-        trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted)
+        trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)
     rates[:, 2] = np.nan
-    trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted)
+    trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)

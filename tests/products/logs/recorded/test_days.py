@@ -21,8 +21,8 @@ from products.logs import small
 MODEL = small.model()
 LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
 MIXER = np.array([[0.5, 0.5], [0.5, -0.5]])
-PAST = np.array(MODEL.past)
-NOISE = np.array(MODEL.noise)
+PAST = np.array(MODEL.past_coefficients)
+NOISE = np.array(MODEL.residual_covariance)
 
 
 def test_the_days_on_which_one_thing_changes(changed):

@@ -153,7 +153,7 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
     stretches = fitting.usable_stretches([flight])
     whole = fitting.fit_model(stretches, MODEL.vehicle)
     bounds = fitting.score_folds_and_choose_credible_mass(stretches, whole)[1]
-    expected = whole.settings.model_copy(update={"bounds": bounds})
+    expected = whole.settings.model_copy(update={"credible_mass": bounds})
     assert benchmark.settings_of_whole_flight(stretches, data) == expected
 
 

@@ -17,7 +17,6 @@ from beaver_ftc.studies.reproduce.words import (
     limit,
     measured,
     number,
-    ours,
 )
 from tools.docs.tables import shared
 
@@ -42,9 +41,14 @@ def reproduction_not_borne_out() -> str:
 
 def _not_borne_out(document: Document) -> str:
     return markdown_table(("published", "statement", "ours", "limit", "why"), [
-        (claim["where"], claim["statement"], ours(claim), limit(claim), claim["because"])
+        (claim["where"], claim["statement"], _ours(claim), limit(claim), claim["because"])
         for claim in measured(document) if claim["verdict"] == NOT_BORNE_OUT
     ])  # fmt: skip
+
+
+def _ours(claim: Document) -> str:
+    """Quantity and number, with a colon between: a cell has no heading that names the quantity."""
+    return f"{claim['quantity']}: {number(claim['number'], claim['unit'], claim['none'])}"
 
 
 def reproduction_stronger() -> str:

@@ -169,8 +169,8 @@ def headline(document: Document) -> str:
         f"hold, and {tested['unsettled']} hold even without the mechanism that the statement credits. "
         f"{tested['elsewhere']} of the {tested['hold']} also hold in every one of {settings} settings that "
         f"the paper did not fly. {built['statements']} other statements follow from the construction of the "
-        f"code, so they show nothing about the scheme; {built['hold']} of these {built['statements']} hold in "
-        f"our flights. The last {document['background']} statements contain nothing that can be measured."
+        f"code, so they show nothing about the scheme; {built['hold']} of these {built['statements']} hold "
+        f"in our flights. The last {document['background']} statements contain nothing that can be measured."
     )
 
 

@@ -115,3 +115,106 @@ def test_from_which_frame_on_an_inequality_is_written_out(pole, since, known, co
     zero = np.zeros((1, 3))
     of = inequality.Hypothesis(0, zero, zero, zero, 0.0, 1.0, constant)
     assert inequality._first_written_frame(term, of, 0.02) == first
+
+
+def hypothesis(n=9, low=-0.6, high=0.35, **changes):
+    """A fault whose effect is known from frame 2 on, in no two frames alike."""
+    offset, slope, spread = (0.1 * numbers(n - 2, 3, seed=seed) for seed in (5, 6, 7))
+    given = {"offset": offset, "slope": slope, "spread": np.abs(spread)} | changes
+    return inequality.Hypothesis(2, theta_low=low, theta_high=high, **given)
+
+
+@pytest.fixture
+def long(history):
+    """Nine rows."""
+    x, model, eta_bar = (numbers(9, 3, seed=seed) for seed in (11, 12, 13))
+    return History(DT, SHARE, x, model, np.abs(eta_bar), history.declared)
+
+
+D = np.array([0.7, -0.2, 0.5])
+
+
+def filtered(decay, inputs):
+    """A filter's state after these inputs, rad/s2."""
+    state = 0.0
+    for value in inputs:
+        state = decay * state + DT * value
+    return state
+
+
+@pytest.mark.parametrize("pole", [0.5, 20.0, np.inf])
+@pytest.mark.parametrize("constant", [True, False])
+@pytest.mark.parametrize("first", [4, 6])
+def test_a_filter_reaches_what_its_frames_and_the_worst_errors_drive_it_to(long, pole, constant, first):
+    """From frame 3, at which it is zero, to frame 8: errors of the model in each frame and of the gyros at
+    both of its ends, each at its worst, and the largest effect of a fault, frame by frame."""
+    term = inequality.Term(D, pole, 3, 8, first_kept_frame=2, effect_before=0.09)
+    of = hypothesis(theta_is_constant=constant)
+    decay, frames = (np.exp(-pole * DT) if np.isfinite(pole) else 0.0), range(4, 9)
+    value, limit, slope, _ = inequality.evaluate_term(term, of, long, first)
+    x, nu = long.rates_rad_s, {}
+    for k in frames:
+        nu[k] = D @ ((x[k] - x[k - 1]) / DT - long.model_rad_s2[k])
+    assert value == pytest.approx(filtered(decay, nu.values()))
+    worst = filtered(decay, [np.abs(D) @ long.eta_bar_rad_s2[k] for k in frames])
+    for j in range(3, 9):  # a reading that is off drives the frame that it ends, and the next the other way
+        driven = filtered(decay, [((k == j) - (k - 1 == j)) / DT for k in frames])
+        worst += abs(driven) * np.abs(D) @ long.gyro_error_change_rad_s[j]
+    h, Z, r = of.offset[2:] @ D, of.slope[2:] @ D, of.spread[2:] @ np.abs(D)
+    if constant and first > 4:
+        return  # a constant is written out from the filter's first frame on
+    start = decay**5 * 0.09
+    if constant:
+        assert slope == pytest.approx(filtered(decay, Z))
+        assert limit == pytest.approx(worst + start + filtered(decay, h + r))
+    else:
+        most = [max(0.0, a - 0.6 * b, a + 0.35 * b) + c for a, b, c in zip(h, Z, r, strict=True)]
+        assert (slope, limit) == (0.0, pytest.approx(worst + start + filtered(decay, most)))
+
+
+def test_each_frame_and_axis_bounds_theta_by_what_explains_its_innovation(long):
+    of = hypothesis(axes=(0, 2))
+    of.slope[3, 2] = 0.0
+    frames = np.array([4, 5, 7])
+    lower, upper, slope = inequality.theta_bounds_by_frame(of, long, frames)
+    assert lower.shape == (4, 3)
+    nu = np.diff(long.rates_rad_s, axis=0)[3:7] / DT - long.model_rad_s2[4:8]
+    for k in range(4):
+        for i in range(3):
+            Z = of.slope[k + 2, i]
+            if k == 2 or i == 1 or Z == 0.0:
+                assert (lower[k, i], upper[k, i], slope[k, i]) == (-np.inf, np.inf, 1.0)
+                continue
+            wide = long.innovation_bound(slice(k + 4, k + 5))[0, i] + of.spread[k + 2, i]
+            ends = sorted((nu[k, i] - of.offset[k + 2, i] + side * wide) / Z for side in (-1, 1))
+            assert (lower[k, i], upper[k, i], slope[k, i]) == pytest.approx((*ends, Z))
+
+
+@pytest.mark.parametrize("ends", [(-0.6, 0.35), (-90.0, 0.35), (-0.6, 90.0), (-90.0, 90.0), (500.0, 501.0)])
+def test_two_frames_are_held_against_one_another_or_against_the_range_of_theta(long, ends):
+    """In units of theta the left side exceeds the right by the largest lower bound less the smallest upper
+    one, each of them that of a frame or the end of the range."""
+    of, frames = hypothesis(low=ends[0], high=ends[1], theta_is_constant=True), np.array([4, 5, 7])
+    lower, upper, _ = inequality.theta_bounds_by_frame(of, long, frames)
+    terms = inequality.constant_theta_tests(of, long, frames)
+    assert [term.last_frame in frames for term in terms] == [True] * len(terms)
+    if not terms:
+        assert lower.max() <= ends[0]
+        assert upper.min() >= ends[1]
+        return
+    value, limit = inequality.sides(terms, of, long)
+    assert value - limit == pytest.approx(max(lower.max(), ends[0]) - min(upper.min(), ends[1]))
+    assert inequality.is_violated(terms, of, long) == (value > limit)
+    assert inequality.constant_theta_tests(of, long, np.array([], int)) == []
+
+
+def test_in_one_frame_two_axes_are_combined_so_that_theta_drops_out():
+    of = hypothesis(axes=(0, 2))
+    of.slope[4] = [0.3, 0.4, -0.6]
+    tests = [term for (term,) in inequality.single_frame_tests(6, of)]
+    assert {(term.filter_start, term.last_frame, term.pole_per_s) for term in tests} == {(5, 6, np.inf)}
+    found = [term.direction.tolist() for term in tests]
+    assert found[:4] == [[1, 0, 0], [-1, 0, 0], [0, 0, 1], [0, 0, -1]]
+    np.testing.assert_allclose(found[4:], [[-1.0, 0, -0.5], [1.0, 0, 0.5]])
+    of.slope[4, [0, 2]] = 0.0
+    assert len([*inequality.single_frame_tests(6, of)]) == 4

@@ -32,6 +32,7 @@ SAYS = [
     Verdict(True, candidates=("elevator", "unanticipated")),
     Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.9),
     Verdict(True, isolated="elevator", type="loss_of_effectiveness", estimate=-0.1),
+    Verdict(True, candidates=tuple(SURFACES)),
 ]
 ROW = np.arange(len(SAYS))
 ALONE = (
@@ -39,12 +40,12 @@ ALONE = (
     np.array([0.97, 0.7, 0.8, 0.95]) + 0.001 * ROW[:, None],
 )
 BOUNDS = {  # low and high of each row
-    "aileron": ([0.9, 0, 1, 1, 1, 0.85, 0, 1, 0, 1, 1], [1, 1, 1, 1, 1, 0.975, 1, 1, 1, 1, 1]),
+    "aileron": ([0.9, 0, 1, 1, 1, 0.85, 0, 1, 0, 1, 1, 0.79], [1, 1, 1, 1, 1, 0.975, *[1] * 6]),
     "elevator": (
-        [0.5, 0, 0.48, 1, 1, 1, 0, 0.43, 0, 0.41, 0.4], [1, 1, 0.702, 1, 1, 1, 1, 1, 1, 0.709, 0.71],
+        [0.5, 0, 0.48, 1, 1, 1, 0, 0.43, 0, 0.41, 0.4, 0.39], [1, 1, 0.702, 1, 1, 1, 1, 1, 1, 0.709, 0.71, 1],
     ),
-    "rudder": ([0.7, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1], [1] * 11),
-    "flap": ([0.4, 0, 1, 1, 1, 1, 0, 0.33, 0, 1, 1], [1] * 11),
+    "rudder": ([0.7, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1, 0.59], [1] * 12),
+    "flap": ([0.4, 0, 1, 1, 1, 1, 0, 0.33, 0, 1, 1, 0.29], [1] * 12),
 }  # fmt: skip
 
 
@@ -62,26 +63,66 @@ def test_verdicts_as_columns():
         "t_s", "faulty", "named",
         *(f"{name}_{what}" for name in SURFACES for what in ("effectiveness", "low", "high")), "credible",
     ]  # fmt: skip
-    assert columns["t_s"] == [0.5 * k for k in range(11)]
-    assert columns["faulty"] == [0] + [1] * 10
+    assert columns["t_s"] == [0.5 * k for k in range(12)]
+    assert columns["faulty"] == [0] + [1] * 11
     assert columns["named"] == [
         "", "unknown", "elevator", "rudder", "rudder", "aileron", *["unknown"] * 3, "elevator", "elevator",
+        "unknown",
     ]  # fmt: skip
-    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.41, 0.71])
-    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, *[1] * 7]
-    assert columns["aileron_effectiveness"] == columns["flap_effectiveness"] == [1] * 11
+    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.41, 0.71, 1])
+    assert columns["rudder_effectiveness"] == [1, 1, 1, 0.75, *[1] * 8]
+    assert columns["aileron_effectiveness"] == columns["flap_effectiveness"] == [1] * 12
     for name, (low, high) in BOUNDS.items():
         assert columns[f"{name}_low"] == pytest.approx(low), name
         assert columns[f"{name}_high"] == pytest.approx(high), name
-    assert columns["credible"] == [1] * 11
+    assert columns["credible"] == [1] * 12
 
 
 @pytest.mark.parametrize("fdi", [{"is_ours": False}, {"pairs": True}])
 def test_verdicts_of_pairs_or_of_another_scheme_bound_nothing(fdi):
     columns = columns_of(**fdi)
     for name in SURFACES:
-        assert (columns[f"{name}_low"], columns[f"{name}_high"]) == ([0.0] * 11, [1.0] * 11)
-    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.1, 0.9])
+        assert (columns[f"{name}_low"], columns[f"{name}_high"]) == ([0.0] * 12, [1.0] * 12)
+    assert columns["elevator_effectiveness"] == pytest.approx([1, 1, 0.6, *[1] * 6, 0.1, 0.9, 1])
+
+
+def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
+    """By trying each theta, at 3 samples a second: 1 + theta of what explains this frame and the two before;
+    0 and 1 where nothing does. The first sample ends no frame, whatever stands there."""
+    planted = np.array([3.0, -0.5, -0.42, -0.61, -0.95, -0.55])
+    bound = np.array(
+        [[0.1] * 3, [0.05, 0.07, 0.2], [0.06, 0.1, 0.1], [0.08, 0.07, 0.2], [0.1] * 3, [0.09] * 3]
+    )
+    effect = np.zeros((6, 3, 2))
+    effect[:, :, 0], effect[:, 1, 1] = [[0.5, -0.6, 0.1]], [0.4, -0.4, 0.8, 0.9, -0.5, 0.7]
+    nu = planted[:, None] * effect[:, :, 0]
+    shown, samples = [], [np.arange(6.0 * n).reshape(6, n) for n in (3, 5, 2, 3)]
+
+    def step(*sample):
+        shown.append(sample)
+        return f"verdict {len(shown)}"
+
+    diagnosis = SimpleNamespace(
+        step=step, innovation=lambda: tuple(of[len(shown) - 1] for of in (nu, bound, effect))
+    )
+    found = stepped.replay_samples(diagnosis, samples, 3.0)
+    assert found.verdicts == [f"verdict {k}" for k in range(1, 7)]
+    for k, sample in enumerate(shown):
+        assert [part.tolist() for part in sample] == [of[k].tolist() for of in samples]
+    assert found.max_command_gains.tolist() == [1.0, 1.0]
+    thetas, bounded = np.linspace(-1.0, 0.0, 2001), 0
+    for k in range(6):
+        for s in range(2):
+            explains = np.ones(len(thetas), bool)
+            for j in range(max(k - 2, 1), k + 1):
+                left = np.abs(nu[j] - thetas[:, None] * effect[j, :, s]) - bound[j]
+                explains &= (left <= 1e-9).all(axis=1)
+            ends = 1.0 + thetas[explains][[0, -1]] if explains.any() else (0.0, 1.0)
+            bounded += 0.0 < ends[0] < ends[1] < 1.0
+            assert (found.effectiveness_low[k, s], found.effectiveness_high[k, s]) == pytest.approx(
+                ends, abs=1e-3
+            )
+    assert bounded > 2
 
 
 def scenario(**sensors):

@@ -9,6 +9,7 @@ import ast
 import inspect
 import os
 import pickle
+import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
@@ -18,7 +19,7 @@ from typing import TypeVar
 from filelock import FileLock
 
 from beaver_ftc.documents.errors import BadInput, suggestion
-from tools.docs.commands import SHARED
+from tools.docs.commands import BIN, SHARED
 
 T = TypeVar("T")
 
@@ -52,6 +53,14 @@ def table(name: str) -> str:
     if inspect.signature(make).parameters:
         raise BadInput(f"{name}: a table maker takes nothing, allowed: a helper's name that begins with _")
     return make()
+
+
+def beaver(*arguments: str) -> list[str]:
+    """A command line of `beaver-ftc`: served by `make docs`, of this interpreter without it."""
+    served = Path(os.environ.get(SHARED, "")) / BIN / "beaver-ftc"
+    if SHARED in os.environ and served.exists():
+        return [str(served), *arguments]
+    return [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", *arguments]
 
 
 def shared(make: Callable[[], T]) -> Callable[[], T]:

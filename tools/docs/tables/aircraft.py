@@ -3,7 +3,6 @@
 import argparse
 import json
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,8 +16,8 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.derive.derivation import derive
 from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 from tools.docs.pages import ROOT
+from tools.docs.tables import beaver
 
-PROGRAM = "from beaver_ftc.cli.main import main; main()"
 LONGEST_S = 600
 FLIGHTS, HOURS, SEED = 10, 0.2, 90417
 PROBE = "pa28"
@@ -161,7 +160,7 @@ def _read_derived(name: str, airspeed: str, roll: str, pitch: str, yaw: str, *lo
 def _derive(name: str) -> tuple[dict | None, str]:
     """What `derive` prints, or why it prints nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-c", PROGRAM, "derive", f"jsbsim:{name}", "--out", folder]
+        command = beaver("derive", f"jsbsim:{name}", "--out", folder)
         try:
             run = subprocess.run(
                 [*command, "--format", "json"], capture_output=True, text=True, timeout=LONGEST_S, check=False

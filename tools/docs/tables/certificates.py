@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,9 +11,9 @@ import pandas as pd
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import beaver
 
 SCENARIO = "elevator-partial-loss"
-PROGRAM = "from beaver_ftc.cli.main import main; main()"
 
 
 @cache
@@ -75,6 +74,6 @@ def certificate_check() -> str:
     """What `beaver-ftc check` prints of it."""
     with TemporaryDirectory() as folder:
         for given in (("run", SCENARIO, "--certificate", "--no-report"), ("check", f"runs/{SCENARIO}")):
-            command = [sys.executable, "-c", PROGRAM, *given]
+            command = beaver(*given)
             run = subprocess.run(command, cwd=Path(folder), capture_output=True, text=True, check=True)
     return run.stdout.strip()

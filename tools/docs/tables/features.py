@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.derive.first_use import derive_if_needed
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.session import Session
-from tools.docs.tables.aircraft import PROGRAM
+from tools.docs.tables import beaver
 
 PLANES = {
     "beaver": "built in",
@@ -105,7 +104,7 @@ def _tried(feature: Feature, plane: str) -> str:
         (Path(folder) / "S.yaml").write_text(json.dumps(flight))
         (Path(folder) / "W.yaml").write_text(json.dumps({"name": "W", "base": "S.yaml", "runs": 2}))
         run = subprocess.run(
-            [sys.executable, "-c", PROGRAM, *line.split()],
+            beaver(*line.split()),
             cwd=folder, capture_output=True, text=True, timeout=LONGEST_S, check=False,
         )  # fmt: skip
     if run.returncode in (0, 1):

@@ -2,24 +2,23 @@
 
 import json
 import subprocess
-import sys
 import tempfile
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import beaver
 
 DESIGNS = ("declared", "engine-neglected", "linearised", "frozen-alpha", "heavy")
 CONDITIONS = ((30.0, 0.0), (35.0, 1829.0), (45.0, 1829.0), (50.0, 3000.0), (55.0, 4000.0))
 SWING = ("short_period", "phugoid", "dutch_roll")
-PROGRAM = "from beaver_ftc.cli.main import main; main()"
 
 
 def mismatch_designs() -> str:
     """What a wrong design model costs: the published elevator case, each with the published bound."""
     given = ("mismatch", "elevator-partial-loss", "--variant", ",".join(DESIGNS), "--no-report")
-    command = [sys.executable, "-c", PROGRAM, *given, "--format", "json"]
+    command = beaver(*given, "--format", "json")
     with tempfile.TemporaryDirectory() as folder:
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     flights = {}

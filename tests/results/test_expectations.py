@@ -81,6 +81,9 @@ GONE += [{"fault": "rudder", "from_s": 4.0, "to_s": 4.5}]
     [
         ("isolated_as", "rudder", EARLY, False, "rudder was named at 1.5 s, before the fault began"),
         ("isolated_as", ["rudder"], EARLY, True, None),
+        ("isolated_as", ["flap", "rudder"], {"isolation": {"names": ["flap", "rudder"]}}, True, None),
+        ("isolated_as", ["flap", "rudder"], {"isolation": {"names": ["rudder", "flap"]}}, False, None),
+        ("isolated_as", ["flap", "rudder"], {"isolation": {"names": ["flap"]}}, False, None),
         ("isolated_within_s", 0.5, EARLY, False, "rudder was named at 1.5 s, before the fault began"),
         (
             "isolated_as",

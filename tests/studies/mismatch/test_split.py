@@ -1,19 +1,23 @@
 """The split on flights of JSBSim: it must account for all that was declared, and for nothing that was not."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.plant import conditions
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.trim import configure
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.schema import load_scenario
+from beaver_ftc.studies.mismatch import sources
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import split
 from beaver_ftc.studies.mismatch.study import tally_of_flight, variant_of
 from flying import PUBLISHED_UNCERTAINTY, flown, loss, scenario
+from telling import numbers
 
 PUBLISHED_BOUND = 0.02  # rad/s2
 ROUNDING = 5e-8  # rad/s2: what unit conversions and rounding of the aircraft's XML may leave
@@ -222,3 +226,19 @@ def test_the_published_uncertainty_is_split_as_declared():
         expected = wave["amplitude_rad_s2"] * np.sin(wave["frequency_rad_s"] * found.t_s)
         assert found.contributions["sinusoids"][:, i] == pytest.approx(expected, abs=1e-12)
     assert largest(found.contributions["inertia_coupling"]) > 1e-5
+
+
+def test_losses_of_one_surface_at_one_time_are_told_together():
+    """They have one name: together they take 1 - 0.7 x 0.5 of the position; the flap's fault has its own."""
+    case = scenario(faults=[loss("elevator", 0.3, 2.0), loss("elevator", 0.5, 2.0), loss("flap", 0.2, 3.0)])
+    states = SimpleNamespace(t_s=np.array([1.0, 2.5, 4.0]), position=numbers(3, 4, seed=1, size=0.1))
+    G = numbers(3, 3, 4, seed=2)
+    found = sources.fault_effects(SimpleNamespace(scenario=case), states, G, states.position)
+    elevator, flap = (SURFACES.index(name) for name in ("elevator", "flap"))
+    lost = -np.array([0.0, 0.65, 0.65]) * states.position[:, elevator]
+    np.testing.assert_allclose(
+        found["elevator loss of effectiveness at 2 s"], G[:, :, elevator] * lost[:, None]
+    )
+    lost = -np.array([0.0, 0.0, 0.2]) * states.position[:, flap]
+    np.testing.assert_allclose(found["flap loss of effectiveness at 3 s"], G[:, :, flap] * lost[:, None])
+    assert len(found) == 2

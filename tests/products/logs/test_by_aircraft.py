@@ -276,6 +276,7 @@ def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     (verdict,) = json.loads(CliRunner().invoke(app, arguments).stdout)["flights"]
     assert (verdict["aircraft"], verdict["isolated"]) == ("beaver", "elevator")
     assert verdict["score"]["mean_error"] < 0.01
+    assert verdict["score"]["classes"] > 0.9
     rows = parquet.read_table(tmp_path / "d" / "flight" / "diagnosis.parquet")
     surfaces = ("aileron", "elevator", "rudder", "flap")
     each = [f"{name}_{what}" for name in surfaces for what in ("effectiveness", "low", "high")]
@@ -420,3 +421,91 @@ def test_stretches_make_one_flight():
         [1, 0.7, 0.7, 1, 0.8],
     )
     assert found.max_command_gains.tolist() == [0.5, 0.4]
+
+
+PAIR = SimpleNamespace(
+    name="pair", surfaces=("left", "right"), signals=["dpt"],
+    envelope=PLANE.envelope, alpha_rad=PLANE.alpha_rad,
+)  # fmt: skip
+MIXED = Vehicle.model_validate({
+    "name": "mixed", "rates": {"p": "p", "q": "q", "r": "r"}, "commands": ["roll", "pitch"],
+    "surfaces": {"right": {"roll": 0.5}, "spoiler": {"pitch": 0.7}, "left": {"roll": -0.4, "pitch": 0.3}},
+    "full_deflection_rad": {"left": 0.25}, "airspeed": "speed",
+    "flow": {"alpha_rad": {"column": "a", "unit": "deg"}, "beta_rad": "b", "qdyn_pa": "load", "dpt": "power"},
+    "attitude": {"roll": "phi", "pitch": {"column": "theta", "unit": "deg"}, "yaw": "psi"},
+})  # fmt: skip
+
+
+def test_the_model_is_given_each_column_in_si_in_its_own_order():
+    """Flow, airspeed, load, signals; commands of its surfaces in rad; what is held, with its age."""
+    t_s = np.arange(6) * 0.1
+    logged = {
+        name: Column(t_s, (k + 1.0) * np.arange(1.0, 7.0))
+        for k, name in enumerate(("a", "b", "speed", "load", "phi", "theta", "psi"))
+    }
+    logged["power"] = Column(np.array([0.0, 0.25]), np.array([70.0, 80.0]))
+    commands = np.arange(18.0).reshape(6, 3)
+    samples = SimpleNamespace(
+        name="log", t_s=t_s, dt_s=0.1, rates=np.arange(18.0).reshape(6, 3) / 7.0, commands=commands,
+        held_column_mean_age_s={"roll": 0.3},
+    )  # fmt: skip
+    recording = RecordedFlight("log", logged)
+    given, age_s = by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
+    rates, signals, asked, attitude = given
+    k = np.arange(1.0, 7.0)
+    np.testing.assert_array_equal(rates, samples.rates)
+    power = [70.0, 70.0, 70.0, 80.0, 80.0, 80.0]
+    np.testing.assert_allclose(signals, np.column_stack([np.radians(k), 2 * k, 3 * k, 4 * k, power]))
+    np.testing.assert_allclose(asked, np.column_stack([0.25 * commands[:, 2], commands[:, 0]]))
+    np.testing.assert_allclose(attitude, np.column_stack([5 * k, np.radians(6 * k), 7 * k]))
+    assert age_s == {"roll": 0.3, "power": pytest.approx((0.0 + 0.1 + 0.2 + 0.05 + 0.15 + 0.25) / 6.0)}
+    still = by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, False)[0][3]
+    assert still.tolist() == np.zeros((6, 3)).tolist()
+    del logged["theta"]
+    with pytest.raises(BadInput, match=r"^log: attitude\.pitch: is missing, allowed: its column"):
+        by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
+
+
+@pytest.mark.parametrize(("gains", "says"), [
+    ([(-0.31, 0.9), (0.5, 0.8)], "left"), ([(0.5, 0.9), (0.4, -0.31)], "right"),
+    ([(-0.29, 0.9), (0.5, -0.29)], None),
+])  # fmt: skip
+def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
+    stretches = [SimpleNamespace(max_command_gains=np.array(of)) for of in gains]
+    if says is None:
+        by_aircraft._check_command_signs("log", PAIR, stretches)
+        return
+    with pytest.raises(BadInput, match=f"log: the rates answer the command of {says} .* signs as of pair"):
+        by_aircraft._check_command_signs("log", PAIR, stretches)
+
+
+def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():
+    """Alarm in row 1, which names left in rows 2 and 4, and right in row 3."""
+    said = {"isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ("jam", "bias")}
+    verdicts = [by_aircraft.Verdict(), by_aircraft.Verdict(True), by_aircraft.Verdict(True, isolated="left")]
+    verdicts += [by_aircraft.Verdict(True, isolated="right"), by_aircraft.Verdict(True, **said)]
+    faulty = np.array([0, 1, 1, 1, 1])
+    low = np.tile([0.9, 0.7], (5, 1))
+    rows = stepped.DiagnosisRows(
+        100.0 + 0.25 * np.arange(5), faulty, np.array(["", "unknown", "left", "right", "left"], dtype=object),
+        np.ones((5, 2)), low, np.ones((5, 2)), faulty.astype(float),
+    )  # fmt: skip
+    samples = SimpleNamespace(
+        name="log", t_s=rows.t_s, dt_s=0.25, stretch_number=np.array([0, 0, 1, 1, 2]), notes=("a remark",)
+    )
+    diagnosed = SimpleNamespace(aircraft=PAIR, declared_errors={"fdi": 1})
+    replayed = SimpleNamespace(verdicts=verdicts)
+    found = by_aircraft._verdict_document(samples, rows, replayed, diagnosed, {"alpha": 0.126})
+    expected = {
+        "flight": "log", "aircraft": "pair", "declared": {"fdi": 1}, "duration_s": 1.0, "recorded_s": 1.25,
+        "gaps": 2, "rate_hz": 4.0, "faulty": True, "detection_s": 100.25, "isolation_s": 100.5,
+        "isolated": "left", "type": "jam", "estimate": -0.3, "candidates": ["jam", "bias"],
+        "notes": ["a remark", "alpha is held, 0.13 s old on average: errors declared have to cover it"],
+    }  # fmt: skip
+    assert {name: found[name] for name in expected} == expected
+    quiet = stepped.DiagnosisRows(**(vars(rows) | {"faulty": 0 * faulty}))
+    none = by_aircraft._verdict_document(
+        samples, quiet, SimpleNamespace(verdicts=[by_aircraft.Verdict()] * 5), diagnosed, {}
+    )
+    names = ("faulty", "detection_s", "isolation_s", "isolated", "notes")
+    assert [none[name] for name in names] == [False, None, None, None, ["a remark"]]

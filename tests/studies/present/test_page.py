@@ -12,6 +12,7 @@ from beaver_ftc.studies.present.page import (
     Pictures,
     Table,
     as_html,
+    as_markdown,
     replace_between,
     write_files,
 )
@@ -88,6 +89,17 @@ def test_whatever_a_page_shows_is_text_and_never_markup(tmp_path):
     assert re.findall("&lt;i&gt;(.)&lt;/i&gt; &amp; &quot;more&quot;", made.partition("</title>")[2]) == [
         str(n) for n in range(9)
     ]
+
+
+def test_each_part_has_its_markdown():
+    parts = [
+        "A sentence.", Heading("Heading"), Table(("a", "b"), [("1", "2|3")]),
+        Bullets("Lead:", ["one", "two"]), Pictures([("First", "one"), ("Second", "two")]),
+    ]  # fmt: skip
+    assert as_markdown(parts, "figures").split("\n\n") == [
+        "A sentence.", "## Heading", "| a | b |\n| --- | --- |\n| 1 | 2\\|3 |", "Lead:", "- one\n- two",
+        "![First](figures/one.png)", "![Second](figures/two.png)\n",
+    ]  # fmt: skip
 
 
 def test_csv_has_a_header_and_nothing_for_none():

@@ -172,3 +172,15 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     np.testing.assert_allclose(sums, [*ours.totals, ours.calm_prediction], rtol=1e-7)
     assert room == pytest.approx(min(ours.room_by_swings, ours.room_by_change_rate), rel=1e-6)
     assert (ours.room_by_change_rate < ours.room_by_swings) == (pace < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "found"),
+    [([np.nan, 0.25, 0.25], 0.25), ([-1.5], -1.5), ([0.25, 0.5], None), ([np.nan, np.inf], None), ([], None)],
+)
+def test_a_constant_of_the_log_is_one_number_in_the_rows_that_say_it(values, found):
+    if found is None:
+        with pytest.raises(Refused, match="a column that must be constant is not"):
+            check_certificate.constant_value(values)
+    else:
+        assert check_certificate.constant_value(values) == found

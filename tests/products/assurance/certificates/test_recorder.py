@@ -1,5 +1,7 @@
 """What certificates take of a flight is kept while it flies: nothing else flies, and no frame is mistaken."""
 
+from types import SimpleNamespace
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -99,3 +101,59 @@ def test_a_certificate_is_of_the_file_beside_the_log(tmp_path, monkeypatch):
     certificate.write("scenario", "recorder", tmp_path)
     assert asked == [("scenario", tmp_path / "log.parquet", "recorder", "name: as it lies there\n")]
     assert (tmp_path / "certificate.json").read_text() == '{"a":1}\n'
+
+
+FLAGS = {  # by row; of three exclusions one stands from the first row on, and one is taken back
+    "t_s": [0.0, 0.1, 0.2, 0.3, 0.4], "detected": [0, 1, 0, 1, 1], "fie_flap_excluded": [0, 0, 0, 0, 1],
+    "fie_rudder_excluded": [1, 1, 1, 1, 0], "fie_elevator_excluded": [1, 1, 1, 1, 1],
+    "flap_likelihood_share": [0.1, 0.2, 0.3, 0.4, 0.5], "p_measured_rad_s": [1.0, 2.0, 3.0, 4.0, 5.0],
+    "q_cmd": [9.0] * 5,
+}  # fmt: skip
+
+
+def logged(columns):
+    log = MemoryLog()
+    log.open([*columns])
+    for part in (slice(0, 2), slice(2, 5)):
+        log.write(np.array([*columns.values()], float).T[part])
+    return log
+
+
+def test_a_certificate_is_of_the_events_that_stand_at_the_end(monkeypatch):
+    asked, scenario = [], bf.load({"name": "x"})
+    monkeypatch.setattr(
+        certificate, "certificate_document", lambda *of: asked.append(of) or {"statements": ["said"]}
+    )
+    monkeypatch.setattr(certificate, "evidence_columns", lambda *of: ("columns", *of))
+    recorder = SimpleNamespace(tape=lambda known, n: ("kept", known, n))
+    events = {"detected": 3, "fie_flap_excluded": 4, "fie_elevator_excluded": 0}
+    found = certificate.certificate(scenario, logged(FLAGS), recorder, "text")
+    ((of, rows, of_events, tape_of_it, text),) = asked
+    assert (of, of_events, text) == (scenario, events, "text")
+    assert tape_of_it == ("kept", [3, 3, 4, 0], 5)
+    taken = [name for name in FLAGS if name not in ("t_s", "q_cmd")]
+    assert {name: values.tolist() for name, values in rows.items()} == {name: FLAGS[name] for name in taken}
+    assert found == ({"statements": ["said"]}, ("columns", scenario, tape_of_it, ["said"]))
+    monkeypatch.setattr(certificate, "tape_of_flight_again", lambda *of: ("again", *of[1:]))
+    certificate.certificate(scenario, logged(FLAGS))
+    assert asked[1][3:] == (("again", [3, 3, 4, 0], 5), None)
+    quiet = {name: [0.0] * 5 for name in FLAGS}
+    assert certificate.certificate(scenario, logged(quiet), recorder, "text")[1] == {}
+    assert asked[2][2:] == ({}, None, "text")
+
+
+def test_a_log_gets_columns_that_are_known_in_a_part_of_it():
+    columns = {
+        "part": certificate.PartialColumn(1, np.array([7.0, 8.0]), -1.0, 6.0),
+        "late": certificate.PartialColumn(4, np.array([3.0, 4.0])),
+        "whole": certificate.PartialColumn.constant(2.5),
+    }
+    whole = MemoryLog()
+    certificate.copy_with_columns(logged(FLAGS), columns, whole)
+    found = {name: np.concatenate([chunk[name] for chunk in whole.read_chunks()]) for name in whole.columns}
+    expected = FLAGS | {
+        "part": [-1.0, 7.0, 8.0, 6.0, 6.0], "late": [np.nan] * 4 + [3.0], "whole": [2.5] * 5,
+    }  # fmt: skip
+    assert list(found) == list(expected)
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)

@@ -172,11 +172,13 @@ def complete_names(incomplete: str) -> list[str]:
 
 
 SCENARIO = typer.Argument(
-    metavar="SCENARIO", help="A file, or the name of a built-in scenario.", autocompletion=complete_names
+    metavar="SCENARIO",
+    help="Path of a scenario file, or name of a built-in scenario.",
+    autocompletion=complete_names,
 )
 ScenarioArgument = Annotated[str, SCENARIO]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one for each core.")
+    int | None, typer.Option(min=1, max=1024, help="Number of processes. Default: one for each core.")
 ]
 AirspeedOption = Annotated[float | None, typer.Option(min=1, max=1000)]
 AirspeedsOption = Annotated[list[float] | None, typer.Option(min=1, max=1000)]

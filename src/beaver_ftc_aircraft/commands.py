@@ -27,14 +27,16 @@ def derive(
 ) -> None:
     """Derive an aircraft's design model from JSBSim.
 
-    The command computes the accelerations of the aircraft in many states of its envelope and fits sparse
-    terms. It then validates the terms in states that the fit did not use. The largest error becomes the
-    declared bound. Afterwards a scenario can have `aircraft: jsbsim:NAME`.
+    The command computes the accelerations of the aircraft in many states of its envelope, and fits a few
+    terms to them. It validates the terms in states that the fit did not use. The largest error there becomes
+    the declared bound. Afterwards a scenario can contain `aircraft: jsbsim:NAME`.
 
-    aircraft: jsbsim:NAME of the installed jsbsim package, a JSBSim model, or an aircraft's folder.
-    envelope: YAML file with the range to sample: airspeed_mps, alpha_deg, altitude_m, sideslip_deg.
-    out: Folder that gets the aircraft folder. Default: the cache.
-    engines: Give each engine a lever of its own, with which the law can turn the aircraft. Needs --out.
+    aircraft: jsbsim:NAME for an aircraft of the installed jsbsim package, the path of a JSBSim model, or the
+    folder of an aircraft.
+    envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg.
+    out: Folder in which the aircraft folder is written. Default: the cache.
+    engines: Give each engine a lever of its own. The law can then turn the aircraft with different thrusts.
+    This option requires --out.
     """
     from beaver_ftc_aircraft.derive.derivation import derive
     from beaver_ftc_aircraft.derive.derived import document_of, text_of
@@ -55,15 +57,15 @@ def gtm(
 ) -> None:
     """Import NASA's Generic Transport Model.
 
-    The aircraft folder `gtm` gets a JSBSim model of the wind-tunnel tables, with 17 surfaces, two jets and
-    six cases of damage; our aircraft file with a derived design model; and scripts for plain JSBSim.
-    Afterwards a scenario can have `aircraft: gtm`.
+    The command writes the aircraft folder `gtm`. The folder contains a JSBSim model of the wind-tunnel
+    tables, with 17 surfaces, two jets and six cases of damage. It also contains an aircraft file with a
+    derived design model, and scripts for JSBSim alone. Afterwards a scenario can contain `aircraft: gtm`.
 
-    The data base is not part of this package: gtm_design/config/T2_polynomial_aerodatabase.mat of
-    github.com/nasa/GTM_DesignSim, under the NASA Open Source Agreement.
+    The database is not part of this package. It is the file gtm_design/config/T2_polynomial_aerodatabase.mat
+    of github.com/nasa/GTM_DesignSim, under the NASA Open Source Agreement.
 
-    database: Your copy of the data base.
-    out: Folder that gets the aircraft folder. Default: the cache.
+    database: Path of your copy of the database.
+    out: Folder in which the aircraft folder is written. Default: the cache.
     """
     from beaver_ftc_aircraft.gtm.conversion import convert, document_of, text_of
 

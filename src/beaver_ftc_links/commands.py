@@ -47,22 +47,25 @@ class Options:
 def command(options: Options) -> None:
     """Fly a scenario under a software-in-the-loop autopilot.
 
-    The autopilot commands the surfaces through the aircraft's `channels`; the scenario's faults act on the
-    surfaces, and its diagnosis runs. The flight ends with the scenario's duration, or with Ctrl-C.
+    The autopilot commands the surfaces through the `channels` of the aircraft. The faults of the scenario act
+    on the surfaces, and the diagnosis of the scenario runs. The flight ends after the scenario's duration, or
+    with Ctrl-C.
 
     Examples:
       beaver-ftc sitl elevator-partial-loss --as ardupilot
       beaver-ftc sitl elevator-partial-loss --as px4 --mavlink 127.0.0.1:14550
 
-    protocol: ArduPilot's JSON interface, or PX4's simulator interface.
+    protocol: Interface of the autopilot: the JSON interface of ArduPilot, or the simulator interface of PX4.
     host: Address to listen on.
-    port: Port to listen on; 9002 for ardupilot, 4560 for px4; 0: any.
-    rate: Autopilot frame rate, Hz. Default: from its first packet; 250 for px4.
-    speed: Multiple of real time; 0: as fast as the autopilot answers. Default: 0 for ardupilot, 1 for px4.
-    hold: Time that the scenario's own law flies first, s.
-    ground: Elevation of the autopilot's ground above sea level, m. Default: 0.
-    mavlink: Ground station that receives the findings and may inject failures.
-    page: Port of a live page that shows the flight and injects faults; 0: any free port.
+    port: Port for the autopilot. 0 selects any free port. Default: 9002 for ardupilot, 4560 for px4.
+    rate: Frame rate of the autopilot, Hz. Default: the rate in the first packet of ardupilot, 250 for px4.
+    speed: Speed of the simulation as a multiple of real time. 0 is as fast as the autopilot answers. Default:
+    0 for ardupilot, 1 for px4.
+    hold: Time at the start in which the scenario's own law flies, s.
+    ground: Elevation of the ground above sea level for the autopilot, m. Default: 0.
+    mavlink: Address of a ground station. It receives the results of the diagnosis, and can inject failures.
+    page: Port of a live page that shows the flight and can inject faults. 0 selects any free port. Default:
+    no page.
     """
     from beaver_ftc.results import Metrics, verdict_text
     from beaver_ftc_links.sitl.serve import Options as Served

@@ -15,9 +15,12 @@ if TYPE_CHECKING:
     from beaver_ftc_logs.model import Model
     from beaver_ftc_logs.samples import Samples
 
-FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Recorded flights.")]
+FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Paths of recorded flights.")]
 ReaderOption = Annotated[
-    str | None, typer.Option(help="Format of the log, if it is not evident: table, alfa, ulog or ardupilot.")
+    str | None,
+    typer.Option(
+        help="Format of the log: table, alfa, ulog or ardupilot. Default: the format is found from the file."
+    ),
 ]
 
 
@@ -32,15 +35,17 @@ def identify(
 ) -> None:
     """Identify a vehicle from recorded flights.
 
-    Writes a model file for `diagnose`. The fit uses the healthy parts of the flights, and faulty parts whose
-    labels give the effectiveness. It is validated on data not used for fitting; the result is in the model
-    file and on a page beside it (MODEL with .html).
+    The command writes a model file for `diagnose`. The fit uses the healthy parts of the flights, and faulty
+    parts whose labels state the effectiveness. The model is validated on data that the fit did not use. The
+    result of the validation is in the model file, and on a page beside it (MODEL with .html).
 
-    vehicle: Vehicle file, or the built-in `alfa`; `beaver-ftc new NAME --log` writes one that lists every
-    key.
-    out: The model file to write; with --check the vehicle file that is proposed.
-    check: Do not fit; report what the logs contain, and propose a vehicle file if none is given.
-    false_alarms_per_hour: Alarms that `diagnose` may raise in healthy flight, instead of the vehicle file's.
+    vehicle: Path of a vehicle file, or the built-in name `alfa`. `beaver-ftc new NAME --log` writes an
+    example with every key.
+    out: Path of the model file. With --check: path of the proposed vehicle file.
+    check: Do not fit a model. Report the content of the logs, and propose a vehicle file if --vehicle is left
+    out.
+    false_alarms_per_hour: Number of false alarms that `diagnose` may raise in one hour of healthy flight.
+    Default: the number in the vehicle file.
     """
     if check:
         _check_logs(flights, vehicle, out, reader, format)
@@ -140,17 +145,19 @@ class DiagnoseOptions:
 def diagnose(options: DiagnoseOptions) -> None:
     """Diagnose recorded flights with a model or an aircraft.
 
-    Writes DIR/<flight>/diagnosis.parquet (one row per sample), verdict.json and report.html. A row uses only
-    samples up to its own time. The log.parquet of `run` needs no model: it is diagnosed as in flight.
+    For each flight the command writes diagnosis.parquet, verdict.json and report.html into a folder of its
+    own. The table diagnosis.parquet has one row for each sample. A row uses only samples up to its own time.
+    A log.parquet that `run` wrote needs no model, because it is diagnosed with the design model of its
+    scenario.
 
-    model: The model file that `identify` wrote; none for logs of `run`.
-    aircraft: Use the design model of this aircraft, as the simulation does, instead of an identified model.
-    scenario: With --aircraft: scenario whose fdi, actuators and design_model declare the errors.
-    vehicle: With --aircraft: the vehicle file, if it is not vehicle.yaml beside the log.
+    model: Model file that `identify` wrote. A log of `run` needs no model file.
+    aircraft: Diagnose with the design model of this aircraft instead of an identified model.
+    scenario: With --aircraft: scenario whose sections fdi, actuators and design_model declare the errors.
+    vehicle: With --aircraft: path of the vehicle file. Default: vehicle.yaml beside the log.
     out: Folder for the results.
-    score: Compare with the log's labels, after the fact.
-    detector: Detector to use: bank-of-filters, or another one by its name.
-    certificate: With --aircraft: also write certificate.json and log.parquet, which prove the alarm.
+    score: After the diagnosis, compare its result with the labels in the log.
+    detector: Name of the detector.
+    certificate: With --aircraft: also write certificate.json and log.parquet, the proof of the alarm.
     """
     _check_options_agree(options)
     flights, out, format = options.flights, options.out, options.format

@@ -52,7 +52,9 @@ def _remember(format: Format) -> Format:
 
 FormatOption = Annotated[
     Format,
-    typer.Option("--format", help="Text for people, or one JSON document.", callback=_remember),
+    typer.Option(
+        "--format", help="Format of the output: text for people, or one JSON document.", callback=_remember
+    ),
 ]
 
 
@@ -293,17 +295,23 @@ def _span(seconds: float) -> str:
 
 
 ScenariosArgument = Annotated[list[str], SCENARIO]
-ResultsOption = Annotated[Path, typer.Option(help="Folder for the results, with a folder for each scenario.")]
-NoReportOption = Annotated[bool, typer.Option("--no-report", help="Skip report.html and the figures.")]
+ResultsOption = Annotated[
+    Path, typer.Option(help="Folder in which each scenario has a result folder of its own.")
+]
+NoReportOption = Annotated[
+    bool, typer.Option("--no-report", help="Do not write report.html and the figures.")
+]
 JunitOption = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Also write the verdict as JUnit XML, for CI.")
+    Path | None,
+    typer.Option(metavar="FILE", help="Also write the verdict to this file as JUnit XML, for CI."),
 ]
 PluginOption = Annotated[
     list[str] | None,
     typer.Option(
         "--plugin",
         metavar="[NAME=]MODULE:CLASS",
-        help="Register a detector or law for this run, under NAME; if left out, MyClass is my-class.",
+        help="Register your own detector or law as NAME for this command. "
+        "Without NAME, class MyClass is registered as my-class.",
     ),
 ]
 

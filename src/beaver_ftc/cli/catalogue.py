@@ -21,14 +21,14 @@ def list_choices(
 ) -> None:
     """List scenarios, aircraft, schemes, laws and fault types.
 
-    Built-in scenarios, sweeps and plans of evidence, aircraft, diagnosis schemes, control laws, fault types
-    and reference signals.
+    The lists are: built-in scenarios, sweeps and plans of evidence, aircraft, diagnosis schemes, control
+    laws, fault types and reference signals.
 
     Examples:
       beaver-ftc list --short
 
-    kind: One kind only, e.g. aircraft.
-    short: Print names only.
+    kind: Print only this list, e.g. aircraft.
+    short: Print only the names, without descriptions.
     """
     available = _available()
     if kind is not None and kind not in available:
@@ -120,12 +120,12 @@ def show(
 ) -> None:
     """Print a built-in scenario, sweep or plan of evidence.
 
-    `run`, `sweep` or `evidence` can read the printed file.
+    If you save the text in a file, `run`, `sweep` or `evidence` can read this file.
 
     Examples:
       beaver-ftc show elevator-partial-loss
 
-    name: A built-in scenario, sweep or plan.
+    name: Name of a built-in scenario, sweep or plan of evidence.
     """
     from beaver_ftc.scenario.builtin import builtin_names, builtin_plans, builtin_sweeps, resolve
 
@@ -142,13 +142,13 @@ def show(
 def schema(sweep: bool = False, plan: bool = False) -> None:
     """Print the JSON Schema of a scenario.
 
-    With this schema, an editor completes and checks a scenario as you type.
+    An editor that reads the schema completes and checks a scenario while you write it.
 
     Examples:
       beaver-ftc schema
 
-    sweep: The schema of a sweep file instead of a scenario.
-    plan: The schema of a plan of evidence instead of a scenario.
+    sweep: Print the schema of a sweep file.
+    plan: Print the schema of a plan of evidence.
     """
     if plan:
         from beaver_ftc.plugins import required

@@ -46,30 +46,37 @@ def command(options: Options) -> None:
     """Compare runs, or schemes and laws on the same flights.
 
     The command compares finished runs (RUN), schemes and laws (--sweep or --benchmark), or detectors on
-    recorded flights (--flights FOLDER). The model of a recorded flight is identified from the other flights.
-    --tune chooses the parameters of schemes and laws, by the same search for ours, rivals and plug-ins.
+    recorded flights (--flights FOLDER). For each recorded flight, the model is identified from the other
+    flights. --tune chooses parameters of schemes and laws. The search is the same for built-in methods and
+    plug-ins.
 
-    Files: comparison.json, .png and .html; for runs: runs.json, .png and .html; for recorded flights:
-    flights.json, .md and .png; with --tune: tuned.json.
+    The command writes comparison.json, .png and .html. For finished runs it writes runs.json, .png and .html.
+    For recorded flights it writes flights.json, .md and .png. With --tune it writes tuned.json.
 
-    The same command resumes an interrupted comparison on flights.
+    If a comparison on flights is interrupted, the same command resumes it.
 
-    runs: Result folders of `run`.
+    runs: Result folders that `run` wrote.
     sweep: Compare on the flights of this sweep.
-    benchmark: Compare on the standard sets of flights, and update the ranking.
-    tune: Tune schemes and laws on the calibration flights.
-    grade: With --tune: only this grade of flights: exact, actuators or errors. Default: all three.
+    benchmark: Compare on the benchmark's standard sets of flights, and update the ranking.
+    tune: Choose parameters of schemes and laws on the calibration flights.
+    grade: With --tune: use only flights of this grade: exact, actuators or errors. Default: all three grades.
     trials: With --tune: number of trials for each method and grade.
-    seed: With --tune: seed of the search.
-    draw: With --tune: number of the draw of calibration flights; from 1 on, also measure the gain.
-    tuned: With --sweep or --benchmark: parameters of this file instead of the shipped ones.
-    schemes: Comma-separated schemes; all registered ones if neither schemes nor laws are listed.
-    laws: Comma-separated laws; all registered ones if neither schemes nor laws are listed.
-    only: With --benchmark: only this set.
-    flights: N: at most N flights of each sweep. FOLDER: recorded flights.
-    other_days: With --flights FOLDER: diagnose altered copies of the labelled flights (other days).
+    seed: With --tune: seed of the random numbers of the search.
+    draw: With --tune: number of the random draw of calibration flights. From draw 1 on, the command also
+    measures the gain of the tuning.
+    tuned: With --sweep or --benchmark: read the parameters from this file instead of the parameters of the
+    package.
+    schemes: Names of schemes, separated by commas. Without --schemes and --laws, all registered schemes and
+    laws are compared.
+    laws: Names of laws, separated by commas. Without --schemes and --laws, all registered schemes and laws
+    are compared.
+    only: With --benchmark: fly only this set of flights.
+    flights: A number N flies at most N flights of each sweep. A FOLDER compares on the recorded flights in
+    it.
+    other_days: With --flights FOLDER: diagnose altered copies of the labelled flights instead, as if flown on
+    other days.
     out: Folder for the comparison.
-    leaderboard: With --benchmark or recorded flights: the page with the ranking.
+    leaderboard: With --benchmark or --flights FOLDER: path of the page with the ranking.
     """
     most, folder = _most_or_folder(options.flights)
     _refuse_contradictions(options, folder)

@@ -39,13 +39,15 @@ def command(
 ) -> None:
     """Decompose the model error by source.
 
-    With --format json: the document of the flight, axes.{p,q,r}.{source}: rms, max, share, bound_share;
-    of several flights {"runs": [...], "recommended": ..., "guarantee": ...}.
+    With --format json the command prints one JSON object. For one flight it contains rms, max, share and
+    bound_share for each axis and source (axes.{p,q,r}.{source}). For several flights it is {"runs": [...],
+    "recommended": ..., "guarantee": ...}.
 
-    The same command resumes an interrupted map.
+    If the map is interrupted, the same command resumes it.
 
-    variant: Design models to compare, e.g. declared,engine-neglected,linearised,mass=1.1.
-    map: Worst mismatch over speed and altitude, too.
+    variant: Design models to compare, separated by commas, e.g.
+    declared,engine-neglected,linearised,mass=1.1.
+    map: Also print the largest mismatch over airspeed and altitude.
     """
     from beaver_ftc.studies.mismatch.study import refuse_other_aircraft
 

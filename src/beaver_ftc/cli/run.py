@@ -65,19 +65,20 @@ class Options:
 def command(options: Options) -> None:
     """Simulate scenarios and report the results.
 
-    With --format json: one JSON object with the metrics, `folder` (or `error`) and a list `runs`; for several
-    scenarios {"passed": ..., "runs": [...]}.
+    With --format json the command prints one JSON object. For one scenario it contains the metrics, `folder`
+    (or `error`) and a list `runs`. For several scenarios it is {"passed": ..., "runs": [...]}.
 
     Examples:
       beaver-ftc run elevator-partial-loss
       beaver-ftc run elevator-partial-loss --format json --no-report
 
     csv: Also write the log as log.csv.
-    acmi: Also write flight.acmi, for Tacview.
-    recording: Also write the log as an on-board recorder would, with vehicle.yaml.
-    flightgear: Show the flight in FlightGear in real time.
-    certificate: Also write certificate.json, which proves the alarm and the exclusions.
-    figures: Formats of the figures, comma-separated: png, pdf, svg; pdf and svg are sized for papers.
+    acmi: Also write the flight path as flight.acmi, for the program Tacview.
+    recording: Also write the log in this format of an on-board recorder, and the vehicle file vehicle.yaml.
+    flightgear: Show the flight in real time in the FlightGear program at this address.
+    certificate: Also write certificate.json, the proof of the alarm and of the exclusions.
+    figures: Formats of the figures, separated by commas: png, pdf, svg. Figures in pdf and svg are sized for
+    a paper.
     """
     formats = _formats(options.figures)
     from beaver_ftc.results.model import Judged

@@ -45,14 +45,15 @@ def validate(
 ) -> None:
     """Check scenario and sweep files, and plans of evidence.
 
-    Every mistake is one line on standard error, FILE:LINE: key.path: what is wrong, what is allowed.
+    The command prints each mistake as one line on standard error: file, line, key, the mistake, and the
+    allowed values.
 
-    With --format json: {"valid": ..., "files": [{"file", "valid", "errors", "warnings"}]}.
+    With --format json the command prints {"valid": ..., "files": [{"file", "valid", "errors", "warnings"}]}.
 
     Examples:
       beaver-ftc validate elevator-partial-loss fault-free
 
-    files: Scenario, sweep and plan files, or names of built-in ones.
+    files: Paths of scenario, sweep and plan files, or names of built-in files.
     """
     reports = [_check(file) for file in files]
     for report in reports:
@@ -97,7 +98,7 @@ def new(
 ) -> None:
     """Write NAME.yaml, a scenario to begin with, or sample logs.
 
-    The file flies without changes. An existing file is never replaced.
+    `run` can fly the new file without changes. The command does not replace an existing file.
 
     Examples:
       beaver-ftc new my-case
@@ -105,9 +106,9 @@ def new(
       beaver-ftc new my-logs --log
 
     name: Name of the scenario, and of its file.
-    like: Copy this built-in scenario.
-    log: Write a folder NAME with two recorded flights and their vehicle file, to try `identify` and
-      `diagnose` on.
+    like: Copy this built-in scenario instead of the template.
+    log: Write a folder NAME with two recorded flights and their vehicle file, as examples for `identify` and
+    `diagnose`.
     out: Folder of the new file.
     """
     if not _NAME.fullmatch(name):

@@ -59,20 +59,23 @@ class Arguments:
 def command(arguments: Arguments) -> None:
     """Fly many variations of one scenario and summarise them.
 
-    Uses all cores, or a cluster. Finished flights are kept if the sweep is interrupted; --resume continues
-    it. With --format json: the summary.
+    The flights run on all cores of the machine, or on a Ray cluster. If the sweep is interrupted, the
+    finished flights are kept, and --resume continues the sweep. With --format json the command prints the
+    summary.
 
     file: A sweep file, or the name of a built-in sweep.
-    out: Folder for the results. It gets a folder for each sweep.
-    workers: Parallel processes or Ray tasks. Default: one per core.
-    backend: Local processes, or a Ray cluster.
-    ray_address: Ray cluster to join, e.g. auto. Default: one on this machine.
-    resume: Continue an interrupted sweep.
-    keep_logs: Flights that keep a result folder: none, failed, missed, worst, all, or indices 3,17.
-    replay: Fly only this flight again, as `run` would.
-    search: Search for the worst flight instead of sampling.
-    certificate: Write certificates into the kept folders; without --keep-logs, for the worst flights.
-    rare: Estimate the probability that a flight misses this expectation, by subset simulation.
+    out: Folder in which each sweep has a result folder of its own.
+    workers: Number of parallel processes or Ray tasks. Default: one for each core.
+    backend: Where the flights run: local processes, or a Ray cluster.
+    ray_address: Address of the Ray cluster, e.g. auto. Default: a cluster on this machine.
+    resume: Continue an interrupted sweep from its finished flights.
+    keep_logs: Which flights keep a result folder: none, failed, missed, worst, all, or indices such as 3,17.
+    replay: Fly only the flight with this index again, and write its result folder as `run` does.
+    search: Search for the flight with the worst value of this objective, instead of drawing flights at
+    random.
+    certificate: Write a certificate into each kept result folder. Without --keep-logs, the worst flights are
+    kept.
+    rare: Estimate by subset simulation the probability that a flight misses this expectation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early

@@ -39,16 +39,16 @@ class Condition:
 def command(condition: Condition) -> None:
     """Print a trimmed flight condition.
 
-    The flight is steady and straight, with wings level. If there is no such trim, the exit status is 2.
-    An omitted option has the value of the scenario, or the default: 45 m/s at 1828.8 m, 1800 rpm,
-    20 inHg, no flap. Engine and flap apply to an aircraft that has them.
+    The flight is steady and straight, with wings level. An omitted option has the value of the scenario.
+    Without SCENARIO its default is 45 m/s, 1828.8 m, 1800 rpm, 20 inHg, or flap 0 deg. The options for engine
+    and flap apply only to an aircraft with these parts. If no trim exists, the exit status is 2.
 
     Examples:
       beaver-ftc trim --airspeed-mps 40 --altitude-m 1000
 
-    scenario: Scenario with the flight condition.
+    scenario: Scenario file or built-in name from which the flight condition is read.
     airspeed_mps: True airspeed, m/s.
-    altitude_m: Altitude, m.
+    altitude_m: Altitude above sea level, m.
     engine_rpm: Engine speed, rpm.
     manifold_pressure_inhg: Manifold pressure, inHg.
     flap_deg: Flap deflection, deg.

@@ -565,24 +565,25 @@ def _line(row: Document) -> str:
 class Detectability(StudyCommand):
     """Compute the smallest fault that is certain to be isolated.
 
-    The command varies airspeed, altitude and the size of the references. It prints a sentence for each
-    surface, and then the tables.
+    The command varies the airspeed, the altitude and the amplitude of the references. It prints one sentence
+    for each surface, and then the tables.
 
-    A fault is certain if it is detected within 0.5 s and isolated within 1 s under every admissible error,
-    with the scenario's references scaled by 0.25 to 2. `median`: for half of the possible start times of the
-    fault.
-    With --surface, the command prints one sentence for each place.
+    A fault is certain to be isolated if it is detected within 0.5 s and isolated within 1 s with every error
+    within the declared bounds. The references of the scenario are scaled by factors from 0.25 to 2. A column
+    with `median` is for half of the possible start times of the fault. With --surface the command prints one
+    sentence for each airspeed and altitude.
 
-    The map of isolability lists, for each pair of surfaces, the smallest loss that is distinguished, its
-    delay, and the smallest doublet that distinguishes it.
+    The map of isolability has a row for each pair of surfaces. A row contains the smallest loss that is
+    distinguished, its delay, and the smallest doublet that distinguishes the two surfaces.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
     airspeed: Airspeed, m/s. Repeat the option for several.
     altitude: Altitude above sea level, m. Repeat the option for several.
-    aircraft: In place of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
-    surface: Only this surface; print one sentence for each place.
-    out: Folder for the maps, a page, CSV and JSON.
+    aircraft: Aircraft that replaces the scenario's aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the
+    working directory.
+    surface: Only this surface. The command then prints one sentence for each airspeed and altitude.
+    out: Folder for the maps, which are written as a page, CSV and JSON.
     """
 
     scenario: ScenarioArgument

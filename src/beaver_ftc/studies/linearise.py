@@ -16,14 +16,15 @@ class Linearise(StudyCommand):
     """Linearise the closed loop and print its margins.
 
     The loop contains the aircraft, the actuators, lag and delay of the sensors, the frame rate and the
-    default law. It is opened at each surface in turn, at the airspeeds of the envelope: healthy, and with
-    losses of each surface that the law knows.
+    default law. The command opens the loop at each surface in turn, at several airspeeds of the envelope. It
+    prints the margins of the healthy aircraft, and with losses of each surface. In the cases with a loss, the
+    law uses the true effectiveness.
 
     The command also prints the handling qualities of the aircraft alone: short period, phugoid, Dutch roll,
-    roll and spiral mode, and their levels of MIL-F-8785C. If the scenario has a fault, it prints them for the
-    end of the flight as well.
+    roll and spiral mode, and their levels of MIL-F-8785C. If the scenario has a fault, the command also
+    prints the handling qualities at the end of the flight.
 
-    scenario: Scenario with the sensors, actuators and law.
+    scenario: Scenario file or built-in name from which sensors, actuators and law are read.
     """
 
     scenario: Annotated[str | None, typer.Argument(metavar="SCENARIO")] = None

@@ -430,17 +430,19 @@ def _line(label: str, cells: Iterable[str]) -> str:
 class Verify(StudyCommand):
     """Test the guarantees on flights within the declared bounds.
 
-    Counts violations of the guarantees with exact confidence limits: false alarms, excluded true faults,
-    wrong isolations, and detections later than guaranteed plus one frame; for the published and the sharpened
-    scheme on the same flights. Exit status 1 if a guarantee is violated.
+    The command counts violations of the guarantees, with exact confidence limits. A violation is a false
+    alarm, an excluded true fault, a wrong isolation, or a detection more than one frame later than
+    guaranteed. The published and the sharpened scheme diagnose the same flights. The exit status is 1 if a
+    guarantee is violated.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
-    hours: Flight hours without a fault.
+    hours: Number of flight hours without a fault.
     faults: Number of flights with one random fault.
     seed: Seed of all random draws.
-    out: Folder for the flights; an interrupted campaign continues from it.
-    steps: Also fly each step between the published and the sharpened scheme.
+    out: Folder for the flights. An interrupted command continues from this folder.
+    steps: Also fly the intermediate schemes, each with one more step from the published to the sharpened
+    scheme.
     """
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0

@@ -20,16 +20,16 @@ def command(
     """Check a run's certificate.
 
     The command computes every statement of certificate.json again, from the log and from the bounds that the
-    scenario declares. It prints each statement as a sentence, or the reason why it refuses the statement.
-    The exit status is 0 if all statements hold, otherwise 1.
+    scenario declares. It prints each statement as a sentence. If a statement does not hold, it prints the
+    reason. The exit status is 0 if all statements hold, otherwise 1.
 
     Examples:
       beaver-ftc run elevator-partial-loss --certificate
       beaver-ftc check runs/elevator-partial-loss
 
-    run: The folder of a run with --certificate, or a certificate.json.
-    log: The log, if it is not log.parquet beside the certificate.
-    scenario: The resolved scenario, if it is not scenario.yaml beside the log.
+    run: Result folder of `run --certificate`, or path of a certificate.json.
+    log: Path of the log. Default: log.parquet beside the certificate.
+    scenario: Path of the scenario with all defaults filled in. Default: scenario.yaml beside the log.
     """
     from pyarrow import ArrowException
 

@@ -41,20 +41,20 @@ class Arguments:
 def command(arguments: Arguments) -> None:
     """Fly a plan of requirements and write the evidence.
 
-    Reports for each requirement whether it is met, not met or not shown, with its margin, its worst flight
-    and the command that flies it again. Writes evidence.json, evidence.html and evidence.pdf.
+    For each requirement the command reports the result (met, not met or not shown), the margin, the worst
+    flight, and the command that repeats this flight. It writes evidence.json, evidence.html and evidence.pdf.
 
-    Exit status 1 if a requirement is not met, or not shown.
+    The exit status is 1 if a requirement is not met or not shown.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
     Examples:
       beaver-ftc evidence flight-controls
 
-    plan: A plan of evidence, or the name of a built-in one.
-    out: Folder for the evidence. Default: runs/ and the plan's name.
-    replay: Fly only this flight again, as `run` would, and evaluate it.
-    no_report: With --replay: skip report.html and the figures of the flight. The evidence is always written.
+    plan: Path of a plan of evidence, or name of a built-in plan.
+    out: Folder for the evidence. Default: a folder in runs/ with the name of the plan.
+    replay: Fly only this flight again, write its result folder as `run` does, and evaluate it.
+    no_report: With --replay: do not write report.html and the figures of the flight.
     """
     from beaver_ftc_assurance.evidence.plan import load_plan
 

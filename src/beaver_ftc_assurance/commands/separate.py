@@ -18,14 +18,15 @@ def command(
 ) -> None:
     """Propose the smallest doublet that separates candidates.
 
-    Flies the scenario to its end. For each remaining pair of candidates it prints the smallest doublet that
-    is certain to distinguish them and how long it takes, or why no doublet within the limits of travel,
-    actuators, body rates and angle of attack does. With `fdi.probing` it also flies the doublets and reports
-    the remaining candidates; flown/N/ holds log and certificate of the flight with doublet N.
+    The command flies the scenario to its end. For each pair of remaining candidates it prints the smallest
+    doublet that is certain to distinguish them, and the time until it does. The doublet stays within the
+    limits of travel, actuators, body rates and angle of attack. If no such doublet exists, the command prints
+    the reason. If the scenario contains `fdi.probing`, the command also flies the doublets and reports the
+    remaining candidates. The folder flown/N/ then contains log and certificate of the flight with doublet N.
 
-    Exit status 1 if a doublet was flown and both candidates remain.
+    The exit status is 1 if a doublet was flown and both candidates remain.
 
-    rate_deg_s: Largest body rate allowed, deg/s.
+    rate_deg_s: Largest allowed body rate, deg/s.
     out: Folder for separation.json.
     """
     from beaver_ftc.scenario import load_scenario

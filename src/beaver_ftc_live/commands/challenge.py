@@ -22,14 +22,14 @@ def new(
 ) -> None:
     """Write a challenge for a class.
 
-    Give DIR/public to the students: rules, practice flights, a detector and a law to begin with. Keep
-    DIR/teacher, which has the hidden flights with new seeds.
+    The folder DIR/public is for the students. It contains rules, practice flights, an example detector and an
+    example law. The folder DIR/teacher is for you. It contains the hidden flights, with new seeds.
 
     Examples:
       beaver-ftc challenge new autumn
 
     folder: New folder for the challenge.
-    flights: Hidden flights; one in four has no fault.
+    flights: Number of hidden flights. One flight in four has no fault.
     """
     from beaver_ftc_live.challenge import folders
     from beaver_ftc_live.challenge.grading import rules
@@ -53,12 +53,13 @@ def submit(
 ) -> None:
     """Check a detector or a law, and hand it in.
 
-    The command flies one practice flight under the conditions of `grade`: in a process of its own, without
-    access to files, network, truth and seed. A submission never replaces an earlier one.
+    The command flies one practice flight under the conditions of `grade`. The submission runs in a process of
+    its own, without access to files, network, truth and seed. A new submission does not replace an earlier
+    submission.
 
     file: A Python file with one class that has reset and step, or a folder with such a file.
-    student: Name of the student. Default: the name of the file.
-    to: Folder of the challenge. Without it, the file is only checked.
+    student: Name of the student. Default: the name of the file or folder.
+    to: Folder of the challenge. Without this option the submission is checked, but not handed in.
     """
     from beaver_ftc_live.challenge import folders
     from beaver_ftc_live.challenge.grading import tried
@@ -82,10 +83,10 @@ def grade(
 ) -> None:
     """Fly every student's last submission on the hidden flights.
 
-    Writes grades.json, grades.md and grades.html into DIR/grades. A submission that fails has a row with the
-    reason.
+    The command writes grades.json, grades.md and grades.html into DIR/grades. If a submission fails, its row
+    contains the reason.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
     folder: Folder of the challenge.
     """

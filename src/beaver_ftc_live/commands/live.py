@@ -28,18 +28,18 @@ def command(
 ) -> None:
     """Fly in the browser: inject faults and watch the diagnosis.
 
-    Prints an address of this machine that works once; Ctrl-C ends the flight.
+    The command prints the address of a page on this machine. The address works once. Ctrl-C ends the flight.
 
     Examples:
       beaver-ftc live rudder-stuck
       beaver-ftc live --host 0.0.0.0 --guests 30
 
-    aircraft: Fly this one, without the scenario's uncertainty.
-    port: Port to listen on; 0: any.
-    host: Address to listen on; 0.0.0.0: all of this machine's, for a class.
-    guests: Number of links for guests, who may inject faults once you allow it. Default: 10 if others can
-    reach the host.
-    out: Folder for flights saved on the page.
+    aircraft: Fly this aircraft instead of the scenario's aircraft, without the scenario's uncertainty.
+    port: Port of the page. 0 selects any free port.
+    host: Network address of the page. With 0.0.0.0 other machines can open it, e.g. those of a class.
+    guests: Number of links for guests. Guests can inject faults after you allow it on the page. Default: 10
+    if other machines can open the page, otherwise 0.
+    out: Folder for flights that you save on the page.
     open_browser: Also open the page in a browser.
     """
     from beaver_ftc_live.page.serve import Place, is_loopback, serve

@@ -91,13 +91,28 @@ TABLES: dict[str, Callable[[], Columns]] = {
 }
 
 
-_SAYS = """Which columns do the log of a flight and the tables of studies have? Read this page if you
-evaluate results with your own program.
+_SAYS = """Which columns do the log of a flight and the tables of studies have? This page is for readers who
+evaluate results with their own program.
 
-The name of a column with a unit ends with the unit. In this page a word in capitals stands for several
-names: AXIS is p, q and r; SURFACE each control surface; ESTIMATOR each isolation estimator, named after its
-surface; SIGNAL a signal of the aircraft; SOURCE a source of the mismatch; WITHIN a number of seconds. The
-unit 1 is a pure number."""
+## How to read a table
+
+- **column**: the name. A name that ends in a unit has this unit. A word in capitals stands for several names,
+  which Table 1 lists: `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
+- **type**: number, whole number, text, or true or false.
+- **unit**: `1` is a pure number. An empty cell means that the column has no unit.
+- **what it is**: the meaning. The [glossary](reference/glossary.md) explains the terms, and the
+  [nomenclature](reference/nomenclature.md) has symbols and signs.
+
+*Table 1. Words in capitals.*
+
+| word | stands for |
+| --- | --- |
+| AXIS | `p` (roll), `q` (pitch) and `r` (yaw) |
+| SURFACE | the name of each control surface, for example `elevator` |
+| ESTIMATOR | the name of each isolation estimator, i.e. of its surface, or of its surface and fault type |
+| SIGNAL | the name of each signal that the aircraft file declares, for example `dpt` |
+| SOURCE | the name of each source of the mismatch |
+| WITHIN | a number of seconds |"""
 _NEXT = """## Next
 
 [Open a flight in other tools](how-to/other-tools.md) shows how to read the files. The
@@ -107,12 +122,35 @@ _NEXT = """## Next
 def page() -> str:
     """The page."""
     texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
-    return "\n\n".join(["# Columns", _SAYS, *(_table(name, texts[name]) for name in TABLES), _NEXT]) + "\n"
+    tables = [_table(number, name, texts[name]) for number, name in enumerate(TABLES, 3)]
+    return "\n\n".join(["# Columns", _SAYS, _contents(texts), *tables, _NEXT]) + "\n"
 
 
-def _table(name: str, text: Mapping[str, str]) -> str:
+def _contents(texts: Mapping[str, Mapping[str, str]]) -> str:
+    """A row for each table, which links to it."""
+    rows = [
+        (f"[{text['title']}](#{_anchor(text['title'])})", *_first(text["says"]))
+        for text in (texts[name] for name in TABLES)
+    ]
+    listed = markdown_table(("table", "written by", "one row for each"), rows)
+    return f"## Contents\n\n*Table 2. The tables of this page.*\n\n{listed}"
+
+
+def _first(says: str) -> tuple[str, str]:
+    """The commands that write a table, and what has a row, from the first two sentences of its text."""
+    written, row, *_ = says.split(". ")
+    commands = dict.fromkeys(re.findall(r"`(\w+)`", written))
+    return ", ".join(f"`{name}`" for name in commands), row.rpartition("one row for each ")[2].rstrip(".")
+
+
+def _anchor(heading: str) -> str:
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+
+
+def _table(number: int, name: str, text: Mapping[str, str]) -> str:
     rows = markdown_table(("column", "type", "unit", "what it is"), list(_rows(name, text["columns"])))
-    return f"## {text['title']}\n\n{text['says']}\n\n{rows}"
+    caption = f"*Table {number}. Columns of {text['title']}.*"
+    return f"## {text['title']}\n\n{text['says']}\n\n{caption}\n\n{rows}"
 
 
 def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:

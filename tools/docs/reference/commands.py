@@ -1,7 +1,7 @@
 """The commands with all their options, and the exit statuses: from the argument parsers and the errors."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import typer
@@ -9,30 +9,113 @@ import typer
 from beaver_ftc.cli.main import app, every_command
 from beaver_ftc.documents import errors
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.pages import ROOT
 
 PARSER: Any = typer.main.get_command(app)
 
 
-_SAYS = """Which options does each command have? Use this page to look up a command. If you do not know
-which command you need, see [which command answers my
-question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints the same text.
+_SAYS = """Which options does each command have? This page lists every command of `beaver-ftc` with its
+options, for readers who already know the command. If you do not know the command, begin with [which command
+answers my question](README.md#which-command-answers-my-question). `beaver-ftc COMMAND --help` prints the text
+of one command.
 
-In each usage line, a word in capitals is a value that you give. `{X}` is required, `[X]` may be left out,
-and a value with `...` after it may be repeated. In the tables, `<...>` is the kind of a value: a path, a
-text, a number or one of the listed words. `1<=x<=60` is its range, and `[required]` marks a value without
-which the command does not run. A rate, a time or an angle has the unit that the text states."""
+## How to read an entry
+
+**Usage line.** A word in capitals stands for a value that you give. `{X}` is required. `[X]` can be left out.
+A value with `...` after it can be repeated. Write the options before or after the values.
+
+**Table of options.** The first column has the option, and the kind of its value in `<...>`. A kind is a path,
+a text (`str`), a whole number (`int`), a number (`float`) or one of the listed words. `list` means that the
+option or value can be repeated. The second column has the effect and the unit. In brackets it has:
+
+- `[default: X]`: the value if the option is left out. Without it, the text states the default, or the option
+  is off.
+- `[1<=x<=60]`: the allowed range of the value x.
+- `[required]`: the command does not run without this value.
+
+**Results.** `--out` names the folder. With `--format json` a command prints one JSON document instead of
+text. [Columns](reference/columns.md) lists the columns of the tables. The [glossary](reference/glossary.md)
+explains the terms of the diagnosis."""
 _NEXT = """## Next
 
 [Exit statuses](reference/exit-statuses.md) explains the status with which a command ends.
 [Columns](reference/columns.md) has the columns of the tables that commands write."""
+_CONTENTS = '*Table 1. The commands, by purpose. "more": the page that shows or explains the command.*'
+
+# Purpose -> command -> page that shows or explains it. A command that is not here is listed under "other".
+_PURPOSES = {
+    "fly": {
+        "run": "tutorials/start.md", "live": "how-to/live.md", "sitl": "how-to/autopilots.md",
+    },
+    "prepare": {
+        "list": "gallery.md", "show": "reference/scenarios.md", "new": "tutorials/own-scenario.md",
+        "validate": "tutorials/own-scenario.md", "schema": "reference/scenario-keys.md",
+        "trim": "reference/beaver.md", "linearise": "explanation/laws.md",
+    },
+    "fly many": {
+        "sweep": "tutorials/sweep.md", "compare": "how-to/compare.md", "matrix": "explanation/fault-types.md",
+    },
+    "measure the diagnosis": {
+        "detectability": "results/verification.md", "smallest": "results/verification.md",
+        "power": "results/robustness.md", "decay": "results/beyond-declared.md",
+        "mechanisms": "results/mechanisms.md", "mismatch": "results/mismatch.md",
+        "reproduce": "how-to/reproduce.md", "bench": "results/performance.md",
+    },
+    "prove": {
+        "verify": "results/verification.md", "check": "explanation/certificates.md",
+        "separate": "explanation/certificates.md", "evidence": "how-to/evidence.md",
+    },
+    "recorded flights": {"identify": "tutorials/flight-log.md", "diagnose": "tutorials/flight-log.md"},
+    "other aircraft": {"derive": "tutorials/own-aircraft.md", "import gtm": "how-to/gtm.md"},
+    "teach": {
+        "challenge new": "how-to/challenge.md", "challenge submit": "how-to/challenge.md",
+        "challenge grade": "how-to/challenge.md",
+    },
+}  # fmt: skip
 
 
 def page() -> str:
     """Every command."""
-    parts = ["# Commands", _SAYS, *_described(PARSER, "beaver-ftc")]
-    for name, command in every_command().items():
-        parts += [f"## {name}", *_described(command, f"beaver-ftc {name}")]
+    known = every_command()
+    purposes = _with_others(known)
+    parts = ["# Commands", _SAYS, "## Contents", _contents(known, purposes)]
+    parts += ["## beaver-ftc", *_described(PARSER, "beaver-ftc")]
+    for commands in purposes.values():
+        for name, more in commands.items():
+            parts += [f"## {name}", *_described(known[name], f"beaver-ftc {name}")]
+            parts += [f"More: [{_title(more)}]({more})."] if more else []
     return "\n\n".join([*parts, _NEXT]) + "\n"
+
+
+def _with_others(known: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """The purposes, with the installed commands alone, and those that have none at the end."""
+    listed = {
+        purpose: {name: more for name, more in commands.items() if name in known}
+        for purpose, commands in _PURPOSES.items()
+    }
+    named = {name for commands in listed.values() for name in commands}
+    others = {name: "" for name in known if name not in named}
+    return listed | ({"other": others} if others else {})
+
+
+def _contents(known: Mapping[str, Any], purposes: Mapping[str, Mapping[str, str]]) -> str:
+    """A row for each command, which links to its section and to the page that explains it."""
+    rows = [
+        (
+            purpose if number == 0 else "",
+            f"[{name}](#{name.replace(' ', '-')})",
+            _in_html(known[name].help.split("\n\n")[0]),
+            f"[{_title(more)}]({more})" if more else "",
+        )
+        for purpose, commands in purposes.items()
+        for number, (name, more) in enumerate(commands.items())
+    ]
+    return f"{_CONTENTS}\n\n{markdown_table(('purpose', 'command', 'what it does', 'more'), rows)}"
+
+
+def _title(page: str) -> str:
+    """The title of a page."""
+    return (ROOT / "docs" / page).read_text(encoding="utf-8").partition("# ")[2].partition("\n")[0]
 
 
 def _described(command: Any, called: str) -> Iterator[str]:
@@ -52,16 +135,16 @@ def _in_html(text: str) -> str:
     return " ".join(text.split()).replace("<", "&lt;")
 
 
-_CAPTION = """*Table 1. Exit statuses. "exception": what the same error raises in Python, and its meaning.*"""
+_CAPTION = """*Table 1. Exit statuses. "exception": the exception that the same error raises in Python.*"""
 _NOTES = """Status 1 has three possible reasons:
 
-- A scenario, a sweep or a plan has an expectation that is not met.
-- A command that checks something found a violation: for example `verify` (a guarantee), `check` (a
-  certificate), `matrix` (a wrong name or a false alarm). `beaver-ftc COMMAND --help` states the condition.
-- A flight of `sitl` was interrupted (Ctrl-C) after it had begun. Its results are written, with the verdict
-  INTERRUPTED. Other commands that are interrupted end with status 130.
+- An expectation of a scenario, of a sweep or of a plan is not met.
+- A check found a violation. `verify` checks guarantees, `check` a certificate, and `matrix` names and false
+  alarms. `beaver-ftc COMMAND --help` states the condition of each command.
+- Ctrl-C interrupted a flight of `sitl`. The results are written, with the verdict INTERRUPTED. Other commands
+  that are interrupted end with status 130.
 
-A command without expectations and without a check, such as `list`, ends with 0 if it is done.
+A command without expectations and without a check, such as `list`, ends with status 0 when it is done.
 
 *Example.* This script publishes the report only if the flight meets its expectations:
 
@@ -79,7 +162,10 @@ fi
 
 def statuses_page() -> str:
     """The exit statuses: what `beaver-ftc --help` says of each, and the errors that end with it."""
-    says = "Which exit status does a command end with, and what does it mean? Scripts and CI jobs read it."
+    says = (
+        "Which exit status does a command end with, and what does it mean? This page is for writers of "
+        "scripts and CI jobs, which read the exit status of `beaver-ftc`."
+    )
     _, _, listed = PARSER.help.partition("Exit status: ")
     found = re.findall(r"(\d+) ([^,.]+)", " ".join(listed.split()))
     raised = {
@@ -91,7 +177,8 @@ def statuses_page() -> str:
     rows.append(
         (
             "`128 + N`",
-            "ended by signal N (2, so status 130, for Ctrl-C); each result file is complete or absent",
+            "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2); each "
+            " result file is complete or absent",
             "",
         )
     )

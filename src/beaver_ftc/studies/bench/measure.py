@@ -321,11 +321,12 @@ def _line(what: str, figures: Document, us: str = "us") -> str:
 class Bench(StudyCommand):
     """Time the closed loop against the bare aircraft.
 
-    Both are timed in turn, and the loop also part by part. The first run compiles the frame again for
-    each part that is left out, which takes about two minutes.
+    The command times the loop and the bare aircraft in turn. It also times each part of the loop: it leaves
+    the part out and measures the difference. The first run compiles the frame again for each part. This
+    compilation takes about two minutes.
 
-    rounds: Number of repetitions.
-    no_parts: Time the whole loop only, not part by part.
+    rounds: Number of repetitions of each measurement.
+    no_parts: Time only the whole loop, not its parts.
     """
 
     rounds: Annotated[int, typer.Option(min=3, max=10000)] = 60

@@ -191,19 +191,19 @@ def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
 class Decay(StudyCommand):
     """Measure how verdicts degrade beyond declared bounds.
 
-    Each error that `fdi.bounds` can declare is flown at 1, 1.5, 2 and 4 times its declared size, alone and
-    with all others. The command reports false alarms, detection, right and wrong names and tracking, each
-    with its 95 % interval. Only the sign of an error is random. An error that is not declared is flown
-    alone, in multiples of a unit.
+    The command flies each error that `fdi.bounds` can declare at 1, 1.5, 2 and 4 times its declared size,
+    alone and with all other errors. If an error is not declared, it is flown alone, in multiples of a unit.
+    Only the sign of an error is random. The command reports false alarms, detections, right names, wrong
+    names and tracking errors, each with its 95 % interval.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
     Examples:
       beaver-ftc decay elevator-loss-in-turbulence
 
-    flights: Flights of each row.
+    flights: Number of flights for each row of the table, i.e. for each error and size.
     seed: Seed of all random draws.
-    out: Folder for the results: SCENARIO-decay in it, with a page, a figure, CSV and JSON.
+    out: Folder in which the result folder SCENARIO-decay is written, with a page, a figure, CSV and JSON.
     """
 
     scenario: ScenarioArgument

@@ -21,22 +21,22 @@ from beaver_ftc.studies.matrix import pitch_lost as lost
 class Matrix(StudyCommand):
     """Fly every fault type on every surface.
 
-    Reports which faults are detected and named, and the tracking error relative to the informed law, which
-    knows the fault. With --declared it also reports how many of the faults that the informed test detects are
-    named.
+    The command reports which faults are detected and which are named. It compares the tracking error with the
+    tracking error of the informed law. The informed law receives the true fault. With --declared the command
+    also reports how many faults the informed test detects, and how many of these faults are named.
 
-    Exit status 1 if a fault is named wrongly or an alarm is false; with --pitch-lost, if an aircraft is lost
-    with engine power but kept without it.
+    The exit status is 1 if a fault is named wrongly or an alarm is false. With --pitch-lost it is 1 if an
+    aircraft is lost with control by engine power, but is not lost without it.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
-    out: Folder for the results: `fault-matrix` or `pitch-lost` in it.
+    out: Folder in which the result folder `fault-matrix` or `pitch-lost` is written.
     airspeed: Airspeed, m/s. Repeat the option for several.
-    pitch_lost: Instead, lose elevator and flap together, with and without control by engine power.
-    declared: Simulate tactical-grade sensors, servos and, where the model allows it, 5 % wrong moment
-      coefficients, and declare them to the diagnosis.
-    turbulence: Turbulence to simulate and to declare to the diagnosis (with --declared).
-    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    pitch_lost: Instead, fail elevator and flap together, with and without control by engine power.
+    declared: Simulate tactical-grade sensors, servos and, if the model allows it, errors of 5 % of the moment
+    coefficients. Declare these errors to the diagnosis.
+    turbulence: With --declared: severity of the turbulence that is simulated and declared to the diagnosis.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
     """
 
     out: Path = Path("runs")

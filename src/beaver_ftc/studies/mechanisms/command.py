@@ -35,20 +35,21 @@ def run_mechanisms(
 class Mechanisms(StudyCommand):
     """Measure which mechanisms of diagnosis and law help.
 
-    Two systems, the published one and the default one, fly the same draws with all of their mechanisms and
-    without each of them: adaptive thresholds, adaptation, networks, hand-over, bank of poles, memory,
-    sharpened tests, statistics. Draws vary fault, bandwidth, undeclared error and instruments. For each
-    mechanism the command prints the net share of flights that are worse without it, by false alarms, late
-    alarms, names and tracking, each with its 95 % interval. Every false alarm of a worst-case detector gets
-    its reason; of the default scheme, its certificate.
+    The command flies two systems on the same random flights: the published system and the default system.
+    Each system flies with all of its mechanisms, and then without one mechanism at a time. The mechanisms are
+    adaptive thresholds, adaptation, networks, hand-over to the flap, bank of poles, memory, sharpened tests
+    and statistics. The random flights vary fault, bandwidth, undeclared error and instruments. For each
+    mechanism the command prints the net share of flights that are worse without it. It counts false alarms,
+    late alarms, names and tracking separately, each with its 95 % interval. For each false alarm of a
+    worst-case detector it prints the reason, and for the default scheme also the certificate.
 
-    Exit status 1 if such a false alarm has no reason.
+    The exit status is 1 if a false alarm of a worst-case detector has no reason.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
-    draws: Draws of each combination of fault, bandwidth, error and instruments.
+    draws: Number of random flights for each combination of fault, bandwidth, error and instruments.
     seed: Seed of all random draws.
-    out: Folder for the results: `mechanisms` in it, with a page, a figure, CSV and JSON.
+    out: Folder in which the result folder `mechanisms` is written, with a page, a figure, CSV and JSON.
     """
 
     draws: Annotated[int, typer.Option(min=1, max=1000)] = DRAWS

@@ -312,23 +312,26 @@ SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tacti
 class Power(StudyCommand):
     """Estimate the probability and the delay of fault detection.
 
-    The command varies surface, size of the loss, reference, sensors and turbulence.
+    The command varies the surface, the size of its loss of effectiveness, the reference, the sensors and the
+    turbulence.
 
-    All schemes diagnose the same flights, each at the alarm level that gives the same false-alarm rate on the
-    same healthy flights. Writes power.json, power.parquet, power.txt, and figures as PNG and SVG.
+    All schemes diagnose the same flights. The alarm level of each scheme is chosen on healthy flights, so
+    that all schemes have the same rate of false alarms. The command writes power.json, power.parquet,
+    power.txt, and figures in PNG and SVG.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
-    grid: quick: about 1 min of processor time; full: about 10 min.
-    schemes: Comma-separated schemes to compare with ours. Default: all registered ones.
-    sensors: Only these sensors. Default: all of the grid.
-    turbulence: Only this turbulence. Default: all of the grid.
+    grid: Number of variations: `quick` takes about 1 min of processor time, `full` about 10 min.
+    schemes: Names of schemes to compare with the default scheme, separated by commas. Default: all registered
+    schemes.
+    sensors: Fly only these sensors. Default: all sensors of the grid.
+    turbulence: Fly only this severity of turbulence. Default: all severities of the grid.
     airspeed: Airspeed, m/s.
     altitude: Altitude above sea level, m.
-    aircraft: Built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
-    surface: Only this surface; print a one-line answer per loss.
-    rates_alone: Give plug-ins only the body rates, without the air data that our detector uses.
-    out: Folder for the results: `power` in it.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    surface: Fly only losses of this surface. The command then prints one line for each loss.
+    rates_alone: Plug-ins receive only the body rates, without the air data that the built-in detector uses.
+    out: Folder in which the result folder `power` is written.
     """
 
     grid: GridName = GridName.quick

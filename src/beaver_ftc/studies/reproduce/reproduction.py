@@ -304,14 +304,15 @@ def _found(rows: Sequence[Any]) -> tuple[Document, Flights]:
 class Reproduce(StudyCommand):
     """Reproduce the published study and check its statements.
 
-    Reports every figure, and for every statement our number, the number without the mechanism concerned, and
-    a verdict; and the same cases flown with our defaults.
+    The command reports every figure of the study. For every statement it reports our number, the number
+    without the mechanism that the statement is about, and a verdict. It also flies the same cases with the
+    default scheme and law.
 
-    Exit status 1 if a statement does not hold and the reason is not known.
+    The exit status is 1 if a statement does not hold and the reason is not known.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
-    out: Folder for the results: `reproduction` in it.
+    out: Folder in which the result folder `reproduction` is written.
     """
 
     out: Path = Path("runs")

@@ -259,14 +259,16 @@ def _counted(count: int, of: int) -> Document:
 class Smallest(StudyCommand):
     """Find the smallest loss that is detected within a time.
 
-    Reports the size that is certain to be detected, and the size that is detected in 90 % of flights with its
-    95 % interval. It flies the scenario without its own faults, with random seed and time of the loss, and
-    adds flights until the interval is narrow, 480 at most.
+    The command reports two sizes of a loss: the size that is certain to be detected, and the size that is
+    detected in 90 % of the flights, with its 95 % interval. The flights are those of the scenario without its
+    faults. Seed and time of the loss are random. The command adds flights until the interval is narrow, up to
+    480 flights.
 
-    Then it reports what limits the size: it flies the same flights without turbulence, sensor errors, servos
-    or model uncertainty, and with references of twice the amplitude and twice the frequency.
+    Then it reports which condition limits the size. It repeats the flights without turbulence, without sensor
+    errors, without servos, without model uncertainty, and with references of twice the amplitude and twice
+    the frequency.
 
-    The same command resumes an interrupted run.
+    If the command is interrupted, the same command resumes it.
 
     Examples:
       beaver-ftc smallest elevator-partial-loss --surface elevator --within 0.5
@@ -274,7 +276,7 @@ class Smallest(StudyCommand):
     surface: The surface that loses effectiveness.
     within: Longest time from the loss to the alarm, s.
     seed: Seed of all random draws.
-    out: Folder for the results: SCENARIO-smallest-SURFACE in it, with a page, CSV and JSON.
+    out: Folder in which the result folder SCENARIO-smallest-SURFACE is written, with a page, CSV and JSON.
     """
 
     scenario: ScenarioArgument

@@ -48,8 +48,8 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class Quantity(Section):
-    """A column of the log. Its value in the given unit is the number in the log times scale, plus offset.
-    A column in its SI unit may be written as its bare name.
+    """A column of the log. Its value in the given unit is scale times the number in the log, plus offset. If
+    a column has its SI unit, its name alone can be written instead of this section.
     """
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
@@ -57,9 +57,15 @@ class Quantity(Section):
         default=None, description="unit of the numbers; left out: the SI unit", examples=["deg/s"]
     )
     scale: Number = number(
-        1.0, unit="1", says="what its numbers are multiplied by", range="not 0", examples=[0.01]
+        1.0, unit="1", says="factor on the numbers in the log", range="not 0", examples=[0.01]
     )
-    offset: Number = number(0.0, unit="as the column", says="added after that", range="any", examples=[-1.5])
+    offset: Number = number(
+        0.0,
+        unit="as the column",
+        says="constant that is added after the multiplication by scale",
+        range="any",
+        examples=[-1.5],
+    )
 
     @model_validator(mode="after")
     def _check_scale_not_zero(self) -> "Quantity":
@@ -111,8 +117,8 @@ class Rates(Section):
 
 
 class Attitude(Section):
-    """Columns of the attitude, with which the rates are checked. `diagnose --aircraft` needs them in
-    turbulence."""
+    """Columns of the attitude. The body rates are checked against them. In turbulence `diagnose --aircraft`
+    requires them."""
 
     roll: LoggedQuantity = Field(description="column of the roll angle, rad", examples=["roll_rad"])
     pitch: LoggedQuantity | None = Field(
@@ -131,7 +137,7 @@ class Energy(Section):
 
 
 class Vehicle(Section):
-    """The columns of a vehicle's logs."""
+    """The columns in the logs of a vehicle."""
 
     name: VehicleName = Field(description="name of the vehicle", examples=["flying-wing"])
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
@@ -144,7 +150,7 @@ class Vehicle(Section):
     commands: list[LoggedQuantity] = Field(
         min_length=1,
         max_length=20,
-        description="columns of the commands, as they are before any part that can fail",
+        description="columns of the commands, recorded before any part that can fail",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[LoggedQuantity] = Field(
@@ -156,18 +162,18 @@ class Vehicle(Section):
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
         max_length=20,
-        description="share of each command in the deflection of each healthy surface",
+        description="for each surface, the share of each command in the deflection of the healthy surface",
         json_schema_extra={"unit": "share of 1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
     )
     labels: dict[str, LoggedQuantity] = Field(
         default={},
-        description="columns with the true effectiveness of each surface, 1 if healthy; used by `identify` "
-        "and by `diagnose --score`",
+        description="columns with the true effectiveness of each surface, which is 1 if the surface is "
+        "healthy. `identify` and `diagnose --score` read them",
         examples=[{"left": "left_truth"}],
     )
     attitude: Attitude | None = Field(
-        default=None, description="columns of the attitude, with which the rates are checked"
+        default=None, description="columns of the attitude. The body rates are checked against them"
     )
     acceleration: LoggedQuantity | None = Field(
         default=None,
@@ -176,43 +182,46 @@ class Vehicle(Section):
     )
     airspeed: LoggedQuantity | None = Field(
         default=None,
-        description="column of the airspeed; outside the airspeeds of the fit the model is not valid, m/s",
+        description="column of the airspeed. The model is valid only in the range of airspeeds that the fit "
+        "used, m/s",
         examples=["airspeed_m_s"],
     )
     energy: Energy | None = Field(
         default=None,
-        description="altitude and airspeed; with them, an engine failure is not named as a surface",
+        description="columns of altitude and airspeed. They prevent an engine failure from being named as a "
+        "surface",
     )
     flow: dict[str, LoggedQuantity] = Field(
         default={},
-        description="columns of further inputs, for `diagnose --aircraft`; names as in the file of the "
-        "aircraft",
+        description="columns of further inputs for `diagnose --aircraft`. The names are those of the "
+        "aircraft file",
         examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}],
     )
     full_deflection_rad: dict[str, Number] = Field(
         default={},
-        description="deflection of each surface at the command 1, for `diagnose --aircraft`; left out: 1",
+        description="deflection of each surface at a command of 1, for `diagnose --aircraft`; left out: 1",
         json_schema_extra={"unit": "rad", "range": "any"},
         examples=[{"left": 0.4}],
     )
     reference_airspeed_mps: Number | None = Field(
         default=None,
         gt=0,
-        description="airspeed at which the commands have their full effect: each command is multiplied by "
-        "(airspeed / this airspeed)^2; left out: `identify` chooses it if it improves the fit",
+        description="airspeed V0 at which the commands have their full effect. Each command is multiplied "
+        "by (airspeed / V0)^2; left out: `identify` chooses V0 if this improves the fit",
         json_schema_extra={"unit": "m/s"},
         examples=[20.0],
     )
     airspeed_powers: dict[str, Number] = Field(
         default={},
-        description="power of the airspeed by which the command of a surface is multiplied; left out: 2; "
-        "`identify` finds it for `other_laws`",
+        description="exponent of airspeed / V0 (`reference_airspeed_mps`) in the factor on the command of "
+        "each surface. With `other_laws`, `identify` estimates it; left out: 2",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
     outputs: dict[str, LoggedQuantity] = Field(
         default={},
-        description="columns of the servo outputs; only a rival method of `compare --flights` uses them",
+        description="columns of the servo outputs. Only one published method in `compare --flights` uses "
+        "them",
         examples=[{"left": "left_pwm"}],
     )
     false_alarms_per_hour: Number | None = number(
@@ -220,24 +229,26 @@ class Vehicle(Section):
         gt=0,
         le=MAX_FALSE_ALARMS_PER_HOUR,
         unit="1/h",
-        says="accepted rate of alarms in healthy flight; left out: 1, if there are no labels",
+        says="accepted number of false alarms in each hour of healthy flight; left out: 1, if the logs have "
+        "no labels",
         examples=[2],
     )
     faults: list[FaultKind] = Field(
         default=["loss"],
         min_length=1,
-        description="fault types that are tested: loss of effectiveness, jam",
+        description="fault types that the diagnosis tests. `loss`: loss of effectiveness. `stuck`: jam",
         examples=[["loss", "stuck"]],
     )
     other_laws: bool | None = Field(
         default=None,
-        description="true: the diagnosed flights may have another control law than the identified ones, so "
-        "an alarm and a name need more evidence; left out: true, if no labels show faults",
+        description="true: the control law of the diagnosed flights can differ from the law of the "
+        "identified flights. An alarm and a name then require more evidence; left out: true, if no labels "
+        "show faults",
         examples=[True],
     )
     moving_air: bool | None = Field(
         default=None,
-        description="true: gusts may move the aircraft, so the diagnosis uses every sample, and estimates "
+        description="true: gusts can move the aircraft. The diagnosis then uses every sample, and estimates "
         "the spectrum of the noise from the flight; left out: true, if no labels show faults",
         examples=[True],
     )

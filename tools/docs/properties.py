@@ -21,19 +21,25 @@ _TEXTS = Path(__file__).with_suffix(".yaml")
 
 _HEAD = """# Properties of the aircraft
 
-Which JSBSim properties does the Beaver have, and what does each mean? Read this page if you fly the model
-in plain JSBSim, or read a property in Python, for example `sim["aero/dpt"]` of a
-[simulation](reference/python.md). A scenario file needs no property names: its sections `faults`,
+Which JSBSim properties does the Beaver have, and what does each mean? This page is for readers who fly the
+model in JSBSim alone, or who read a property in Python, for example `sim["aero/dpt"]` of a
+[simulation](reference/python.md). A scenario file needs no property names. Its sections `faults`,
 `uncertainty` and `actuators` set these properties ([scenarios](reference/scenarios.md)).
 
 The names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of the files of its
-actuators.
+actuators. The page has three tables:
+
+- [Properties that can be set](#properties-that-can-be-set): actuators, failures, engine, errors of the truth
+- [Properties that JSBSim computes](#properties-that-jsbsim-computes): positions, air data, coefficients
+- [Aerodynamic terms](#aerodynamic-terms): value and factors of each term
+
+How to read the tables:
 
 - `<s>` stands for one of the surfaces aileron, elevator, rudder and flap.
 - A name ends with its unit: `rad_sec` is rad/s, `rad_sec2` is rad/s², `mps` is m/s, `lbs` is pound-force,
   `lbsft` is pound-force times foot. A name without a unit is dimensionless.
 - The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
-  them, Cl, Cm and Cn those of the moments in roll, pitch and yaw.
+  these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw.
 - In formulas, p, q and r are the body rates in rad/s, b is the span in m, c the chord in m, n the engine
   speed in rpm, pz the manifold pressure in inHg. P is the power in kW, V the airspeed in m/s, rho the
   density in kg/m3. Ix, Iy, Iz and Jxz are the [moments of inertia](reference/beaver.md), and a name with
@@ -63,12 +69,15 @@ def as_markdown() -> str:
         _HEAD,
         "## Properties that can be set",
         "The defaults are the values after the model is loaded. With them, a surface follows its command.",
+        "*Table 1. Properties that can be set, with the value after the model is loaded.*",
         _table(("property", "default", "meaning"), _input_rows(inputs)),
         "## Properties that JSBSim computes",
         "These properties can be read. JSBSim computes them in each step.",
+        "*Table 2. Properties that can be read.*",
         _table(("property", "meaning"), _output_rows(others)),
         "## Aerodynamic terms",
         _example(next(element for element in terms if element.get("name") == _EXAMPLE)),
+        "*Table 3. Terms of the coefficients. \"times\": the quantities by which the value is multiplied.*",
         _table(("term", "value", "times", "meaning"), [_term_row(element) for element in terms]),
         _NEXT,
     ]) + "\n"  # fmt: skip

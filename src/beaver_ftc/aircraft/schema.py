@@ -44,11 +44,13 @@ class OutputSection(Section):
     """One output of an autopilot that moves a surface or the engine.
 
     channel: number of the output, counted from 1
-    share: deflection at full output, as a share of the travel to the stop; negative: towards the other stop
-    reversed: true: a longer pulse gives a smaller deflection; together with a negative `share` the two cancel
+    share: deflection at full output, divided by the travel to the stop. A negative share moves the surface
+    towards the other stop
+    reversed: true: a longer pulse gives a smaller deflection. A negative `share` reverses the direction once
+    more
     pwm_us: shortest and longest pulse, us
-    trim_us: pulse that puts a surface at 0 deg and closes a throttle; left out: the middle of `pwm_us`, for a
-        throttle its lower end, us
+    trim_us: pulse at which a surface is at 0 deg, or a throttle is closed; left out: for a surface the middle
+    of `pwm_us`, for a throttle its lower end, us
     """
 
     channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
@@ -139,7 +141,8 @@ class SurfaceSection(Section):
         description="property of the actuator's output, rad", examples=["fcs/elevator-pos-rad"]
     )
     effective: Property = Field(
-        description="property of what the aerodynamics see, rad", examples=["fcs/elevator-effective-rad"]
+        description="property of the deflection that the aerodynamics feel, rad",
+        examples=["fcs/elevator-effective-rad"],
     )
     travel_rad: Stops = Field(
         description="lower and upper stop, rad", json_schema_extra={"unit": "rad"}, examples=[[-0.49, 0.49]]
@@ -151,7 +154,9 @@ class SignalSection(Section):
 
     property: Property = Field(description="property with the value of the signal", examples=["aero/dpt"])
     sensed: Literal[True] = Field(
-        default=True, description="whether an instrument measures it: always true", examples=[True]
+        default=True,
+        description="true: an instrument measures the signal. Only true is allowed",
+        examples=[True],
     )
 
 
@@ -202,7 +207,9 @@ class TermSection(Section):
         examples=[{"alpha": 1}],
     )
     surface: Name | None = Field(
-        default=None, description="the surface whose deflection it multiplies", examples=["elevator"]
+        default=None,
+        description="surface whose deflection is a further factor of the term",
+        examples=["elevator"],
     )
     source: Text = entry("", examples=["TM88"])
     description: Text = entry("", examples=["static stability"])
@@ -258,8 +265,8 @@ class TrimSection(Section):
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="for a surface that trims an axis: other surfaces that move with it, and their share of "
-        "the way",
+        description="for each surface that trims an axis: the other surfaces that move with it. The number "
+        "is the deflection of the other surface, divided by the deflection of the first",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
@@ -315,7 +322,7 @@ class ThrustSection(Section):
     airspeed_mps: true airspeeds, m/s
     setting: values of the property that `trim.throttle` names
     force_n: one row for each airspeed, with a force for each setting; forces do not decrease, N
-    lag_s: time until 63 % of a change is reached, s
+    lag_s: time constant of the thrust, i.e. the time until 63 % of a change is reached, s
     """
 
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
@@ -337,8 +344,8 @@ class ThrustSection(Section):
 class EngineSection(Section):
     """Settings of the engine, by their key in the section `initial` of a scenario, and limits of the trim.
 
-    start: how the engines start; `steady`: at once, `run_up`: by starters, which takes time, `off`: not at
-    all
+    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start them,
+    which takes time. `off`: they do not run
     settings: settings that a scenario can have
     limits: properties that must be within a range in trim
     thrust: force at each value of the setting that trim moves; left out: airspeed is held with `forces` alone
@@ -351,9 +358,8 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine with a lever of its own, which the law moves: its force along the body x axis turns the
-    aircraft about
-    the centre of gravity.
+    """An engine with a lever of its own. The law moves the lever. The force of the engine along the body x
+    axis turns the aircraft about the centre of gravity.
 
     throttle: property that is added to the lever of this engine alone, in the unit of its setting
     share: share of the thrust of all engines, `engine.thrust`
@@ -384,8 +390,8 @@ Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
 
 
 class ErrorBox(Section):
-    """A box of states, and the largest error in it. An error has a row for each age of the flight, with a
-    value for each share of the surfaces' travel.
+    """A box of states, and the largest error in it. An error has one row for each time in `until_s`, with one
+    value for each share in `travel_share`.
 
     airspeed_mps: true airspeed, m/s
     alpha_rad: angle of attack, rad
@@ -398,7 +404,7 @@ class ErrorBox(Section):
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: largest Cn of the engines with equal levers, in addition to that of their thrust; left out:
+    engines_apart: largest Cn of the engines with equal levers, without the Cn of their thrust; left out:
     unknown
     """
 
@@ -435,12 +441,15 @@ class ErrorMapSection(Section):
     stand_ins: Number = number(
         1.0,
         unit="share of 1",
-        says="factor on all shares but the last, for surfaces that only replace others",
+        says="factor on all shares except the last, for surfaces that only replace other surfaces",
         gt=0,
         le=1,
     )
     until_s: Ages = entry(
-        ..., "ages of a flight, rising: fuel burns, and the inertia changes, s", examples=[[600]]
+        ...,
+        "times since the start of the flight, rising. The error depends on the time because fuel burns "
+        "and the inertia changes, s",
+        examples=[[600]],
     )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
 
@@ -482,7 +491,7 @@ class GroundSection(Section):
     height_m: Number = number(
         ...,
         unit="m",
-        says="height of the centre of gravity when the aircraft stands",
+        says="height of the centre of gravity above the ground when the aircraft stands",
         gt=0,
         le=100,
         examples=[1.5],
@@ -493,7 +502,7 @@ class GroundSection(Section):
 
 
 class DamageSection(Section):
-    """One case of damage. If several are set at once, only the first one acts.
+    """One case of damage. If a flight has several cases at once, only the first case acts.
 
     property: property that is 1 if the damage is present, otherwise 0
     takes: surfaces that the damage removes
@@ -507,8 +516,9 @@ class AircraftFile(Section):
     """The whole file.
 
     jsbsim: the JSBSim model, a file beside this one
-    groups: groups of surfaces that can replace each other, in the order in which they take over
-    model_error_rad_s2: largest model error, which is added to the declared bound
+    groups: groups of surfaces that can replace each other. In each group the surfaces are in the order in
+    which they replace each other
+    model_error_rad_s2: largest model error. It is added to the declared bound
     model_error_map: largest model error in each part of the envelope, instead of one value
     channels: outputs of an autopilot, and the surfaces that they move
     ground: the aircraft on the ground; left out: no flight begins on the ground
@@ -516,7 +526,7 @@ class AircraftFile(Section):
     name: name of the aircraft
     description: one line about the aircraft
     surfaces: three or more control surfaces, by name
-    signals: measured dimensionless signals that terms multiply
+    signals: measured dimensionless signals that are factors of terms
     mass: mass and inertia
     geometry: reference dimensions
     moments: terms of the moment coefficients
@@ -524,7 +534,7 @@ class AircraftFile(Section):
     envelope: range in which the terms are valid
     trim: parts that trim moves in addition to the main surfaces
     engine: settings and limits of the engine
-    effectors: engines that turn the aircraft if surfaces are not enough, by name
+    effectors: engines, by name, with which the law turns the aircraft if the surfaces are not sufficient
     start: flight condition at the start, if the scenario has no other
     """
 

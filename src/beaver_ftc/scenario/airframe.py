@@ -149,14 +149,16 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The flight condition at the start: a trimmed, straight flight with the wings level."""
+    """The flight condition at the start: trimmed straight flight with wings level."""
 
     airspeed_mps: Number = number(
-        45.0, "m/s", "true airspeed; the model is valid from 30 to 55 m/s", ge=20, le=70
+        45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70
     )
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
-        None, "true: the aircraft stands on the ground, whose elevation is altitude_m; only for `sitl`"
+        None,
+        "true: the aircraft stands on the ground, and altitude_m is the elevation of the ground. Only "
+        "`sitl` accepts true",
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -206,7 +208,7 @@ def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
     (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
     slowest, fastest = airspeeds_of(aircraft)
     default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
-    says = f"true airspeed; the model is valid from {low:g} to {high:g} m/s"
+    says = f"true airspeed. The model is valid from {low:g} to {high:g} m/s"
     speed = number(default, "m/s", says, ge=slowest, le=fastest)
     keys: dict[str, Any] = {"airspeed_mps": (Number, speed)}
     if start.altitude_m is not None:
@@ -243,7 +245,7 @@ class ActuatorDynamics(Section):
 
     bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
     rate_limit_deg_s: largest rate of the surface; 0: no limit, deg/s
-    travel_deg: lower and upper stop; left out: those of the aircraft, deg
+    travel_deg: lower and upper stop; left out: the stops in the aircraft file, deg
     """
 
     bandwidth_rad_s: Number = number(0.0, "rad/s", ge=0, le=10_000, examples=[20])
@@ -271,7 +273,8 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section, extra="allow"):
-    """Dynamics of the actuators. A preset applies to all surfaces, and so do keys outside the surfaces."""
+    """Dynamics of the actuators. A preset applies to all surfaces. A key directly in this section also
+    applies to all surfaces, and a key below a surface to this surface."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
 
@@ -314,11 +317,14 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 
 
 class Gust(Section):
-    """A one-minus-cosine gust of JSBSim: its velocity rises, is held, and fades."""
+    """A one-minus-cosine gust of JSBSim. Its velocity rises, is held, and fades."""
 
     at_s: Number = number(..., "s", "start of the gust", ge=0, le=360_000, examples=[10])
     velocity_mps: tuple[Wind, Wind, Wind] = number(
-        ..., "m/s", "largest velocity of the gust, towards north, east, down", examples=[[0, 0, -3]]
+        ...,
+        "m/s",
+        "largest velocity of the gust, with the components towards north, east and down",
+        examples=[[0, 0, -3]],
     )
     rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
     hold_s: Number = number(0.0, "s", "time at the largest velocity", ge=0, le=3600, examples=[2])

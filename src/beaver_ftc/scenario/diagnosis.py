@@ -121,20 +121,20 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
 class Bounds(Section, strict=True):
-    """Declared uncertainty, from which the thresholds follow [Zhang2005, sec. VII].
+    """Declared uncertainty. The thresholds follow from it [Zhang2005, sec. VII].
 
-    inertia_coupling: relative error of the inertia coupling on each axis; the default is that of the
-    published     study
-    constant_rad_s2: any other error of the angular acceleration; the default is that of the published study,
-    rad/s2
-    coefficients: tolerance of the moment coefficients, as a share of each: one number for all, or one for
-    each     name
-    inertia: tolerance of Ix, Iy, Iz and Jxz, as a share of each
-    sensors: measurement errors: a preset, or noise, bias, resolution and slope error by signal
+    inertia_coupling: largest relative error of the inertia coupling on each axis. The default is the bound in
+    the published study
+    constant_rad_s2: largest other error of the angular acceleration on each axis. The default is the bound in
+    the published study, rad/s2
+    coefficients: largest relative error of the moment coefficients: one number for all terms, or one number
+    for each name of a term
+    inertia: largest relative error of Ix, Iy, Iz and Jxz
+    sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each signal
     deflection_deg: largest difference between a surface and the model of its actuator, deg
-    turbulence: severity of Dryden turbulence; no instrument measures the rotation of this air. The bound is
-    that of     the present height, but at least that above 2000 ft
-    vertical_wind_mps: strongest steady vertical wind, up or down, that the sensor monitor allows for when it
+    turbulence: largest severity of Dryden turbulence. The bound follows from the present height, but it is
+    never below the bound for heights above 2000 ft. No instrument measures the rotation of turbulent air
+    vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor allows for it when it
     compares altitude and climb, m/s
     """
 
@@ -157,12 +157,13 @@ class Bounds(Section, strict=True):
 
 
 class Statistical(Section, strict=True):
-    """Likelihood ratio tests in addition to the worst-case thresholds. Alarm levels follow from the declared
-    rates.
+    """Likelihood ratio tests in addition to the worst-case thresholds. Their alarm levels follow from the
+    keys of this section.
 
     false_alarms_per_h: largest rate of false alarms per flight hour under the declared noise
     misnaming: probability that noise excludes the true fault within one second
-    uncertainty_rad_s: highest frequency of the model error; the default is that of the published study, rad/s
+    uncertainty_rad_s: highest frequency of the model error. The default is the frequency in the published
+    study, rad/s
     """
 
     false_alarms_per_h: float = number(1e-3, "1/h", gt=0, le=3600)
@@ -171,28 +172,36 @@ class Statistical(Section, strict=True):
 
 
 class Probing(Section):
-    """Active diagnosis: a small movement of the flap, balanced by the elevator, shows which of them is at
-    fault.
+    """Active diagnosis: a small movement of the flap, balanced by the elevator, shows which of the two
+    surfaces is faulty.
 
-    If both surfaces follow their commands, the aircraft does not react. Probing begins if the pitch axis is
-    at     fault, and neither surface is named within the time that a slow oscillation needs to become
-    visible. Probing     ends when a surface is named.
+    If both surfaces follow their commands, the aircraft does not react. Probing begins after an alarm in
+    pitch, if neither surface is named within the time that a slow oscillation needs to become visible.
+    Probing ends when a surface is named.
     """
 
     amplitude_deg: float = entry(3.0, "largest flap deflection, downwards, deg", gt=0, le=10)
-    frequency_hz: float = entry(0.5, "number of movements in a second, Hz", gt=0, le=5)
-    duration_s: float = entry(4.0, "longest duration, s", gt=0, le=60)
+    frequency_hz: float = entry(0.5, "number of movements of the flap in each second, Hz", gt=0, le=5)
+    duration_s: float = entry(4.0, "longest duration of the probing, s", gt=0, le=60)
 
 
 class Sharpen(Section, strict=True):
-    """Steps that make the published tests more sensitive. Each step keeps the guarantees G1 and G2
-    (theory.md)."""
+    """Steps that make the published tests more sensitive. Each step keeps the guarantees G1 (no false alarm)
+    and G2 (no exclusion of the true fault). The page on assumptions (docs/explanation/assumptions.md) states
+    both."""
 
-    pole_bank: bool = entry(True, "several filters (`fdi.pole_bank_per_s`): each can raise the alarm")
+    pole_bank: bool = entry(
+        True,
+        "several detection filters, with the poles in `fdi.pole_bank_per_s`. Each filter can raise the alarm",
+    )
     memory: bool = entry(True, "each fault must explain the whole flight, not only the time after the alarm")
-    shared_effectiveness: bool = entry(True, "one parameter for each surface, shared by all axes")
+    shared_effectiveness: bool = entry(
+        True, "each surface has one parameter for all axes, not one parameter for each axis"
+    )
     set_membership: bool = entry(
-        True, "if a parameter is declared constant, its sets of possible values are intersected over time"
+        True,
+        "if `fault_profile` declares a constant parameter, its sets of possible values are intersected "
+        "over time",
     )
 
     @model_validator(mode="before")
@@ -212,31 +221,32 @@ class Sharpen(Section, strict=True):
 class FdiConfig(Section, strict=True):
     """The diagnosis: scheme, fault class, declared bounds and poles.
 
-    scheme: name of a diagnosis scheme; `beaver-ftc list schemes` prints all. `none`: no diagnosis
+    scheme: name of a diagnosis scheme. `beaver-ftc list schemes` prints all names. `none`: no diagnosis
     options: parameters of the scheme, by name
-    fault_class: faults that the diagnosis looks for. `published`: loss of effectiveness of aileron, elevator
-    or     rudder; `all`: all fault types on all surfaces
-    pairs: true: also look for faults of two surfaces at once, in pitch, and in roll and yaw; needs the class
-    `all`
-    sensor_monitor: when the instruments are compared with each other; `auto`: if the scenario has a fault of
-    an     instrument
-    slowest_oscillation_rad_s: lowest frequency of an oscillatory failure that the class `all` contains, rad/s
-    slowest_rate_deg_s: lowest rate of a slow surface in the class `all`; a slower surface counts as jammed,
-    deg/s
-    probing: active diagnosis, with the class `all`; left out: off; `{}`: on, with default values
-    statistical: statistical detector beside the worst-case detector; left out: off; `{}`: on, with default
-    values
-    authority: detector whose alarms and exclusions count, if there are two
-    thresholds: bound of the isolation tests: an interval with signs, or the norm of the published study
+    fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
+    elevator or rudder. `all`: all fault types on all surfaces
+    pairs: true: also look for simultaneous faults of two surfaces, one pair in pitch and one pair in roll and
+    yaw. This requires `fault_class: all`
+    sensor_monitor: when the sensor monitor compares the instruments with each other. `auto`: if the scenario
+    has a fault of an instrument
+    slowest_oscillation_rad_s: lowest frequency of an oscillatory failure in the fault class `all`, rad/s
+    slowest_rate_deg_s: lowest rate of a slow surface in the fault class `all`. A slower surface counts as
+    jammed, deg/s
+    probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
+    statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
+    left out: off
+    authority: detector whose alarms and exclusions count, if the statistical detector is on
+    thresholds: bound of the isolation tests. `interval`: an interval with a lower and an upper end.
+    `published`: the norm of the published study
     detection_pole_per_s: pole of the detection filter of the published study, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
-    forgetting_time_s: time constant with which estimates forget; it should exceed a period of the reference,
-    s
-    sharpen: steps beyond the published scheme: `all`, `none`, or true or false for each
-    pole_bank_per_s: poles of further detection filters; a filter with the default pole uses only the last
-    frame,     1/s
-    fault_profile: assumption about a fault. `any`: its parameter may change with time; `abrupt`: it is
-    constant     from the beginning
+    forgetting_time_s: time constant with which the estimates forget old data. It should exceed one period of
+    the reference, s
+    sharpen: steps beyond the published scheme: `all`, `none`, or true or false for each step
+    pole_bank_per_s: poles of further detection filters. A filter with the default pole uses only the last
+    frame, 1/s
+    fault_profile: assumption about the parameter of a fault. `any`: the parameter can change with time.
+    `abrupt`: the parameter is constant from the start of the fault
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -346,22 +356,22 @@ Law = Annotated[str, named(partial(refusal, LAWS))]
 
 
 class EnginePower(Section, strict=True):
-    """Control of pitch by engine power, if elevator and flap are both lost.      It works with the law
-    fault-tolerant and `fault_class: all`, and with the oracle. The page on fault types
-    (docs/explanation/fault-types.md) has the design.
+    """Control of pitch by engine power, if elevator and flap are both lost. It requires the law
+    `fault-tolerant` with `fault_class: all`, or the law `oracle`. The page on fault types
+    (docs/explanation/fault-types.md) explains the design.
 
     enabled: false: the engine keeps its trim setting
-    speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed; this
-    damps     the phugoid, inHg per m/s
-    attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the nose is too high;
-    power     lowers the nose, inHg per deg
-    washout_s: time constant of the mean airspeed; about a period of the phugoid, s
+    speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This
+    feedback damps the phugoid, inHg per m/s
+    attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the pitch attitude is too
+    high. More power lowers the nose, inHg per deg
+    washout_s: time constant of the mean airspeed. It should be about one period of the phugoid, s
     attitude_memory_s: time constant with which an earlier error of the pitch rate is forgotten, s
-    smoothing_s: time constant of the lag on the airspeed, against noise and gusts, s
+    smoothing_s: time constant of the first-order lag that smooths noise and gusts in the measured airspeed, s
     lowest_inhg: manifold pressure with the throttle closed, inHg
-    highest_inhg: highest manifold pressure; the default is the take-off rating of the engine R-985, inHg
+    highest_inhg: highest manifold pressure. The default is the take-off rating of the engine R-985, inHg
     rate_inhg_s: fastest change of the manifold pressure, inHg/s
-    patience_s: time for which both surfaces must be lost before engine power takes over, s
+    patience_s: time for which both surfaces must be lost before engine power controls pitch, s
     release_s: time for which a surface must act again before the engine returns to its trim setting, s
     """
 
@@ -385,28 +395,32 @@ class EnginePower(Section, strict=True):
 
 
 class ControlConfig(Section, strict=True):
-    """The control law and its gains. The published study gives no gains, so the default values are ours.
+    """The control law and its gains. The published study states no gains, so this project chose the default
+    values.
 
-    law: name of a control law; `beaver-ftc list laws` prints all
+    law: name of a control law. `beaver-ftc list laws` prints all names
     options: parameters of the law, by name
-    gain_margin_db: gain margin that every loop of the default law keeps, upwards and downwards, dB
-    phase_margin_deg: phase margin that every loop of the default law keeps, deg
-    noise_share: largest standard deviation of a surface's rate that gyro noise causes with the default law,
-    as a     share of the rate limit; with 0.5 the rate is within the limit 95 % of the time
+    gain_margin_db: smallest gain margin of every loop of the default law, for larger and for smaller gains,
+    dB
+    phase_margin_deg: smallest phase margin of every loop of the default law, deg
+    noise_share: with the default law, gyro noise moves the surfaces. This key limits the standard deviation
+    of the surface rate, divided by the rate limit. With 0.5 the rate stays within the limit for 95 % of the
+    time
     proportional_per_s: proportional gain Kp of the tracking error, 1/s
-    integral_per_s2: integral gain Ki of the tracking error; Ki = Kp^2/4 gives two equal poles of the error at
+    integral_per_s2: integral gain Ki of the tracking error. With Ki = Kp^2/4 the error has two equal poles at
     Kp/2, 1/s2
-    reference_natural_frequency_rad_s: natural frequency of the reference model; faster than the control loop,
-    rad/s
-    reference_damping: damping ratio of the reference model; from 1 on there is no overshoot
+    reference_natural_frequency_rad_s: natural frequency of the reference model. It should be higher than the
+    bandwidth of the control loop, rad/s
+    reference_damping: damping ratio of the reference model. A ratio of 1 or more gives no overshoot
     network_gain_per_s2: learning gain of the network of the laws `adaptive` and `fault-tolerant-published`,
     1/s2
-    network_leak_per_s: rate at which the network forgets after the isolated fault explains the error, 1/s
+    network_leak_per_s: rate at which the network forgets. The network forgets from the isolation on, because
+    the isolated fault then explains the error, 1/s
     network_weight_limit_rad_s2: largest magnitude of each weight of the network, rad/s2
-    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses, so that commands do not
-    jump, 1/s
-    least_effectiveness: effectiveness below which the law no longer uses a surface
-    hand_over_s: duration of the transfer of control from a failed surface to its stand-in, s
+    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses. This limit prevents jumps
+    of the command, 1/s
+    least_effectiveness: smallest effectiveness with which the law still uses a surface
+    hand_over_s: duration of the reallocation from a failed surface to the surface that replaces it, s
     power: control of pitch by engine power, if elevator and flap are both lost
     """
 

@@ -170,8 +170,8 @@ MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
 
 
 class InertiaCoupling(Section):
-    """Relative errors of the inertia coupling in the truth: the errors of the coefficients of the products
-    of two body rates. In the published study they are within 0.25."""
+    """Relative errors of the inertia coupling in the truth. The inertia coupling is the angular acceleration
+    from products of two body rates. In the published study these errors are at most 0.25."""
 
     p: Number = number(
         0.0, "share of 1", "error in roll, of the coefficient of q r", ge=-1, le=1, examples=[0.2]
@@ -185,7 +185,7 @@ class InertiaCoupling(Section):
 
 
 class Sinusoid(Section):
-    """The amplitude times sin(frequency t), added to one angular acceleration at the time t."""
+    """An error of one angular acceleration: amplitude times sin(frequency t) at the time t."""
 
     amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
@@ -200,7 +200,7 @@ class SinusoidAxes(Section):
 
 
 class TrueInertia(Section):
-    """Inertia of the truth, as a share of the value in the aircraft file."""
+    """Inertia of the truth, divided by the inertia in the aircraft file."""
 
     Ix: Number = number(1.0, "share of 1", "roll inertia", ge=0.5, le=2)
     Iy: Number = number(1.0, "share of 1", "pitch inertia", ge=0.5, le=2)
@@ -211,16 +211,14 @@ Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
 
 
 class Uncertainty(Section):
-    """How the truth differs from the design model.
+    """Differences between the truth and the design model.
 
     inertia_coupling: relative errors of the inertia coupling
     sinusoid: sinusoidal angular accelerations
-    coefficients: single aerodynamic terms of the truth, each as a share of its value in the aircraft file; 1
-    is no error
-    mass: mass of the truth, as a share of the value in the aircraft file; the inertia is not changed, share
-    of 1
+    coefficients: factors on aerodynamic terms of the truth, by name of the term. A factor of 1 is no error
+    mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, share of 1
     inertia: inertia of the truth
-    cg_m: shift of the centre of gravity from that of the aircraft file: forward, right, down, m
+    cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
     """
 
     inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
@@ -235,7 +233,7 @@ Scale = Annotated[Number, Field(ge=0.1, le=10)]
 
 
 class InertiaScale(Section):
-    """Inertia of the design model, as a share of the value in the aircraft file."""
+    """Inertia of the design model, divided by the inertia in the aircraft file."""
 
     Ix: Scale = number(1.0, "share of 1", "roll inertia")
     Iy: Scale = number(1.0, "share of 1", "pitch inertia")
@@ -244,17 +242,17 @@ class InertiaScale(Section):
 
 
 class DesignModel(Section):
-    """Deliberate errors of the design model; the truth stays as it is.
+    """Deliberate errors of the design model. The truth does not change.
 
-    engine_terms: false: the terms of the slipstream (`dpt`) in Cl, Cm and Cn are left out, as in the
-    published     study
-    linearised: true: the design model is linear, about the trim at the start
+    engine_terms: false: the design model has no slipstream terms (`dpt`) in Cl, Cm and Cn, as in the
+    published study
+    linearised: true: the design model is linearised about the trim at the start
     frozen_alpha: true: in the design model, alpha always has its trim value
-    mass: mass of the design model, as a share of the value in the aircraft file; the inertia has the same
-    share,     share of 1
+    mass: mass of the design model, divided by the mass in the aircraft file. The inertia is multiplied by the
+    same factor, share of 1
     inertia: inertia of the design model
-    coefficients: single aerodynamic terms of the design model, each as a share of its value in the aircraft
-    file; 1 is no     error
+    coefficients: factors on aerodynamic terms of the design model, by name of the term. A factor of 1 is no
+    error
     """
 
     engine_terms: Flag = True
@@ -270,14 +268,16 @@ class Change(Section):
 
     at_s: Number = number(..., "s", "time of the change", gt=0, le=360_000, examples=[20])
     law: Law | None = entry(
-        None, "the new law, as in `control.law`; commands and reference continue", examples=["nominal"]
+        None,
+        "new law, as in `control.law`. Commands and reference continue without a jump",
+        examples=["nominal"],
     )
     scheme: Scheme | None = entry(
-        None, "the new scheme, as in `fdi.scheme`; the diagnosis restarts", examples=["zhang2005"]
+        None, "new scheme, as in `fdi.scheme`. The diagnosis restarts", examples=["zhang2005"]
     )
-    sensors: Sensors | None = entry(None, "the new sensor errors, as in `sensors`")
+    sensors: Sensors | None = entry(None, "new sensor errors, as in `sensors`")
     declared_sensors: BoundedSensors | None = entry(
-        None, "the new declaration, as in `fdi.bounds.sensors`; the diagnosis restarts"
+        None, "new declared sensor errors, as in `fdi.bounds.sensors`. The diagnosis restarts"
     )
 
     @model_validator(mode="after")
@@ -289,7 +289,7 @@ class Change(Section):
 
 
 class RmsLimits(Section):
-    """Largest RMS tracking error that is allowed on each axis."""
+    """Largest allowed RMS tracking error of each axis."""
 
     p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000, examples=[1.5])
     q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000, examples=[1.5])
@@ -297,12 +297,15 @@ class RmsLimits(Section):
 
 
 class Arrival(Section):
-    """Deviations from the commanded profile at the end of the flight, after a first-order lag of 10 s."""
+    """Largest allowed deviations from the commanded flight path at the end of the flight, after a first-order
+    lag of 10 s."""
 
     altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
     airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
     heading_deg: Number | None = number(None, "deg", "heading", gt=0, le=180, examples=[5])
-    in_envelope: Flag | None = entry(None, "true: inside the validated envelope at the end; false: outside")
+    in_envelope: Flag | None = entry(
+        None, "true: the flight must end inside the validated envelope. false: it must end outside"
+    )
 
 
 def _one_or_list(given: Any) -> str:
@@ -313,28 +316,31 @@ Names = Annotated[tuple[Nameable, ...], Field(max_length=MOST_NAMES)]
 
 
 class Expect(Section):
-    """Conditions that the flight must meet; a condition that is left out is not checked.
+    """Conditions that the flight must meet. A condition that is left out is not checked.
 
-    detected_within_s: delay from fault to first alarm, s
+    detected_within_s: largest allowed time from the fault to the first alarm, s
     isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    unanticipated. A list: the names given in flight, withdrawn ones included, are exactly these, in the order
-    of the faults; a name given before its fault does not count
+    `unanticipated`. With a list, the diagnosis must give exactly these names, in the order of the faults.
+    Withdrawn names count, but a name given before its fault does not count
     isolated_type: fault type that the diagnosis must name
-    candidate_type: fault type that must be named or still possible
-    isolated_within_s: delay from fault to isolation, s
-    no_false_alarm: true: there must be no alarm without a fault; false: there must be one
-    no_departure: true: the aircraft must not be lost; false: it must be lost
-    pre_fault_rms_deg_s: largest RMS tracking error before the fault, or of the whole flight if there is none
-    post_fault_rms_deg_s: largest RMS tracking error after the fault
-    altitude_within_m: largest deviation from the commanded altitude, m
-    airspeed_within_mps: largest deviation from the commanded airspeed, after a first-order lag of 10 s, m/s
-    airspeed_within_limits_mps: the same deviation, but from the commanded airspeed limited to the airspeeds
-    that can be held after a fault, m/s
-    heading_within_deg: largest deviation from the commanded heading, from 30 s after each change of it on,
-    deg
-    stays_in_envelope: true: the flight must stay inside the validated envelope; false: it must leave it
-    arrives: largest deviations from the commanded profile at the end of the flight; a lost aircraft never
-    arrives
+    candidate_type: fault type that the diagnosis must name, or must not exclude
+    isolated_within_s: largest allowed time from the fault to the isolation, s
+    no_false_alarm: true: no alarm may be raised before a fault. false: such an alarm must be raised
+    no_departure: true: the aircraft must not be lost. false: the aircraft must be lost
+    pre_fault_rms_deg_s: largest allowed RMS tracking error before the fault. Without a fault the whole flight
+    counts
+    post_fault_rms_deg_s: largest allowed RMS tracking error after the fault
+    altitude_within_m: largest allowed deviation from the commanded altitude, m
+    airspeed_within_mps: largest allowed deviation from the commanded airspeed, after a first-order lag of 10
+    s, m/s
+    airspeed_within_limits_mps: largest allowed deviation from the commanded airspeed, limited to the
+    airspeeds that the aircraft can hold after a fault. The deviation has a first-order lag of 10 s, m/s
+    heading_within_deg: largest allowed deviation from the commanded heading. The first 30 s after each change
+    of the command do not count, deg
+    stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave
+    this envelope
+    arrives: largest allowed deviations from the commanded flight path at the end of the flight. A lost
+    aircraft does not meet this condition
     """
 
     detected_within_s: Number | None = number(None, "s", ge=0, le=360_000, examples=[0.5])
@@ -362,23 +368,24 @@ class Expect(Section):
 class Scenario(Section, title="beaver-ftc scenario"):
     """One flight: aircraft, manoeuvre, faults, diagnosis, control law and expectations.
 
-    name: name of the result folder: letters, digits, - and _
+    name: name of the result folder. It consists of letters, digits, - and _
     description: purpose of the flight
-    aircraft: built-in name, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER beside this file
+    aircraft: name of a built-in aircraft, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER for
+    an aircraft folder beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
-    substeps: JSBSim steps in each frame
+    substeps: number of JSBSim steps in each frame
     seed: seed of all random numbers of the flight
     initial: flight condition at the start, trimmed
     reference: commanded body rates
-    autopilot: flight path that outer loops follow; left out: only the body rates are controlled
+    autopilot: flight path that the outer loops follow; left out: only the body rates are controlled
     faults: faults of surfaces and sensors
-    uncertainty: how the truth differs from the design model
+    uncertainty: differences between the truth and the design model
     actuators: actuator dynamics
     sensors: measurement errors
     environment: wind, turbulence and gusts
-    fdi: fault detection and isolation
-    control: the control law
+    fdi: fault detection and isolation, i.e. the diagnosis
+    control: control law and its gains
     changes: changes of law, diagnosis and sensors in flight
     design_model: deliberate errors of the design model
     expect: conditions that the flight must meet

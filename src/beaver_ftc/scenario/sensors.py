@@ -38,11 +38,11 @@ NOISE_LIMIT_SIGMA = 4.0
 class _Sensor(Section):
     """measured = quantised((1 + scale_error) lagged(t - delay) + bias + noise); lost: the last one.
 
-    scale_error: relative error of the slope: a reading is multiplied by 1 + this; below 1 in
-    declared errors (`fdi.bounds.sensors`, `declared_sensors`), share of 1
+    scale_error: relative error of the slope: a reading is multiplied by 1 + scale_error. In declared errors
+    (`fdi.bounds.sensors`, `declared_sensors`) it must be below 1, share of 1
     delay_s: delay of the measurement, s
     bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
-    dropout_share: share of lost samples; each is replaced by the last sample before it, share of 1
+    dropout_share: share of lost samples. A lost sample is replaced by the sample before it, share of 1
     """
 
     # Keys of noise, bias and resolution, their unit, and that unit in SI.
@@ -123,10 +123,16 @@ class DynamicPressure(_Sensor):
 
 
 class AttitudeAngle(FlowVane):
-    """Roll, pitch or yaw angle: of a vertical or directional gyro, or of integrated rates, which drift."""
+    """Bank angle, pitch attitude or heading, from a vertical or directional gyro, or from integrated rates.
+    Integrated rates drift."""
 
     drift_deg_h: Number = number(
-        0.0, "deg/h", "growth of the error from the start on", ge=-3600, le=3600, examples=[10]
+        0.0,
+        "deg/h",
+        "growth of the error in each hour from the start of the flight",
+        ge=-3600,
+        le=3600,
+        examples=[10],
     )
 
     @property
@@ -152,7 +158,8 @@ class ManifoldGauge(_Sensor):
 
 @_reads("mps2", "m/s2", 100)
 class Accelerometer(_Sensor):
-    """Specific force along a body axis at the centre of mass: all forces except gravity, over the mass."""
+    """Specific force along a body axis at the centre of mass: the sum of all forces except gravity, divided
+    by the mass."""
 
 
 class Equal(NamedTuple):
@@ -320,8 +327,12 @@ class SensorFault(Section):
 
     sensor: SensorName
     at_s: Number = number(..., "s", "start of the fault", ge=0, le=360_000, examples=[12])
-    end_s: Number | None = number(None, "s", "end of the fault; left out: it stays", gt=0, examples=[20])
-    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt", examples=["abrupt"])
+    end_s: Number | None = number(
+        None, "s", "end of the fault; left out: the fault stays to the end of the flight", gt=0, examples=[20]
+    )
+    profile: Literal["abrupt"] = entry(
+        "abrupt", "time course of the fault. This fault type is always abrupt", examples=["abrupt"]
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -344,7 +355,12 @@ class SensorBias(SensorFault):
 
     type: Literal["bias"]
     magnitude: Number = number(
-        ..., "the sensor's unit", "added to the reading", ge=-5000, le=5000, examples=[2]
+        ...,
+        "the sensor's unit",
+        "constant error that is added to the reading",
+        ge=-5000,
+        le=5000,
+        examples=[2],
     )
 
 
@@ -375,7 +391,7 @@ class SensorFreeze(SensorFault):
 
 
 class SensorLost(SensorFault):
-    """There is no reading, and it is marked as missing."""
+    """The instrument gives no reading. The reading is marked as missing."""
 
     type: Literal["lost"]
 

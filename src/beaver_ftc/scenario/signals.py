@@ -132,7 +132,7 @@ class _Wave(_Window):
 
 
 class Sine(_Wave):
-    """The amplitude times sin(2 pi frequency tau + phase). Here tau is the time since start_s."""
+    """A sine: amplitude times sin(2 pi frequency tau + phase), with the time tau since start_s."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -145,7 +145,7 @@ class Sine(_Wave):
 
 
 class Doublet(Section):
-    """+amplitude for width_s, then -amplitude for width_s. The two changes of angle cancel."""
+    """Two pulses: +amplitude for width_s, then -amplitude for width_s. Their changes of angle cancel."""
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
@@ -159,7 +159,7 @@ class Doublet(Section):
 
 
 class Step(_Window):
-    """The amplitude from start_s to end_s."""
+    """A constant: the amplitude from start_s to end_s."""
 
     amplitude_deg_s: Number = _amplitude()
 
@@ -170,7 +170,8 @@ class Step(_Window):
 
 
 class Square(_Wave):
-    """+amplitude in the first half of each period, -amplitude in the second. The phase is that of `sine`."""
+    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. It has the
+    sign of the `sine` with the same frequency and phase."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -192,7 +193,7 @@ class _Closed(_Window):
 
 
 class Ramp(_Closed):
-    """A straight line from 0 at start_s to the amplitude at end_s. Then the amplitude is held."""
+    """A straight line from 0 at start_s to the amplitude at end_s. After end_s the amplitude is held."""
 
     amplitude_deg_s: Number = _amplitude()
 
@@ -219,16 +220,16 @@ class Chirp(_Closed):
 
 
 class Csv(Section):
-    """A table in a CSV file, with straight lines between its rows. Outside, the first and last values are
-    held.
+    """A table in a CSV file. Between two rows the rate is interpolated linearly. Before the first row and
+    after the last row it is constant.
 
-    The table is read when the scenario is loaded, and becomes a part of the scenario (`time_s`,
-    `values_deg_s`). The scenario in a result folder therefore needs no CSV file.
+    The table is read when the scenario is loaded. It becomes a part of the scenario, as `time_s` and
+    `values_deg_s`. The scenario in a result folder therefore needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
-    column: name of the column with the rates in deg/s; the column `t_s` has the times in s
-    time_s: times, usually read from the file, s
-    values_deg_s: rates, usually read from the file, deg/s
+    column: name of the column that contains the rates in deg/s. The column `t_s` contains the times in s
+    time_s: times of the rows. Usually they are read from the file, s
+    values_deg_s: rates of the rows. Usually they are read from the file, deg/s
     """
 
     model_config = ConfigDict(json_schema_extra={"required": ["file"]})
@@ -361,7 +362,7 @@ Signals = tuple[Signal, ...]
 
 
 class Reference(Section):
-    """Commanded body rates. The signals of an axis are summed. An axis without signals is 0."""
+    """Commanded body rates. All signals of an axis are added. The command of an axis without signals is 0."""
 
     p: Signals = entry((), "signals of the roll rate", max_length=50)
     q: Signals = entry((), "signals of the pitch rate", max_length=50)
@@ -405,8 +406,8 @@ class _Leg(Section):
     at_s: Number = number(0.0, "s", "time from which the leg applies", ge=0, le=_LATEST_S, examples=[10])
     hold: Flag = entry(
         False,
-        "true: keep the value that is commanded at this time, or if there is none, the value that the "
-        "aircraft has",
+        "true: hold the value that is commanded at this time. If no value is commanded, hold the present "
+        "value of the aircraft",
     )
     value: Number | None = None
 
@@ -420,14 +421,14 @@ class _Leg(Section):
 
 
 class AltitudeLeg(_Leg):
-    """A commanded altitude, to which the command moves at a steady rate of climb or descent."""
+    """A commanded altitude. The command moves to it at a constant rate of climb or descent."""
 
     value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000, examples=[1900])
     climb_mps: Number = number(2.5, "m/s", "rate of climb or descent of the command", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
-    """A commanded airspeed, to which the command moves at a steady acceleration."""
+    """A commanded airspeed. The command moves to it at a constant acceleration."""
 
     value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
     change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
@@ -476,13 +477,13 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The flight path. A channel that is left out is not controlled."""
+    """The flight path. A quantity that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
         "legs of the altitude"
     )
     airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
-        "legs of the true airspeed, which engine power holds, or pitch if there is no engine"
+        "legs of the true airspeed. Engine power holds it; without an engine, pitch holds it"
     )
     heading_deg: tuple[HeadingLeg, ...] = _legs("legs of the true heading")
     bank_deg: tuple[BankLeg, ...] = _legs("legs of the bank angle")

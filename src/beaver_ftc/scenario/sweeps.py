@@ -59,14 +59,14 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 
 class Variation(Section):
-    """How one key varies: a mapping with exactly one of these kinds.
+    """How one key varies. The mapping has exactly one of these kinds of variation.
 
-    uniform: [lowest, highest]; all values are equally likely
-    loguniform: [lowest, highest]; the logarithms of the values are equally likely
+    uniform: [lowest, highest]. All values between are equally likely
+    loguniform: [lowest, highest]. All logarithms between are equally likely
     normal: [mean, standard deviation]
-    within: [lowest, highest] of the drawn values of `normal`; only with `normal`
-    linspace: [first, last, count]; evenly spaced values, one after the other
-    choice: a list of values; all are equally likely
+    within: [lowest, highest] limits of the values of `normal`. Only with `normal`
+    linspace: [first, last, count]. This is a number `count` of evenly spaced values, which are flown in order
+    choice: list of values. All are equally likely
     """
 
     uniform: Span | None = number(None, "as the key", range="rising", examples=[[0.2, 0.8]])
@@ -124,13 +124,13 @@ class Variation(Section):
 
 
 class Level(Section):
-    """A limit for a rate that is estimated from the flights, or with `confidence` for its one-sided
-    confidence bound.
+    """A limit for a rate that is estimated from the flights. With `confidence` the limit applies to the
+    one-sided confidence bound of the rate.
 
     at_least: smallest allowed value
     at_most: largest allowed value
-    confidence: confidence of the bound that is compared with the limit; left out: the estimate itself is
-    compared
+    confidence: confidence of the one-sided bound that is compared with the limit; left out: the estimate is
+    compared with the limit
     """
 
     at_least: Number | None = entry(None, range="any", examples=[0.9])
@@ -150,7 +150,12 @@ class QuantileLevel(Level):
     """A limit for a quantile over the flights."""
 
     quantile: Number = number(
-        0.95, "share of 1", "the quantile; 0.5 is the median", gt=0, lt=1, needs={"at_most": 1}
+        0.95,
+        "share of 1",
+        "which quantile of the flights is compared with the limit. 0.5 is the median",
+        gt=0,
+        lt=1,
+        needs={"at_most": 1},
     )
 
 
@@ -163,19 +168,20 @@ class AxisLevels(Section):
 
 
 class SweepExpect(Section):
-    """Conditions on the statistics of a sweep; a condition that is left out is not checked.
+    """Conditions on the statistics of a sweep. A condition that is left out is not checked.
 
-    detection_rate: share of faults that were detected
+    detection_rate: share of the faults that were detected
     isolation_rate: share of faults that were named correctly
     false_alarms_per_hour: number of false alarms per hour without a fault
     departure_rate: share of flights in which the aircraft was lost
     failure_rate: share of flights that could not be flown
     pass_rate: share of flights that met every expectation of the base scenario
-    detection_delay_s: time from fault to alarm; a missed fault counts as infinite
-    isolation_delay_s: time from fault to the correct name; a missing or wrong name counts as infinite
-    post_fault_rms_deg_s: RMS tracking error after the fault; for a lost aircraft it counts as infinite
-    tracking_ratio: RMS tracking error after the fault, divided by that before it; for a lost aircraft it
-    counts     as infinite
+    detection_delay_s: time from the fault to the alarm. For a missed fault this time counts as infinite
+    isolation_delay_s: time from the fault to the correct name. For a missing or wrong name this time counts
+    as infinite
+    post_fault_rms_deg_s: RMS tracking error after the fault. For a lost aircraft it counts as infinite
+    tracking_ratio: RMS tracking error after the fault, divided by the RMS tracking error before the fault.
+    For a lost aircraft it counts as infinite
     """
 
     detection_rate: Level | None = number(None, "share of 1")
@@ -193,14 +199,17 @@ class SweepExpect(Section):
 class SweepFile(Section, title="beaver-ftc sweep"):
     """Many flights: a base scenario, the keys that vary, and the conditions that the statistics must meet.
 
-    name: name of the result folder: letters, digits, - and _
+    name: name of the result folder. It consists of letters, digits, - and _
     description: purpose of the sweep
-    base: name of a built-in scenario, a scenario file beside this one, or a scenario itself
-    set: keys of the base, written with dots, with new values for all flights
+    base: scenario that is varied: a built-in name, a scenario file beside this file, or the keys of a
+    scenario
+    set: new values of keys of the base, for all flights. A key is written with dots, e.g.
+    `initial.airspeed_mps`
     runs: number of flights; left out: one flight for each point of the grid
     seed: seed of the drawn values and of the flights
-    sampling: how values are drawn; `linspace` is never drawn
-    vary: keys of the base, written with dots, each with the way in which it varies
+    sampling: how the values of a key are chosen: at random, every point of a grid, by a Latin hypercube or by
+    a Sobol sequence. `linspace` always takes its values in order
+    vary: keys of the base that vary, written with dots, and how each key varies
     expect: conditions that the statistics must meet
     """
 

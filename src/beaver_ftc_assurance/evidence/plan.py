@@ -66,19 +66,21 @@ class OfSweep(SweepExpect):
 
 
 class OfHandling(Section):
-    """Required level of handling qualities in MIL-F-8785C, in trim or after the failure of the scenario."""
+    """Required level of handling qualities by MIL-F-8785C: in trim, or after the fault of the scenario."""
 
     type: Literal["handling_qualities"]
-    level: Whole = number(1, "1", "worst level that is allowed; 1 is the best", ge=1, le=3)
+    level: Whole = number(1, "1", "worst allowed level. 1 is the best level", ge=1, le=3)
 
 
 class OfMargins(Section):
-    """Required stability margins of the loop of each surface: healthy, and after each loss for which the
-    default law is     designed."""
+    """Required stability margins of the loop of each surface. They must hold for the healthy aircraft, and
+    after each loss for which the default law is designed."""
 
     type: Literal["margins"]
-    gain_db: Number = number(6.0, "dB", "gain margin, upwards and downwards", ge=0, le=100)
-    phase_deg: Number = number(45.0, "deg", "phase margin", ge=0, le=180)
+    gain_db: Number = number(
+        6.0, "dB", "smallest allowed gain margin, for larger and for smaller gains", ge=0, le=100
+    )
+    phase_deg: Number = number(45.0, "deg", "smallest allowed phase margin", ge=0, le=180)
 
 
 Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
@@ -90,10 +92,10 @@ class Requirement(Section):
     id: name of the requirement: letters, digits, - and _
     text: the requirement in words
     clause: clause of a regulation or standard, and how it is interpreted
-    over: flights of the requirement: names of `flights`, names of built-in scenarios and sweeps, or files in
-    the     folder of the plan or below it
-    expect: conditions that each flight must meet, as in a scenario's `expect`
-    formula: formula of signal temporal logic over columns of the log, which must be true in each flight
+    over: flights that the requirement is about: names from `flights`, names of built-in scenarios and sweeps,
+    or files in the folder of the plan or below it
+    expect: conditions that each flight must meet, as in the `expect` of a scenario
+    formula: formula of signal temporal logic over columns of the log. It must be true in each flight
     bar: limit for the result of a study
     """
 

@@ -1,7 +1,7 @@
 """The keys of scenario, sweep, plan, aircraft and vehicle files: each as the schema has it that loads it."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import yaml
@@ -29,39 +29,89 @@ class Kind(NamedTuple):
     says: str
     next: str
     more: Callable[[], Iterator[str]] = lambda: iter(())
+    links: Mapping[str, str] = {}  # path of a section -> link to the page that explains it
 
 
 def page(kind: Kind) -> str:
     """The page of a kind of file."""
-    parts = (_section(section) for section in Sections(kind.schema()))
+    sections = list(Sections(kind.schema()))
+    more = list(kind.more())
+    headings = [part.removeprefix("## ") for part in more if part.startswith("## ")]
+    parts = (_section(section, number, kind.links) for number, section in enumerate(sections, 2))
+    captioned = _captioned(more, len(sections) + 2)
     return (
-        "\n\n".join([f"# {kind.title}", kind.says, _READ, *parts, *kind.more(), f"## Next\n\n{kind.next}"])
+        "\n\n".join(
+            [
+                f"# {kind.title}", kind.says, _READ, _contents(sections, headings), *parts, *captioned,
+                f"## Next\n\n{kind.next}",
+            ]
+        )
         + "\n"
-    )
+    )  # fmt: skip
 
 
-_READ = """The file is YAML. Each section of the file has a table below, with a row for each key:
+_READ = """## How to read a table
 
-- *what it is*: meaning of the key. Text after "left out:" says what applies if the key is not in the file.
+The file is YAML. Each section of the file has a table below, with a row for each key:
+
+- *what it is*: meaning of the key. Text after "left out:" states the effect if the key is not in the file.
 - *type*: kind of value. A link leads to the table of a section below this key. A mapping of names to
   numbers is written `{aileron: 0.1, rudder: 0.2}`.
-- *unit*: unit of a number. 1 is a pure number; a share of 1 is a fraction, so that 0.4 is 40 %.
+- *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction, so that 0.4 is 40 %.
 - *range*: allowed values. A key of the type "choice" has one of the listed values.
-- *default*: value if the key is not in the file. "required": the key must be in the file; "left out": there
-  is no value; "none": empty; "see section": the keys of the section have their own defaults.
+- *default*: value if the key is not in the file. "required": the key must be in the file. "left out": there
+  is no value. "none": the value is empty. "see section": the keys of the section have their own defaults.
 - *example*: the key with a value that is accepted.
 
-In a heading, `[]` is an item of a list, and `NAME` is a name that you choose or that the aircraft has."""
+In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose, or that the
+aircraft has. The [glossary](reference/glossary.md) explains the terms, and the
+[nomenclature](reference/nomenclature.md) explains symbols, axes and signs."""
+_CONTENTS = "*Table 1. The sections of the file, by their key at the top of the file.*"
 
 
-def _section(section: Section) -> str:
+def _contents(sections: Iterable[Section], headings: Iterable[str]) -> str:
+    """A row for each key at the top of the file, with links to its section and to the sections below it."""
+    rows: dict[str, list[str]] = {}
+    for section in sections:
+        path = section.places[0].path
+        top = path[0] if path else ""
+        rows.setdefault(top, []).append(f"[{_heading(section)}](#{_anchor(section.title)})")
+    links = [(f"`{top}`" if top else "top of the file", ", ".join(of)) for top, of in rows.items()]
+    links += [("names", f"[{heading}](#{_slug(heading)})") for heading in headings]
+    return f"## Contents\n\n{_CONTENTS}\n\n{markdown_table(('key', 'sections'), links)}"
+
+
+def _slug(heading: str) -> str:
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+
+
+def _captioned(parts: Iterable[str], number: int) -> Iterator[str]:
+    """The parts, with a caption above each table."""
+    for part in parts:
+        if part.startswith("|"):
+            first, second, *_ = part.split("\n")[0].strip("| ").split(" | ")
+            shown = {"option": f"Options of each {first}", "part": "Values of each preset"}
+            yield f"*Table {number}. {shown.get(second, f'Names of each {first}, and what it does')}.*"
+            number += 1
+        yield part
+
+
+def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
     parts = [f'<a id="{_anchor(section.title)}"></a>\n\n## {_heading(section)}']
     if elsewhere := _elsewhere(section):
         parts.append(f"The same keys are also allowed {elsewhere}.")
     if section.says:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
+    if page := links.get(dotted(section.places[0].path)):
+        parts.append(f"More: {page}.")
+    parts.append(f"*Table {number}. Keys of {_called_file(section)}.*")
     parts.append(markdown_table(HEAD, [_row(key, section.places) for key in section.keys]))
     return "\n\n".join(parts)
+
+
+def _called_file(section: Section) -> str:
+    heading = _heading(section)
+    return "the top of the file" if heading == "The file" else heading
 
 
 def _anchor(title: str) -> str:
@@ -201,18 +251,20 @@ def _of_scenarios() -> Iterator[str]:
         yield f"## {what.capitalize()}, and their `{where}.options`"
         yield f"`{where}.{what[:-1]}` has one of these names, and `{where}.options` sets the options below."
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
-        yield markdown_table((what, "what it is"), [(f"`{one.name}`", one.description()) for one in entries])
+        yield markdown_table(
+            (what[:-1], "what it is"), [(f"`{one.name}`", one.description()) for one in entries]
+        )
         rows = [
             (f"`{one.name}`", f"`{name}`", _option_range(of), f"`{of['default']:g}`", of["says"])
             for one in entries
             for name, of in options_of(group, one.name).items()
         ]
-        yield markdown_table(("of", "option", "range", "default", "what it is"), rows)
+        yield markdown_table((what[:-1], "option", "range", "default", "what it is"), rows)
     for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
         yield f"## Presets of `{what}`"
         yield f"A preset is a name for these values: `{what}: NAME` replaces the section with the values."
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
-        yield markdown_table(("preset", "of", "values"), rows)
+        yield markdown_table(("preset", "part", "values"), rows)
 
 
 def _option_range(of: Mapping[str, Any]) -> str:
@@ -235,28 +287,55 @@ _AS_SCHEMA = (
     "`beaver-ftc schema{}` prints the same keys as JSON Schema, "
     "with which an editor completes and checks the file."
 )
+_SCENARIOS = "reference/scenarios.md"
+_LINKS = {
+    "reference": f"[reference signals]({_SCENARIOS}#reference-signals)",
+    "autopilot": f"[flight path]({_SCENARIOS}#flight-path), [outer loops](explanation/laws.md#outer-loops)",
+    "faults[]": f"[faults]({_SCENARIOS}#faults), [fault types](explanation/fault-types.md)",
+    "uncertainty": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
+    "actuators": f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)",
+    "sensors": f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)",
+    "environment": f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)",
+    "fdi": "[detection](explanation/detection.md), [isolation](explanation/isolation.md), "
+    "[sensor monitor](explanation/instruments.md)",
+    "fdi.probing": "[active probing](explanation/fault-types.md#active-probing)",
+    "fdi.statistical": "[statistical detector](explanation/statistical.md)",
+    "fdi.bounds": "[bound on the model error](explanation/detection.md#the-bound-on-the-model-error), "
+    "[declare errors](how-to/declare-errors.md)",
+    "fdi.sharpen": "[bank of poles](explanation/detection.md#a-bank-of-poles), "
+    "[isolation tests](explanation/isolation.md)",
+    "control": "[control laws](explanation/laws.md)",
+    "control.power": "[if elevator and flap are both lost]"
+    "(explanation/laws.md#if-elevator-and-flap-are-both-lost)",
+    "changes[]": f"[changes in flight]({_SCENARIOS}#changes-in-flight)",
+    "design_model": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
+    "expect": f"[expectations]({_SCENARIOS}#expectations)",
+}
 KINDS = {
     "scenario-keys": Kind(
         json_schema,
         "Scenario keys",
-        "Which keys can a scenario file have? Use this page to look up a key. "
-        "[Scenarios](reference/scenarios.md) "
+        "Which keys can a scenario file have? This page lists every key, for readers who write or read a "
+        "scenario. [Scenarios](reference/scenarios.md) "
         f"explains the sections with examples. {_AS_SCHEMA.format('')}",
         "[Sweep keys](reference/sweep-keys.md) has the keys of a file with many flights, and "
         "[columns](reference/columns.md) the results of a flight.",
         _of_scenarios,
+        _LINKS,
     ),
     "sweep-keys": Kind(
         sweep_json_schema,
         "Sweep keys",
-        "Which keys can a sweep file have? A sweep flies one scenario many times with varied values "
+        "Which keys can a sweep file have? This page lists every key, for readers who write a sweep. "
+        "A sweep flies one scenario many times with varied values "
         f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
         "[Results of a sweep](reference/sweep-results.md) has the files and statistics that a sweep writes.",
     ),
     "plan-keys": Kind(
         plan_json_schema,
         "Plan keys",
-        "Which keys can a plan of evidence have? A plan lists requirements and the flights that test them "
+        "Which keys can a plan of evidence have? This page lists every key, for readers who show that "
+        "requirements are met. A plan lists requirements and the flights that test them "
         f"([how to write one](how-to/evidence.md)). {_AS_SCHEMA.format(' --plan')}",
         "[Write evidence](how-to/evidence.md) explains the verdicts of a plan with an example.",
     ),
@@ -264,15 +343,16 @@ KINDS = {
         AircraftFile.model_json_schema,
         "Aircraft file keys",
         "Which keys can an `aircraft.yaml` have? The file describes an aircraft for diagnosis and law: "
-        "its surfaces, mass, the terms of the design model, and limits. `derive` writes it "
-        "([your own aircraft](tutorials/own-aircraft.md)); look up a key here to read or change it.",
+        "its surfaces, mass, the terms of the design model, and limits. `derive` writes the file "
+        "([your own aircraft](tutorials/own-aircraft.md)). This page is for readers who read or change it.",
         "[Derived aircraft](explanation/derived-aircraft.md) explains how terms and errors are found.",
     ),
     "vehicle-keys": Kind(
         Vehicle.model_json_schema,
         "Vehicle file keys",
-        "Which keys can a vehicle file have? The file says which column of a flight log is which quantity "
-        "([prepare a log](how-to/flight-logs.md)). `identify --check` proposes a first version of it.",
+        "Which keys can a vehicle file have? The file states which column of a flight log contains which "
+        "quantity ([prepare a log](how-to/flight-logs.md)). `identify --check` proposes a first version. "
+        "This page is for readers who complete this version.",
         "[Diagnose a flight log](tutorials/flight-log.md) uses such a file.",
     ),
 }

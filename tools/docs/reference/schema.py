@@ -49,7 +49,7 @@ class Key:
     @property
     def says(self) -> str:
         """What it means."""
-        kind = "name of the type" if self.name == "type" else ""
+        kind = "name of this type" if self.name == "type" else ""
         return next((one["description"] for one in (self.node, *self.forms) if "description" in one), kind)
 
     @property

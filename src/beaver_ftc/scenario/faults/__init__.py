@@ -76,7 +76,9 @@ class SurfaceFault(Section):
         profile: str
 
     at_s: Number = number(..., "s", "start of the fault", ge=0, le=360_000, examples=[12])
-    end_s: Number | None = number(None, "s", "end of the fault; left out: it stays", gt=0, examples=[20])
+    end_s: Number | None = number(
+        None, "s", "end of the fault; left out: the fault stays to the end of the flight", gt=0, examples=[20]
+    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -107,7 +109,9 @@ class SurfaceFault(Section):
 class Switched(SurfaceFault):
     """A fault that is either there or not: a jam does not grow."""
 
-    profile: Literal["abrupt"] = entry("abrupt", "this type of fault is always abrupt", examples=["abrupt"])
+    profile: Literal["abrupt"] = entry(
+        "abrupt", "time course of the fault. This fault type is always abrupt", examples=["abrupt"]
+    )
 
 
 class Gradual(SurfaceFault):
@@ -115,14 +119,15 @@ class Gradual(SurfaceFault):
 
     profile: Literal["abrupt", "incipient"] = entry(
         "abrupt",
-        "`abrupt`: the full size at once; `incipient`: the size grows as 1 - exp(-kappa (t - at_s))",
+        "time course of the fault. `abrupt`: the full size at once. `incipient`: the size grows as 1 - "
+        "exp(-kappa (t - at_s)), where kappa is `kappa_per_s`",
         needs={"kappa_per_s": 2},
         examples=["incipient"],
     )
     kappa_per_s: Number | None = number(
         None,
         "1/s",
-        "growth rate of an incipient fault",
+        "growth rate kappa of an incipient fault",
         gt=0,
         le=1000,
         needs={"profile": "incipient"},
@@ -211,7 +216,8 @@ class Stuck(Switched):
     """The surface jams.
 
     actuator: surface that fails
-    position_deg: position of the jam, between the stops; left out: the present position, deg
+    position_deg: position at which the surface jams, between its stops; left out: the position at the start
+    of the fault, deg
     """
 
     properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"
@@ -252,14 +258,14 @@ class Hardover(Switched):
 
     type: Literal["hardover"]
     actuator: Actuator = entry(..., "surface that fails")
-    direction: Literal[1, -1] = entry(1, "stop to which the surface runs; 1: upper, -1: lower")
+    direction: Literal[1, -1] = entry(1, "stop to which the surface runs. 1: upper stop. -1: lower stop")
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["hardover"] = float(self.direction)
 
 
 class Float(Switched):
-    """The surface trails in the airflow and gives no moment."""
+    """The surface floats freely in the airflow and gives no moment."""
 
     properties, holds, adds = (("float", 0.0),), "float", False
     examples = (("float", {}),)
@@ -292,7 +298,7 @@ class Bias(Gradual):
 
 
 class RateLimit(Gradual):
-    """The surface moves slowly."""
+    """The surface moves more slowly: its rate limit is multiplied by `scale`."""
 
     properties = (("rate-scale", 1.0),)
     in_words = growing(scale=lambda value: f"{100 * value:g} % of its rate")
@@ -344,7 +350,7 @@ class Unanticipated(Gradual):
 
     type: Literal["unanticipated"]
     Cm_alpha3: Number = number(
-        10.0, "1/rad^3", "coefficient of alpha^3 in Cm; in the study 10", ge=-1000, le=1000
+        10.0, "1/rad^3", "coefficient of alpha^3 in Cm. The published study has 10", ge=-1000, le=1000
     )
 
     def strike(self, of: Properties, share: float, past: Past) -> None:

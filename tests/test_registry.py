@@ -112,6 +112,15 @@ def test_what_cannot_be_made():
             plugins.made(LAWS, name)
 
 
+def test_what_cannot_be_made_is_said_in_one_line(monkeypatch):
+    def refuse():
+        raise ValueError("two\n   lines")
+
+    monkeypatch.setattr(plugins, "plugin_class", lambda group, name: refuse)
+    with pytest.raises(BadInput, match=r"^plug-in mine: cannot be made: ValueError: two lines$"):
+        plugins.made(LAWS, "mine")
+
+
 def test_a_broken_one_says_so_where_it_is_listed():
     entry = Registered(LAWS, "gone", "nowhere:Gone", "a-package")
     assert entry.description() == "broken: plug-in gone: not registered" + plugins.suggestion(

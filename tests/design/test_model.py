@@ -179,3 +179,12 @@ def test_acceleration_is_f_plus_G_u():
     f, G, u, found = rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=4), np.zeros(3)
     model.acceleration(f, G, u, found)
     assert found == pytest.approx(f + G @ u, rel=1e-12)
+
+
+def test_as_many_monomials_as_there_is_room_for():
+    """The first is 1; each is one factor longer than an earlier one, and stands once."""
+    assert model._chain([(3, 1, 4), (3, 1), (2,), (3, 5)]) == [(), (3,), (3, 1), (3, 1, 4), (2,), (3, 5)]
+    singles = [(i,) for i in range(MAX_MONOMIALS)]
+    assert model._chain(singles[:-1]) == [(), *singles[:-1]]
+    with pytest.raises(ValueError, match=f"{MAX_MONOMIALS + 1} monomials, allowed: at most {MAX_MONOMIALS}"):
+        model._chain(singles)

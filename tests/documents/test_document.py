@@ -94,6 +94,7 @@ MALFORMED = {
     "local tag": ("a: !x 1", "is not read"),
     "merge key": ("a: &a {x: 1}\nb: {<<: *a}", "merge keys"),
     "two documents": ("a: 1\n---\nb: 2", "second document"),
+    "two numbers": ("1\n---\n2", "second document"),
     "key that is a list": ("? [a, b]\n: 1", "not plain text"),
     "tab": ("a:\n\t- 1", "tab"),
     "open bracket": ("a: [1, 2", "is not YAML"),

@@ -321,3 +321,34 @@ def test_the_command_surveys_what_was_asked_and_shows_one_surface_or_all(monkeyp
     assert asked[0][-1] == progress.append
     with pytest.raises(BadInput, match=r"^--surface 'flap': allowed: aileron, elevator, rudder$"):
         found(surface="flap")
+
+
+def test_the_summary_counts_places_and_spans_the_magnitudes():
+    """In no order of size; of the fault and excitation of the line alone."""
+    found = [("flap", 0.5, 0.4, 0.35), ("flap", 0.5, 0.7, None), ("flap", 2.0, 0.1, 0.05),
+             ("flap", 0.5, None, 0.2), ("flap", 0.5, 0.3, 0.25), ("rudder", 0.5, None, 0.9)]  # fmt: skip
+    keys = ("fault", "excitation", "isolated", "isolated_median")
+    rows = [dict(zip(keys, values, strict=True)) for values in found]
+    assert detectability._summary(rows) == [
+        ("flap", "0.5", "3 of 4", "0.30 - 0.70", "3 of 4", "0.20 - 0.35"),
+        ("flap", "2", "1 of 1", "0.10 - 0.10", "1 of 1", "0.05 - 0.05"),
+        ("rudder", "0.5", "0 of 1", "-", "1 of 1", "0.90 - 0.90"),
+        ("rudder", "2", "0 of 0", "-", "0 of 0", "-"),
+    ]
+
+
+def test_the_answers_or_tables_with_what_is_alike_and_the_engines(monkeypatch):
+    monkeypatch.setattr(detectability, "text", lambda *of: f"text of {of}")
+    monkeypatch.setattr(detectability, "geometry", lambda alike: [f"geometry of {alike}"])
+    command = detectability.Detectability("fault-free")
+    document = {"points": [1], "pairs": [2], "alike": 3, "folder": "folder"}
+    shown = ["text of ([1], [2])", "geometry of 3"]
+    assert command.as_text(document, False).splitlines() == [*shown, "folder"]
+    engine = {"engine": "left", "turns_rad_s2": [0.1, 0.25, 0.2], "shows": 3.14, "known": True, "held": False}
+    says = (
+        "left failed to idle accelerates the aircraft by 0.25 rad/s2, 3.1 times the detection limit of one "
+        "frame; the design model knows its moment"
+    )
+    assert command.as_text(document | {"engines": [engine]}, False).splitlines() == [*shown, says, "folder"]
+    answered = command.as_text(document | {"answers": ["one", "two"]}, False)
+    assert answered == "\n".join(["one", "two", detectability.POINTER])

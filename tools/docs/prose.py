@@ -1,5 +1,5 @@
-"""How pages are written: tables have captions, symbols are in the nomenclature, sentences have verbs,
-a page ends with the next step, and tutorials and how-to pages are short.
+"""How pages are written: tables have captions, symbols are in the nomenclature, sentences have verbs, and a
+page ends with the next step.
 
 A page that is older than a rule may break it as often as `prose.yaml` says, and no more often.
 """
@@ -17,12 +17,10 @@ from tools.docs.pages import ROOT, Finding, is_generated
 ALLOWED = Path(__file__).with_name("prose.yaml")
 VERBS = Path(__file__).with_name("verbs.txt")
 NOMENCLATURE = ROOT / "docs/reference/nomenclature.md"
-CAPTION, SYMBOL, VERB, NEXT, LENGTH = "caption", "symbol", "verb", "next", "length"
-LONGEST_WORDS = {"docs/tutorials/": 1500, "docs/how-to/": 900}  # one sitting; one question
+CAPTION, SYMBOL, VERB, NEXT = "caption", "symbol", "verb", "next"
 _HOME = ("README.md", "docs/README.md")  # they are the way to all pages
 _FENCE = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!--.*?-->", re.DOTALL)
-_PRINTED = re.compile(r"<!-- printed: .*?<!-- /printed -->", re.DOTALL)
 _RULE = re.compile(r"^\|(?: ?:?-+:? ?\|)+$")
 _MATHS = re.compile(r"\$\$(.+?)\$\$|(?<!\$)\$([^$\n]+?)\$(?!\$)", re.DOTALL)
 _WORDS_IN_MATHS = re.compile(r"\\(?:text|mathrm|begin|end|operatorname|tag)\{[^}]*\}|`[^`]*`")
@@ -77,21 +75,12 @@ def faults(name: str, text: str) -> Iterator[tuple[str, int, str]]:
     yield from _tables(bare)
     yield from _symbols(bare)
     yield from _verbless(bare)
-    yield from _too_long(name, text)
     if name.startswith("docs/") and name not in _HOME and not _names_a_next_step(bare):
         yield (
             NEXT,
             bare.count("\n"),
             "the page names no next step, allowed: a last section `## Next` with a link",
         )
-
-
-def _too_long(name: str, text: str) -> Iterator[tuple[str, int, str]]:
-    """A page with more words than its folder allows. What is printed does not count."""
-    words = len(_MARK.sub("", _PRINTED.sub("", text)).split())
-    for folder, most in LONGEST_WORDS.items():
-        if name.startswith(folder) and words > most:
-            yield LENGTH, 1, f"{words} words, allowed: {most}"
 
 
 def _blank(found: re.Match[str]) -> str:

@@ -72,7 +72,7 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
 def identified(flights: list[Samples], vehicle: Vehicle) -> Model:
     """The model of flights, with its threshold."""
     stretches = fitting.usable_stretches(flights)
-    return fitting.add_validity_range(stretches, fitting.fit_model(stretches, vehicle))
+    return fitting.add_fitted_ranges_and_alarm_threshold(stretches, fitting.fit_model(stretches, vehicle))
 
 
 def begun(faulty: np.ndarray) -> int:
@@ -88,7 +88,7 @@ def alfa(folder: Path) -> list[list[str]]:
     for one in load_flights_for_fit(sorted({*folder.iterdir()} - {*healthy}), vehicle):
         said, begins = diagnose(one, model), min(event.t_s for event in one.logged_failures)
         after = (said.t_s >= begins) & (said.faulty == 1)
-        names, count = np.unique(said.named_surfaces[after].astype(str), return_counts=True)
+        names, count = np.unique(said.isolated_surfaces[after].astype(str), return_counts=True)
         shares = [f"{name} {part / after.sum():.2f}" for name, part in zip(names, count, strict=True)]
         delay = f"{said.t_s[after][0] - begins:.1f}" if after.any() else "never"
         failed = "+".join(sorted({event.surface for event in one.logged_failures}))

@@ -224,7 +224,7 @@ def told(log: Log, noise: dict[bool, Whitener]) -> bool:
 def by_model(log: Log, model: Model) -> Said:
     """As `diagnose --model`."""
     rows = diagnose(resample(read_for_vehicle(log.path, model.vehicle), model.vehicle), model)
-    names, count = np.unique(rows.named_surfaces[rows.faulty == 1].astype(str), return_counts=True)
+    names, count = np.unique(rows.isolated_surfaces[rows.faulty == 1].astype(str), return_counts=True)
     return rows, str(names[count.argmax()]) if len(names) else None
 
 
@@ -242,7 +242,7 @@ def judged(by: str, log: Log, said_of: Said) -> Document:
     held = (rows.effectiveness_low <= truth + 1e-9) & (truth <= rows.effectiveness_high + 1e-9)
     lost = said & (truth < 1.0)
     alarmed = rows.t_s[rows.faulty == 1]
-    named = {str(name) for name in rows.named_surfaces[rows.faulty == 1]} - {
+    named = {str(name) for name in rows.isolated_surfaces[rows.faulty == 1]} - {
         "unknown",
         "unanticipated",
         "engine",

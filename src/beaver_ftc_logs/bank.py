@@ -61,7 +61,7 @@ class HypothesisBank(NamedTuple):
         return len(self.hypothesis_kind) - 1
 
     @property
-    def is_fault(self) -> np.ndarray:
+    def is_fault_hypothesis(self) -> np.ndarray:
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
         return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
 
@@ -251,18 +251,18 @@ class ResidualNoise(NamedTuple):
 
     intercept_rad_s (3,): of the model; covariance (3, 3) of a sample, (rad/s)2; effective_sample_share:
     information of a residual over that of a white one; degrees_of_freedom: of its t distribution;
-    memory_samples, min_scale, max_scale: memory and limits of the running scale of the covariance;
-    max_squared_residual: squared standardised residual above which a sample carries no more information;
-    covariance_inflation: the covariance over that of the residuals.
+    memory_samples, min_variance_scale, max_variance_scale: memory and limits of the running scale of the
+    covariance; max_squared_residual: squared standardised residual above which a sample carries no more
+    information; covariance_inflation: the covariance over that of the residuals.
     """
 
     intercept_rad_s: Floats
     covariance: Floats
     effective_sample_share: float
     degrees_of_freedom: float
-    memory_samples: float
-    min_scale: float
-    max_scale: float
+    scale_memory_samples: float
+    min_variance_scale: float
+    max_variance_scale: float
     max_squared_residual: float
     covariance_inflation: float
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Mask = NDArray[np.bool_]
 
 _MAX_LOG_RATE_HZ, _MIN_LOG_RATE_HZ = 1000.0, 20.0
-_MAX_STEP_JITTER = 0.1
+_MAX_RELATIVE_STEP_JITTER = 0.1
 _MIN_STRETCH_SAMPLES = 50
 _AIR_DENSITY_LIMITS_KG_M3 = (0.2, 1.6)
 _MAX_COMMAND_TRAVEL_RATIO = 1.1
@@ -72,60 +72,64 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
 
 
 @dataclass(frozen=True)
-class AircraftInputs:
-    """Inputs of the diagnosis from a log: as `stepped.inputs_of`; the mean age of what is held, s; and begin
-    and end of each stretch that is diagnosed in one."""
+class AircraftDiagnosisInputs:
+    """Inputs of the diagnosis from a log: as `stepped.log_input_columns`; the mean age of what is held, s;
+    and begin and end of each stretch that is diagnosed in one."""
 
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
     diagnosis_inputs: list[Floats]
     held_column_mean_age_s: dict[str, float]
-    is_missing: Mask
+    has_missing_value: Mask
     stretches: list[tuple[int, int]]
 
 
 def read_diagnosis_inputs(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
-) -> AircraftInputs:
+    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
+) -> AircraftDiagnosisInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    _check_log_has_inputs(recording, vehicle, diagnosed.aircraft)
+    _check_log_has_inputs(recording, vehicle, diagnosed_aircraft.aircraft)
     samples = resample(
         recording,
         vehicle.model_copy(update={"max_rate_hz": _MAX_LOG_RATE_HZ, "reference_airspeed_mps": None}),
     )
     rate_hz = _log_rate_hz(samples)
-    diagnosis = Diagnosis(diagnosed.aircraft, rate_hz, **diagnosed.declared_errors)
+    diagnosis = Diagnosis(diagnosed_aircraft.aircraft, rate_hz, **diagnosed_aircraft.declared_errors)
     needs_attitude = diagnosis.declared.air.moves
-    inputs, mean_age_s = _read_sample_inputs(samples, recording, vehicle, diagnosed.aircraft, needs_attitude)
-    _check_units_plausible(samples.name, inputs, diagnosed.aircraft)
-    is_missing = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
-    stretches = _gap_free_stretches(samples, is_missing, rate_hz)
+    inputs, mean_age_s = _read_sample_inputs(
+        samples, recording, vehicle, diagnosed_aircraft.aircraft, needs_attitude
+    )
+    _check_units_plausible(samples.name, inputs, diagnosed_aircraft.aircraft)
+    has_missing_value = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
+    stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
     if not stretches:
         raise BadInput(
             f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
             "missing number, allowed: all signals logged at one rate of "
             f"{_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
         )
-    surface_indices = _vehicle_surface_indices(vehicle, diagnosed.aircraft)
+    surface_indices = _vehicle_surface_indices(vehicle, diagnosed_aircraft.aircraft)
     samples = replace(
         samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
     )
-    return AircraftInputs(samples, diagnosis, rate_hz, inputs, mean_age_s, is_missing, stretches)
+    return AircraftDiagnosisInputs(
+        samples, diagnosis, rate_hz, inputs, mean_age_s, has_missing_value, stretches
+    )
 
 
 def diagnose_with_aircraft_model(
-    recording: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
+    recording: RecordedFlight, vehicle: Vehicle, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[Samples, DiagnosisRows, Document]:
     """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed)
-    return aircraft_inputs.samples, *diagnose_inputs(aircraft_inputs, diagnosed)
+    aircraft_inputs = read_diagnosis_inputs(recording, vehicle, diagnosed_aircraft)
+    return aircraft_inputs.samples, *diagnose_inputs(aircraft_inputs, diagnosed_aircraft)
 
 
 def diagnose_inputs(
-    aircraft_inputs: AircraftInputs, diagnosed: DiagnosedAircraft
+    aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
     samples, diagnosis, inputs, stretches, stretch_verdicts = (
@@ -141,16 +145,18 @@ def diagnose_inputs(
             replay_samples(diagnosis, [values[begin:end] for values in inputs], aircraft_inputs.rate_hz)
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(samples.name, diagnosed.aircraft, stretch_verdicts)
+        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, stretch_verdicts)
     replayed = _join_stretch_diagnoses(
-        len(samples.t_s), len(diagnosed.aircraft.surfaces), stretches, stretch_verdicts
+        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), stretches, stretch_verdicts
     )
-    rows = rows_of_replay(samples.t_s, replayed, diagnosed.aircraft.surfaces, diagnosis.config)
+    rows = rows_of_replay(samples.t_s, replayed, diagnosed_aircraft.aircraft.surfaces, diagnosis.config)
     reasons = _rows_outside_envelope(
-        inputs[1], diagnosed.aircraft, aircraft_inputs.is_missing, stretches
+        inputs[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, stretches
     ) | _rows_unexplained_from_start(samples.t_s, stretches, replayed)
     rows = rows.without_verdict(_add_rows_after_doubtful_alarm(stretches, rows, reasons))
-    return rows, _verdict_document(samples, rows, replayed, diagnosed, aircraft_inputs.held_column_mean_age_s)
+    return rows, _verdict_document(
+        samples, rows, replayed, diagnosed_aircraft, aircraft_inputs.held_column_mean_age_s
+    )
 
 
 def _check_command_signs(
@@ -158,7 +164,9 @@ def _check_command_signs(
 ) -> None:
     """Raise BadInput where the rates answer a command the other way round in all of a stretch."""
     for surface, gain in zip(
-        aircraft.surfaces, np.min([one.max_command_gains for one in stretch_verdicts], axis=0), strict=True
+        aircraft.surfaces,
+        np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0),
+        strict=True,
     ):
         if gain < trust.MAX_REVERSED_GAIN:
             says = f"the rates answer the command of {surface} the other way round in all of it"
@@ -203,7 +211,7 @@ def _log_rate_hz(samples: Samples) -> float:
     """Samples a second: of the first ones, so that a log cut short has the same; rounded to four digits."""
     first_t_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
     steps_s = np.diff(first_t_s)
-    even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_STEP_JITTER]
+    even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_steps_s.mean() if len(even_steps_s) else samples.dt_s):.4g}")
     if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
         says = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
@@ -214,21 +222,21 @@ def _log_rate_hz(samples: Samples) -> float:
 def _read_sample_inputs(
     samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.inputs_of` has them; and the mean age
-    of what is held, s. needs_attitude: whether the attitude is wanted."""
+    """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns` has them; and the
+    mean age of what is held, s. needs_attitude: whether the attitude is wanted."""
     columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.held_column_mean_age_s)
 
-    def measured(one: Quantity) -> Floats:
-        values, age_s = values_at(columns[one.column], samples.t_s, samples.dt_s)
+    def sampled_values(quantity: Quantity) -> Floats:
+        values, age_s = values_at(columns[quantity.column], samples.t_s, samples.dt_s)
         if age_s is not None:
-            mean_age_s[one.column] = age_s
+            mean_age_s[quantity.column] = age_s
         return values
 
     alpha, beta, qdyn, *aircraft_signals = (
-        measured(vehicle.flow[name]) for name in _flow_input_names(aircraft)
+        sampled_values(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
     assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signals = [alpha, beta, measured(vehicle.airspeed), qdyn, *aircraft_signals]
+    signals = [alpha, beta, sampled_values(vehicle.airspeed), qdyn, *aircraft_signals]
     surface_indices = _vehicle_surface_indices(vehicle, aircraft)
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
@@ -238,7 +246,7 @@ def _read_sample_inputs(
             if one is None or one.column not in columns:
                 says = "is missing, allowed: its column, where fdi.bounds declares turbulence"
                 raise BadInput(f"{samples.name}: attitude.{angle}: {says}")
-            attitude[:, axis] = measured(one)
+            attitude[:, axis] = sampled_values(one)
     return [
         samples.rates,
         np.column_stack(signals),
@@ -286,10 +294,10 @@ def _median_without_nan(values: Floats) -> float:
     return float(np.median(known)) if known.size else float("nan")
 
 
-def _gap_free_stretches(samples: Samples, is_missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
+def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """Begin and end of what is diagnosed in one: evenly spaced and without a missing number."""
-    is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_STEP_JITTER
-    is_known = ~is_missing
+    is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
+    is_known = ~has_missing_value
     is_joined = is_known[1:] & is_known[:-1] & ~is_uneven_step
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_joined, [False]]).astype(int)))
     begin_end_pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
@@ -308,7 +316,7 @@ def _join_stretch_diagnoses(
         np.zeros((n_samples, n_surfaces)),
         np.ones((n_samples, n_surfaces)),
     )
-    gains = np.min([one.max_command_gains for one in stretch_verdicts], axis=0)
+    gains = np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0)
     for (begin, end), one in zip(stretches, stretch_verdicts, strict=True):
         verdicts[begin:end], low[begin:end], high[begin:end] = (
             one.verdicts,
@@ -319,7 +327,7 @@ def _join_stretch_diagnoses(
 
 
 def _rows_outside_envelope(
-    signals: Floats, aircraft: Aircraft, is_missing: Mask, stretches: list[tuple[int, int]]
+    signals: Floats, aircraft: Aircraft, has_missing_value: Mask, stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """Rows of which the aircraft's model says nothing, by what is wrong."""
     min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
@@ -329,8 +337,8 @@ def _rows_outside_envelope(
         is_outside_stretches[begin:end] = False
     airspeed, alpha = signals[:, 2], signals[:, 0]
     return {
-        "a number is missing": is_missing,
-        "samples are not evenly spaced": is_outside_stretches & ~is_missing,
+        "a number is missing": has_missing_value,
+        "samples are not evenly spaced": is_outside_stretches & ~has_missing_value,
         f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (airspeed < min_airspeed_mps)
         | (airspeed > max_airspeed_mps),
         f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (alpha < min_alpha_rad)
@@ -376,11 +384,11 @@ def _verdict_document(
     samples: Samples,
     rows: DiagnosisRows,
     replayed: ReplayedVerdicts,
-    diagnosed: DiagnosedAircraft,
+    diagnosed_aircraft: DiagnosedAircraft,
     held_column_mean_age_s: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
-    surfaces = list(diagnosed.aircraft.surfaces)
+    surfaces = list(diagnosed_aircraft.aircraft.surfaces)
     alarm_rows = np.flatnonzero(rows.faulty)
     last_verdict = replayed.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
     same_verdict_rows = [
@@ -392,8 +400,8 @@ def _verdict_document(
     ]
     return {
         "flight": samples.name,
-        "aircraft": diagnosed.aircraft.name,
-        "declared": diagnosed.declared_errors,
+        "aircraft": diagnosed_aircraft.aircraft.name,
+        "declared": diagnosed_aircraft.declared_errors,
         "duration_s": float(samples.t_s[-1] - samples.t_s[0]),
         "recorded_s": len(samples.t_s) * samples.dt_s,
         "gaps": int(samples.stretch_number[-1]),

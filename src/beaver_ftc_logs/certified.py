@@ -12,11 +12,11 @@ import numpy as np
 
 from beaver_ftc_assurance.certificates import certificate
 from beaver_ftc_assurance.certificates import proved as by_frames
-from beaver_ftc_logs.by_aircraft import AircraftInputs
+from beaver_ftc_logs.by_aircraft import AircraftDiagnosisInputs
 from beaver_ftc_logs.diagnose import DiagnosisRows
 
 
-def write_certificate(aircraft_inputs: AircraftInputs, rows: DiagnosisRows, folder: Path) -> None:
+def write_certificate(aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisRows, folder: Path) -> None:
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
     stretches_with_alarm = (

@@ -162,11 +162,11 @@ def _column_in_si(columns: Any, quantity: Any) -> Column:
     return replace(column, values=quantity.to_si(column.values))
 
 
-def _guess_vehicle(path: Path, reader: str | None, lines: list[str]) -> Document | None:
+def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     reader_name = reader or detect_reader(path)
-    time_column = _find_time_column(path, lines) if reader_name == "table" else None
+    time_column = _find_time_column(path, remarks) if reader_name == "table" else None
     candidates = _candidate_columns(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column, candidates))
     names = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
@@ -180,7 +180,7 @@ def _guess_vehicle(path: Path, reader: str | None, lines: list[str]) -> Document
             f"no column looks like the rate {missing[0]}" if missing else "no column looks like a command"
         )
         nearest = nearest_names("rate" if missing else "command", recording.columns)
-        lines.append(f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest}")
+        remarks.append(f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest}")
         return None
     return _propose_vehicle(path.stem, recording, reader_name, time_column, column_of_quantity, commands)
 
@@ -239,16 +239,16 @@ def _candidate_columns(names: Iterable[str]) -> list[str]:
     return known[:_MAX_READ_COLUMNS]
 
 
-def _may_be_command_column(name: str) -> bool:
+def _may_be_command_column(column_name: str) -> bool:
     return bool(
-        re.search(_COMMAND_NAME_PATTERN, name.lower())
-        and not re.search(_NOT_A_COMMAND_NAME_PATTERN, name.lower())
+        re.search(_COMMAND_NAME_PATTERN, column_name.lower())
+        and not re.search(_NOT_A_COMMAND_NAME_PATTERN, column_name.lower())
     )
 
 
-def _normalized_name(name: str) -> str:
+def _normalized_name(column_name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    with_unit = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
+    with_unit = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower())
     return re.sub(r"[\s/]+", "_", with_unit)
 
 
@@ -269,7 +269,7 @@ def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | N
     ]
 
 
-def _find_time_column(path: Path, lines: list[str]) -> tuple[str, str]:
+def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     names = column_names(path)
     candidates = [
@@ -288,7 +288,7 @@ def _find_time_column(path: Path, lines: list[str]) -> tuple[str, str]:
                 (one for one in plausible_units if _normalized_name(name).endswith(one)), plausible_units[0]
             )
             if (name, unit) != (TIME_COLUMN, "s"):
-                lines.append(f"time is in column {name}, its steps fit {unit}")
+                remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
     says = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     raise BadInput(f"{path}: no column of time, allowed: {says}; it has {nearest_names(TIME_COLUMN, names)}")

@@ -85,7 +85,7 @@ def identify(
         "identified": model.identification_results,
         "settings": model.settings.model_dump(by_alias=True),
     }
-    long_log_lines = [f"  {one.name}: {one.notes[0]}" for one in loaded_flights if one.n_parts > 1]
+    long_log_lines = [f"  {one.name}: {one.notes[0]}" for one in loaded_flights if one.n_log_parts > 1]
     answer(
         format,
         document,

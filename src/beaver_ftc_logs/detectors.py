@@ -106,8 +106,8 @@ def _least_squares_rows(
     samples: Samples, model: Model, effectiveness: Floats, standard_error: Floats
 ) -> DiagnosisRows:
     """Rows of a least-squares estimate. With labelled levels, the effectiveness is the nearest of them, and
-    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_FAULT_SD standard
-    deviations."""
+    below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
+    standard deviations."""
     bank = build_hypothesis_bank(model)
     low, high = (
         np.clip(effectiveness + side * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
@@ -132,14 +132,19 @@ def _least_squares_rows(
 
 
 def _rows_without_bounds(
-    samples: Samples, named: np.ndarray, estimate: Floats, **given_bounds: Floats
+    samples: Samples, isolated_names: np.ndarray, effectiveness: Floats, **given_bounds: Floats
 ) -> DiagnosisRows:
     """Rows of a detector without bounds or probability: faulty where it names a surface; the bounds are then
     the estimate, the probability is 0 or 1."""
-    faulty = np.array([bool(name) for name in named], dtype=np.int64)
-    bounds = {"low": estimate, "high": estimate, "probability": faulty.astype(float), **given_bounds}
+    faulty = np.array([bool(name) for name in isolated_names], dtype=np.int64)
+    bounds = {
+        "low": effectiveness,
+        "high": effectiveness,
+        "probability": faulty.astype(float),
+        **given_bounds,
+    }
     low, high, probability = bounds["low"], bounds["high"], bounds["probability"]
-    return DiagnosisRows(samples.t_s, faulty, named, estimate, low, high, probability)
+    return DiagnosisRows(samples.t_s, faulty, isolated_names, effectiveness, low, high, probability)
 
 
 def diagnose_by_freeze_rule(

@@ -26,7 +26,7 @@ _MAX_WRONG_ISOLATION_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
 _RESIDUAL_DIRECTION_WINDOW_S = 1.0
-_MIN_COMMAND_MOTION_SHARE = 1e-6
+_MIN_COMMAND_MOTION_TRAVEL_SHARE = 1e-6
 """Share of travel that a command moves by rounding alone."""
 _MAX_NO_RESPONSE_PROBABILITY = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
@@ -36,7 +36,7 @@ _MAX_NO_RESPONSE_PROBABILITY = 0.5
 class DiagnosisRows:
     """A row a sample.
 
-    t_s (n,); faulty (n,) 0 or 1; named_surfaces (n,) text; effectiveness of each surface, its
+    t_s (n,); faulty (n,) 0 or 1; isolated_surfaces (n,) text; effectiveness of each surface, its
     effectiveness_low and effectiveness_high (n, S); fault_probability (n,) of any surface; credible (n,) 0 or
     1, 1 where nothing else is given; evidence_start_time_s (n,) when the evidence for a fault began to
     gather, t_s where nothing else is given; reasons_not_credible: rows that are not credible, by what is
@@ -45,7 +45,7 @@ class DiagnosisRows:
 
     t_s: Floats
     faulty: NDArray[np.int64]
-    named_surfaces: NDArray[np.object_]
+    isolated_surfaces: NDArray[np.object_]
     effectiveness: Floats
     effectiveness_low: Floats
     effectiveness_high: Floats
@@ -75,7 +75,7 @@ class DiagnosisRows:
         return replace(
             self,
             faulty=np.where(is_removed, 0, self.faulty),
-            named_surfaces=np.where(is_removed, "", self.named_surfaces),
+            isolated_surfaces=np.where(is_removed, "", self.isolated_surfaces),
             fault_probability=np.where(is_removed, 0.0, self.fault_probability),
         )
 
@@ -138,12 +138,12 @@ def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: Diagno
     surfaces = list(model.vehicle.surfaces)
     has_moved = (
         np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0)
-        > _MIN_COMMAND_MOTION_SHARE
+        > _MIN_COMMAND_MOTION_TRAVEL_SHARE
     )
     has_moved |= "stuck" in model.vehicle.faults
     surfaces_of_unknown_effect = trust.surfaces_of_unknown_effect(model)
     may_join = has_moved & np.array([surface in surfaces_of_unknown_effect for surface in surfaces])
-    named, high = rows.named_surfaces.copy(), rows.effectiveness_high.copy()
+    named, high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
         named_group = set(str(named[k]).split("+"))
         if not named_group <= set(surfaces):
@@ -154,12 +154,12 @@ def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: Diagno
             model.settings.isolates_single_group and not _are_in_one_group(named_group, model)
         ):
             high[k, is_named] = 1.0
-    return replace(rows, named_surfaces=named, effectiveness_high=high)
+    return replace(rows, isolated_surfaces=named, effectiveness_high=high)
 
 
-def _are_in_one_group(named_surfaces: set[str], model: Model) -> bool:
+def _are_in_one_group(isolated_surfaces: set[str], model: Model) -> bool:
     """Whether surfaces are one group of the model, which has one effectiveness."""
-    return any(named_surfaces <= set(group) for group in model.groups)
+    return any(isolated_surfaces <= set(group) for group in model.groups)
 
 
 def _withdraw_isolation_after_engine_failure(
@@ -175,12 +175,12 @@ def _withdraw_isolation_after_engine_failure(
     named = energy.withdraw_surfaces_after_engine_failure(
         rows.t_s,
         rows.faulty,
-        rows.named_surfaces,
+        rows.isolated_surfaces,
         climb_mps,
         unpowered_energy_height_rate_mps,
         rows.evidence_start_time_s,
     )
-    return replace(rows.without_estimate(named != rows.named_surfaces), named_surfaces=named)
+    return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
 
 
 def _withdraw_contradicted_isolation(
@@ -204,12 +204,12 @@ def _withdraw_contradicted_isolation(
     log_likelihood_gain = 0.5 * model.settings.effective_sample_share * (cumulated - cumulated[window_begin])
     best_gain, is_contradicted = log_likelihood_gain.max(axis=1), np.zeros(len(residual), dtype=bool)
     for group_index, group in enumerate(model.groups):
-        is_contradicted |= _rows_isolating_any(rows.named_surfaces, set(group)) & (
+        is_contradicted |= _rows_isolating_any(rows.isolated_surfaces, set(group)) & (
             best_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
         )
     return replace(
         rows.without_estimate(is_contradicted),
-        named_surfaces=np.where(is_contradicted, UNKNOWN_SURFACE, rows.named_surfaces),
+        isolated_surfaces=np.where(is_contradicted, UNKNOWN_SURFACE, rows.isolated_surfaces),
     )
 
 
@@ -223,9 +223,9 @@ def standardized_healthy_residual(
     return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(noise)).T)
 
 
-def _rows_isolating_any(named: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
+def _rows_isolating_any(isolated_surfaces: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
     """Which rows name a surface of which nothing is claimed."""
-    return np.array([bool(surfaces & set(name.split("+"))) for name in named], dtype=bool)
+    return np.array([bool(surfaces & set(name.split("+"))) for name in isolated_surfaces], dtype=bool)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:
@@ -245,7 +245,7 @@ def rows_of_posterior(
 ) -> DiagnosisRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
     no_response_probability = posterior[:, bank.no_response_index]
-    probability = posterior[:, bank.is_fault].sum(axis=1)
+    probability = posterior[:, bank.is_fault_hypothesis].sum(axis=1)
     posterior_given_response = (
         posterior[:, : bank.no_response_index]
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
@@ -277,7 +277,7 @@ def rows_of_posterior(
     return DiagnosisRows(
         t_s=samples.t_s,
         faulty=faulty,
-        named_surfaces=_surfaces_at_fault(
+        isolated_surfaces=_surfaces_at_fault(
             model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_healthier)
         ),
         effectiveness=group_values_by_surface(estimate, model),
@@ -342,12 +342,12 @@ def _median_level(levels: Floats, level_probability: Floats) -> Floats:
 
 
 def _credible_bounds(
-    levels: Floats, level_probability: Floats, min_probability: float
+    levels: Floats, level_probability: Floats, credible_mass: float
 ) -> tuple[Floats, Floats]:
     """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
     by_probability = np.argsort(-level_probability, axis=1, kind="stable")
     ranked_probability = np.take_along_axis(level_probability, by_probability, axis=1)
-    is_inside = np.cumsum(ranked_probability, axis=1) - ranked_probability < min_probability
+    is_inside = np.cumsum(ranked_probability, axis=1) - ranked_probability < credible_mass
     chosen_levels = np.where(is_inside, levels[by_probability], np.nan)
     low, high = np.nanmin(chosen_levels, axis=1), np.nanmax(chosen_levels, axis=1)
     level_edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
@@ -367,7 +367,7 @@ def _surfaces_at_fault(
     (`one_group`), each that may be instead is named with it; `unknown` where none that the bank has is left
     out.
     """
-    fault_probability = np.maximum(posterior[:, bank.is_fault].sum(axis=1), MIN_DIVISOR)
+    fault_probability = np.maximum(posterior[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     group_shares = [
         posterior[:, bank.is_fault_of_group(g)].sum(axis=1) / fault_probability
         for g in range(len(model.groups))
@@ -420,9 +420,9 @@ def _still_names_all_surfaces(new_name: str, last_name: str, model: Model) -> bo
     )
 
 
-def join_flagged_names(is_named: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
-    """The names that are flagged in is_named (n, K), joined by +, (n,) text."""
-    return np.array(["+".join(compress(names, row)) for row in is_named], dtype=object)
+def join_flagged_names(is_flagged: NDArray[np.bool_], names: Sequence[str]) -> NDArray[np.object_]:
+    """The names that are flagged in is_flagged (n, K), joined by +, (n,) text."""
+    return np.array(["+".join(compress(names, row)) for row in is_flagged], dtype=object)
 
 
 def _rows_at_log_stamps(samples: Samples, rows: DiagnosisRows) -> DiagnosisRows:

@@ -34,8 +34,8 @@ def energy_height_rate_mps(
 def withdraw_surfaces_after_engine_failure(
     t_s: Floats,
     faulty: np.ndarray,
-    named: np.ndarray,
-    climb_mps: Floats,
+    isolated_surfaces: np.ndarray,
+    energy_height_rate_mps: Floats,
     unpowered_energy_height_rate_mps: float,
     evidence_start_time_s: Floats,
 ) -> np.ndarray:
@@ -45,13 +45,13 @@ def withdraw_surfaces_after_engine_failure(
     That is so while the window of the energy height reaches back to before then, and from where energy falls
     as without power until it rises, which it does by power alone. A row uses nothing later than its time.
     """
-    kept_names = named.copy()
+    kept_names = isolated_surfaces.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         evidence_begin = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
         is_falling, is_rising = (
-            climb_mps[evidence_begin:end] <= unpowered_energy_height_rate_mps,
-            climb_mps[evidence_begin:end] > 0.0,
+            energy_height_rate_mps[evidence_begin:end] <= unpowered_energy_height_rate_mps,
+            energy_height_rate_mps[evidence_begin:end] > 0.0,
         )
         row_index = np.arange(end - evidence_begin)
         last_fall, last_rise = (
@@ -64,5 +64,5 @@ def withdraw_surfaces_after_engine_failure(
         )
         doubted_names = np.where(np.logical_or.accumulate(is_lasting) & is_doubted, ENGINE, UNKNOWN_SURFACE)
         is_early = t_s[begin:end] - t_s[evidence_begin] < _CLIMB_WINDOW_S
-        kept_names[begin:end] = np.where(is_doubted | is_early, doubted_names, named[begin:end])
+        kept_names[begin:end] = np.where(is_doubted | is_early, doubted_names, isolated_surfaces[begin:end])
     return kept_names

@@ -132,16 +132,18 @@ def fault_evidence_increments(posterior: Floats, bank: HypothesisBank) -> Floats
     sum of it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the
     mean."""
     fault_probability = np.clip(
-        posterior[:, bank.is_fault].sum(axis=1),
+        posterior[:, bank.is_fault_hypothesis].sum(axis=1),
         _MIN_HYPOTHESIS_PROBABILITY,
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
     change_to_fault = (
-        bank.transition_probability * bank.transition_share[bank.is_fault].sum() / bank.transition_share.sum()
+        bank.transition_probability
+        * bank.transition_share[bank.is_fault_hypothesis].sum()
+        / bank.transition_share.sum()
     )
     predicted_probability = np.concatenate(
         [
-            [bank.prior_probability[bank.is_fault].sum()],
+            [bank.prior_probability[bank.is_fault_hypothesis].sum()],
             (1.0 - bank.transition_probability) * fault_probability[:-1] + change_to_fault,
         ]
     )
@@ -202,7 +204,9 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
     return found
 
 
-def min_noise_variance_scale(residual: Floats, ok: np.ndarray, covariance: Floats, rate_hz: float) -> Floats:
+def min_noise_variance_scale(
+    residual: Floats, is_usable: np.ndarray, covariance: Floats, rate_hz: float
+) -> Floats:
     """Return how many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the
     last seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
 
@@ -211,7 +215,7 @@ def min_noise_variance_scale(residual: Floats, ok: np.ndarray, covariance: Float
     """
     white = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
     total = np.cumsum(np.vstack([np.zeros((1, 3)), white]), axis=0)
-    known = np.concatenate([[0], np.cumsum(ok)])
+    known = np.concatenate([[0], np.cumsum(is_usable)])
     end = np.arange(1, len(white) + 1)
     found = np.zeros(len(white))
     for span_s in _RESIDUAL_SUM_SPANS_S:
@@ -226,42 +230,56 @@ def min_noise_variance_scale(residual: Floats, ok: np.ndarray, covariance: Float
 
 
 @kernel
-def run_bank(y, f, ok, bank, own, noise, least):
+def run_bank(unexplained_rates, group_responses, is_usable, bank, state_model, noise, min_variance_scale):
     """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
 
     Evidence is the log likelihood of the sample given all before it, raised to the power.
 
-    Shapes: y (n, 3); f (n, G, 3) responses; ok (n,) the sample may be used. bank: Bank, own: Adaptation,
-    noise: Noise (bank.py); least (n,): scale of the noise at least.
+    Shapes: unexplained_rates (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the sample may
+    be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
+    min_variance_scale (n,): scale of the noise at least.
     """
-    n, hypotheses, states = len(y), len(bank.transition_share), len(own.initial_mean)
+    n, hypotheses, states = len(unexplained_rates), len(bank.transition_share), len(state_model.initial_mean)
     idle = hypotheses - 1
     mu = bank.prior_probability.copy()
     m = np.zeros((hypotheses, states))
     p = np.zeros((hypotheses, states, states))
-    m[:] = own.initial_mean
-    p[:] = own.initial_covariance
+    m[:] = state_model.initial_mean
+    p[:] = state_model.initial_covariance
     posterior = np.zeros((n, hypotheses))
     trim = np.zeros((n, states))
     scales = np.zeros(n)
     evidence = np.zeros(n)
     scale = 1.0
     for k in range(n):
-        prior = _mix_hypotheses(mu, m, p, bank, own.random_walk_variance)
-        _relax_to_model(m, p, own)
+        prior = _mix_hypotheses(mu, m, p, bank, state_model.random_walk_variance)
+        _relax_to_model(m, p, state_model)
         m[idle], p[idle] = (
-            own.initial_mean,
-            own.initial_covariance,
+            state_model.initial_mean,
+            state_model.initial_covariance,
         )  # while nothing answers, nothing is learnt
-        if ok[k]:
+        if is_usable[k]:
             mu, square, evidence[k] = _correct_hypotheses(
-                prior, m, p, y[k], f[k], bank, noise, max(scale, least[k])
+                prior,
+                m,
+                p,
+                unexplained_rates[k],
+                group_responses[k],
+                bank,
+                noise,
+                max(scale, min_variance_scale[k]),
             )
-            _limit_states(m, own.initial_mean - own.max_deviation, own.initial_mean + own.max_deviation)
+            _limit_states(
+                m,
+                state_model.initial_mean - state_model.max_deviation,
+                state_model.initial_mean + state_model.max_deviation,
+            )
             scale *= np.exp(
-                (1.0 - mu[idle]) * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL) / noise.memory_samples
+                (1.0 - mu[idle])
+                * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL)
+                / noise.scale_memory_samples
             )
-            scale = min(max(scale, noise.min_scale), noise.max_scale)
+            scale = min(max(scale, noise.min_variance_scale), noise.max_variance_scale)
         else:
             mu = prior
         posterior[k] = mu
@@ -272,83 +290,125 @@ def run_bank(y, f, ok, bank, own, noise, least):
 
 
 @kernel
-def _mix_hypotheses(mu, m, p, bank, walk):
-    """Let each hypothesis pass to any other; m and p are replaced, the prior probabilities returned."""
-    hypotheses, states = m.shape
+def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_walk_variance):
+    """Let each hypothesis pass to any other; state_means (H, N) and state_covariances (H, N, N) are replaced,
+    the prior probabilities returned."""
+    hypotheses, states = state_means.shape
     stay = 1.0 - bank.transition_probability
     mean = np.zeros(states)
     spread = np.zeros((states, states))
     for h in range(hypotheses):
-        mean += mu[h] * m[h]
+        mean += probabilities[h] * state_means[h]
     for h in range(hypotheses):
         for i in range(states):
             for j in range(states):
-                spread[i, j] += mu[h] * (p[h, i, j] + (m[h, i] - mean[i]) * (m[h, j] - mean[j]))
+                spread[i, j] += probabilities[h] * (
+                    state_covariances[h, i, j] + (state_means[h, i] - mean[i]) * (state_means[h, j] - mean[j])
+                )
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
-        prior[h] = stay * mu[h] + bank.transition_probability * bank.transition_share[h]
+        prior[h] = stay * probabilities[h] + bank.transition_probability * bank.transition_share[h]
         total += prior[h]
         _merge_gaussians(
-            stay * mu[h] / prior[h], m[h], p[h], mean, spread, bank.rate_offset_variance[h], walk
+            stay * probabilities[h] / prior[h],
+            state_means[h],
+            state_covariances[h],
+            mean,
+            spread,
+            bank.rate_offset_variance[h],
+            random_walk_variance,
         )
     return prior / total
 
 
 @kernel
-def _merge_gaussians(own, m, p, mean, spread, offset, walk):
-    """One Gaussian for two: the hypothesis' own (m, p) with weight `own`, everyone's with the rest.
+def _merge_gaussians(
+    own_weight,
+    state_mean,
+    state_covariance,
+    mixed_mean,
+    mixed_covariance,
+    rate_offset_variance,
+    random_walk_variance,
+):
+    """One Gaussian for two: the hypothesis' own with weight `own_weight`, everyone's with the rest.
 
-    m (N,) and p (N, N) are replaced; who comes from elsewhere brings the offset (3,) along.
+    state_mean (N,) and state_covariance (N, N) are replaced; who comes from elsewhere brings the offset of
+    the rates along, of variance rate_offset_variance (3,).
     """
-    rest, states = 1.0 - own, len(m)
+    rest, states = 1.0 - own_weight, len(state_mean)
     for i in range(states):
         for j in range(states):
-            away = (m[i] - mean[i]) * (m[j] - mean[j])
-            p[i, j] = own * p[i, j] + rest * spread[i, j] + own * rest * away
-        p[i, i] += walk[i]
+            away = (state_mean[i] - mixed_mean[i]) * (state_mean[j] - mixed_mean[j])
+            state_covariance[i, j] = (
+                own_weight * state_covariance[i, j] + rest * mixed_covariance[i, j] + own_weight * rest * away
+            )
+        state_covariance[i, i] += random_walk_variance[i]
     for i in range(states):
-        m[i] = own * m[i] + rest * mean[i]
-    for i in range(len(offset)):
-        p[i, i] += rest * offset[i]
+        state_mean[i] = own_weight * state_mean[i] + rest * mixed_mean[i]
+    for i in range(len(rate_offset_variance)):
+        state_covariance[i, i] += rest * rate_offset_variance[i]
 
 
 @kernel
-def _relax_to_model(m, p, own):
-    """Let all trims and gains return towards the model's; m (H, N) and p (H, N, N) are replaced."""
-    for h in range(len(m)):
-        for i in range(len(own.deviation_retention)):
-            m[h, i] = own.initial_mean[i] + own.deviation_retention[i] * (m[h, i] - own.initial_mean[i])
-            for j in range(len(own.deviation_retention)):
-                p[h, i, j] *= own.deviation_retention[i] * own.deviation_retention[j]
+def _relax_to_model(state_means, state_covariances, state_model):
+    """Let all trims and gains return towards the model's; state_means (H, N) and state_covariances (H, N, N)
+    are replaced."""
+    for h in range(len(state_means)):
+        for i in range(len(state_model.deviation_retention)):
+            state_means[h, i] = state_model.initial_mean[i] + state_model.deviation_retention[i] * (
+                state_means[h, i] - state_model.initial_mean[i]
+            )
+            for j in range(len(state_model.deviation_retention)):
+                state_covariances[h, i, j] *= (
+                    state_model.deviation_retention[i] * state_model.deviation_retention[j]
+                )
 
 
 @kernel
-def _correct_hypotheses(prior, m, p, y, f, bank, noise, scale):
-    """Kalman correction of every hypothesis by one sample; m and p are replaced.
+def _correct_hypotheses(
+    prior_probabilities,
+    state_means,
+    state_covariances,
+    unexplained_rates,
+    group_responses,
+    bank,
+    noise,
+    noise_variance_scale,
+):
+    """Kalman correction of every hypothesis by one sample; state_means and state_covariances are replaced.
 
     Returns the posterior probabilities, the clipped square of the residual under them, as if the noise were
     no wider than residuals are, and the evidence.
     """
-    hypotheses, states = m.shape
+    hypotheses, states = state_means.shape
     log = np.empty(hypotheses)
     squares = np.empty(hypotheses)
     nothing, certain = np.zeros(states), np.zeros((states, states))
-    covariance, dof = noise.covariance * scale, noise.degrees_of_freedom
+    covariance, dof = noise.covariance * noise_variance_scale, noise.degrees_of_freedom
     for h in range(hypotheses):
         seen = _state_sensitivity(
-            bank.effectiveness[h], bank.group_gain_sensitivity[h], f, noise.intercept_rad_s, states
+            bank.effectiveness[h],
+            bank.group_gain_sensitivity[h],
+            group_responses,
+            noise.intercept_rad_s,
+            states,
         )
         if h == hypotheses - 1:
-            squares[h], log_det = _update_gaussian(nothing, certain, y, seen, covariance, noise)
+            squares[h], log_det = _update_gaussian(
+                nothing, certain, unexplained_rates, seen, covariance, noise
+            )
         else:
-            squares[h], log_det = _update_gaussian(m[h], p[h], y, seen, covariance, noise)
+            squares[h], log_det = _update_gaussian(
+                state_means[h], state_covariances[h], unexplained_rates, seen, covariance, noise
+            )
         square = min(squares[h], noise.max_squared_residual)
         log[h] = noise.effective_sample_share * (
             -0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det
         )
     most = log.max()
-    mu = np.maximum(prior * np.exp(log - most), _MIN_HYPOTHESIS_PROBABILITY)
+    mu = np.maximum(prior_probabilities * np.exp(log - most), _MIN_HYPOTHESIS_PROBABILITY)
     total = mu.sum()
     mu /= total
     clipped = 0.0
@@ -358,45 +418,49 @@ def _correct_hypotheses(prior, m, p, y, f, bank, noise, scale):
 
 
 @kernel
-def _state_sensitivity(e, own, f, base, states):
-    """How the rates show the states, (N, 3): trim, the gain of the constant and of all groups' answers f
-    (G, 3), each as effective as e (G,) says, and each group's own gain of a share (G,) of its answer."""
-    seen = np.zeros((states, 3))
+def _state_sensitivity(effectiveness, gain_sensitivity, group_responses, intercept_rad_s, n_states):
+    """How the rates show the states, (N, 3): trim, the gain of the constant and of all group_responses (G,
+    3), each as effective as effectiveness (G,) says, and each group's own gain, gain_sensitivity (G,) of its
+    response."""
+    seen = np.zeros((n_states, 3))
     seen[:3] = np.eye(3)
-    seen[3] = base
-    for g in range(len(e)):
-        seen[4 + g] = own[g] * f[g]
-        seen[3] += e[g] * f[g]
+    seen[3] = intercept_rad_s
+    for g in range(len(effectiveness)):
+        seen[4 + g] = gain_sensitivity[g] * group_responses[g]
+        seen[3] += effectiveness[g] * group_responses[g]
     return seen
 
 
 @kernel
-def _limit_states(m, low, high):
+def _limit_states(state_means, min_state, max_state):
     """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
-    for h in range(len(m)):
-        m[h] = np.minimum(np.maximum(m[h], low), high)
+    for h in range(len(state_means)):
+        state_means[h] = np.minimum(np.maximum(state_means[h], min_state), max_state)
 
 
 @kernel
-def _update_gaussian(m, p, y, seen, covariance, noise):
-    """Correct one Gaussian (m (N,), p (N, N), replaced) by y (3,) = seen' m + noise, seen (N, 3).
+def _update_gaussian(
+    state_mean, state_covariance, unexplained_rates, state_sensitivity, noise_covariance, noise
+):
+    """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by unexplained_rates (3,) =
+    state_sensitivity' state_mean + noise, state_sensitivity (N, 3).
 
     Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
     out in the tail of the t distribution counts less, and one that is too far nothing.
     """
-    states, dof = len(m), noise.degrees_of_freedom
+    states, dof = len(state_mean), noise.degrees_of_freedom
     cross = np.zeros((states, 3))
-    s = covariance.copy()
-    v = y.copy()
+    s = noise_covariance.copy()
+    v = unexplained_rates.copy()
     for i in range(states):
         for j in range(3):
-            v[j] -= m[i] * seen[i, j]
+            v[j] -= state_mean[i] * state_sensitivity[i, j]
             for k in range(states):
-                cross[i, j] += p[i, k] * seen[k, j]
+                cross[i, j] += state_covariance[i, k] * state_sensitivity[k, j]
     for i in range(states):
         for j in range(3):
             for k in range(3):
-                s[j, k] += seen[i, j] * cross[i, k]
+                s[j, k] += state_sensitivity[i, j] * cross[i, k]
     inverse, determinant = _invert_symmetric(s)
     gain = np.zeros((states, 3))
     square = 0.0
@@ -408,21 +472,22 @@ def _update_gaussian(m, p, y, seen, covariance, noise):
     gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.max_squared_residual else 0.0
     for j in range(3):
         for i in range(states):
-            m[i] += gain[i, j] * v[j]
-            for k in range(i + 1):  # mirrored: what rounding makes of an unsymmetric p grows without bound
-                p[i, k] -= gain[i, j] * cross[k, j]
-                p[k, i] = p[i, k]
+            state_mean[i] += gain[i, j] * v[j]
+            # mirrored: what rounding makes of an unsymmetric matrix grows without bound
+            for k in range(i + 1):
+                state_covariance[i, k] -= gain[i, j] * cross[k, j]
+                state_covariance[k, i] = state_covariance[i, k]
     return square, np.log(determinant)
 
 
 @kernel
-def _invert_symmetric(s):
+def _invert_symmetric(matrix):
     """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
     c = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
             d, e = (j + 1) % 3, (j + 2) % 3
-            c[j, i] = s[a, d] * s[b, e] - s[a, e] * s[b, d]
-    determinant = s[0, 0] * c[0, 0] + s[0, 1] * c[1, 0] + s[0, 2] * c[2, 0]
+            c[j, i] = matrix[a, d] * matrix[b, e] - matrix[a, e] * matrix[b, d]
+    determinant = matrix[0, 0] * c[0, 0] + matrix[0, 1] * c[1, 0] + matrix[0, 2] * c[2, 0]
     return c / determinant, determinant

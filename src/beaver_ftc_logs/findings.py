@@ -23,7 +23,7 @@ from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
-_MIN_PROPORTIONAL_COSINE = 0.9
+_MIN_COSINE_OF_PROPORTIONAL_EFFECTS = 0.9
 _MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
 _PROPORTIONAL_GROUP_NOTE = (
@@ -56,10 +56,10 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
 def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     """Each time with one name and one effectiveness: when, what, how much is left.
 
-    What lasts less than BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone is
-    brief. This is hindsight, for the reader; the rows have none.
+    What lasts less than MAX_BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone
+    is brief. This is hindsight, for the reader; the rows have none.
     """
-    _, name = np.unique(rows.named_surfaces.astype(str), return_inverse=True)
+    _, name = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
     runs = _join_brief_events(rows, constant_stretches(said))
     return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
@@ -88,18 +88,18 @@ def _is_brief(rows: DiagnosisRows, begin: int, end: int) -> bool:
 
 
 def _is_brief_and_unnamed(rows: DiagnosisRows, begin: int, end: int) -> bool:
-    return rows.named_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
+    return rows.isolated_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
 
 
-def _have_same_verdict(rows: DiagnosisRows, one: int, other: int) -> bool:
-    return rows.named_surfaces[one] == rows.named_surfaces[other] and bool(
-        (rows.effectiveness[one] == rows.effectiveness[other]).all()
+def _have_same_verdict(rows: DiagnosisRows, first_row: int, second_row: int) -> bool:
+    return rows.isolated_surfaces[first_row] == rows.isolated_surfaces[second_row] and bool(
+        (rows.effectiveness[first_row] == rows.effectiveness[second_row]).all()
     )
 
 
 def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event; name and effectiveness as they stood for most of it."""
-    names, count = np.unique(rows.named_surfaces[begin:end].astype(str), return_counts=True)
+    names, count = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     named = str(names[count.argmax()])
     mentioned = surfaces if named in (UNKNOWN_SURFACE, ENGINE) else named.split("+")
     known = {"estimate": rows.effectiveness, "low": rows.effectiveness_low, "high": rows.effectiveness_high}
@@ -201,14 +201,14 @@ def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
 
 
 def _group_fisher_information(
-    answers: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
+    group_responses: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     odds = _log_odds_needed_for_alarm(model, bank, group, dt_s)
-    if not len(answers):
+    if not len(group_responses):
         return {"information_per_s": 0.0, "smallest_loss": _smallest_detectable_losses(0.0, odds)}
-    own = float((answers[:, group] ** 2).sum(axis=1).mean()) / dt_s
-    left = _conditional_fisher_information(answers, group) / dt_s
+    own = float((group_responses[:, group] ** 2).sum(axis=1).mean()) / dt_s
+    left = _conditional_fisher_information(group_responses, group) / dt_s
     return {
         "information_per_s": own,
         "information_per_s_of_its_motion": left,
@@ -217,13 +217,13 @@ def _group_fisher_information(
     }
 
 
-def _conditional_fisher_information(answers: Floats, group: int) -> float:
+def _conditional_fisher_information(group_responses: Floats, group: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
-    n, groups, axes = answers.shape
+    n, groups, axes = group_responses.shape
     constant = np.tile(np.eye(axes), (n, 1))
-    others = [answers[:, other].reshape(-1, 1) for other in range(groups) if other != group]
+    others = [group_responses[:, other].reshape(-1, 1) for other in range(groups) if other != group]
     nuisance = np.column_stack([constant, *others])
-    target = answers[:, group].reshape(-1)
+    target = group_responses[:, group].reshape(-1)
     rest = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
     return float(rest @ rest) / n
 
@@ -237,35 +237,44 @@ def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, d
     return float(np.log(settings.alarm_probability / (1.0 - settings.alarm_probability)) - np.log(change))
 
 
-def _smallest_detectable_losses(information: float, odds: float) -> dict[str, float | None]:
+def _smallest_detectable_losses(
+    information_per_s: float, required_log_odds: float
+) -> dict[str, float | None]:
     """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {f"{horizon_s:g}": information * horizon_s for horizon_s in DETECTION_HORIZONS_S}
-    losses = {key: np.sqrt(2.0 * odds / much) if much > 0.0 else np.inf for key, much in gathered.items()}
+    gathered = {f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S}
+    losses = {
+        key: np.sqrt(2.0 * required_log_odds / much) if much > 0.0 else np.inf
+        for key, much in gathered.items()
+    }
     return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
-def _group_pair_cosines(answers: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosines(group_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for a, b in combinations(range(len(model.groups)), 2):
-        one, other = answers[:, a].ravel(), answers[:, b].ravel()
+        one, other = group_responses[:, a].ravel(), group_responses[:, b].ravel()
         norms = float(np.sqrt((one @ one) * (other @ other)))
         cosine = float(one @ other) / max(norms, MIN_DIVISOR)
         surfaces = [model.groups[a], model.groups[b]]
         pairs.append(
-            {"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _MIN_PROPORTIONAL_COSINE}
+            {
+                "surfaces": surfaces,
+                "cosine": cosine,
+                "separable": abs(cosine) < _MIN_COSINE_OF_PROPORTIONAL_EFFECTS,
+            }
         )
     return pairs
 
 
-def isolability_sentences(found: dict[str, Any]) -> list[str]:
+def isolability_sentences(isolability: dict[str, Any]) -> list[str]:
     """The statement in words."""
-    said = [entry["says"] for entry in found["together"]]
-    for entry in found["groups"]:
+    said = [entry["says"] for entry in isolability["together"]]
+    for entry in isolability["groups"]:
         said.append(
             f"{', '.join(entry['surfaces'])}: {_smallest_detectable_loss_text(entry['smallest_loss'])}"
         )
-    for pair in found["alike"]:
+    for pair in isolability["alike"]:
         if not pair["separable"]:
             one, other = (" and ".join(names) for names in pair["surfaces"])
             said.append(
@@ -275,8 +284,12 @@ def isolability_sentences(found: dict[str, Any]) -> list[str]:
     return said
 
 
-def _smallest_detectable_loss_text(smallest: dict[str, float | None]) -> str:
-    seen = [f"{loss:.0%} within {horizon} s" for horizon, loss in smallest.items() if loss is not None]
+def _smallest_detectable_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
+    seen = [
+        f"{loss:.0%} within {horizon} s"
+        for horizon, loss in smallest_loss_by_horizon.items()
+        if loss is not None
+    ]
     if not seen:
         longest = f"{DETECTION_HORIZONS_S[-1]:g} s"
         return f"not even a complete loss would show within {longest} by the mean of this flight's commands."

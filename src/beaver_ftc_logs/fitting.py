@@ -103,8 +103,8 @@ class Stretch:
     """A flight and which of its samples may be fitted; known: what was made of it and others already."""
 
     samples: Samples
-    usable: NDArray[np.bool_]
-    known: dict[tuple[object, ...], tuple[object, object]] = field(
+    is_usable: NDArray[np.bool_]
+    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
         default_factory=dict, repr=False, compare=False
     )
 
@@ -113,7 +113,7 @@ def _compute_once(
     stretches: Sequence[Stretch], result_key: tuple[object, ...], compute: Callable[[], Result]
 ) -> Result:
     """Compute a result of these stretches once: every test of a model needs the same fits to parts."""
-    cache, key = stretches[0].known, (*result_key, *map(id, stretches))
+    cache, key = stretches[0].result_cache, (*result_key, *map(id, stretches))
     if key not in cache:
         cache[key] = (tuple(stretches), compute())  # held: an id is of one object while this lives
     return cache[key][1]  # type: ignore[return-value]
@@ -230,7 +230,7 @@ def bic_by_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[i
     return scores
 
 
-def _regressor_columns_of_order(vehicle: Vehicle, history: int, lags: int) -> list[int]:
+def _regressor_columns_of_order(vehicle: Vehicle, n_rate_lags: int, n_command_lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
     first_signal, n_signals = 1 + 3 * max(RATE_LAG_CANDIDATES), len(vehicle.signal_regressor_names)
     first_command = first_signal + n_signals * vehicle.n_signal_lags(max(RATE_LAG_CANDIDATES))
@@ -238,28 +238,32 @@ def _regressor_columns_of_order(vehicle: Vehicle, history: int, lags: int) -> li
         first_command + group * max(COMMAND_LAG_CANDIDATES)
         for group in range(len(regression.group_surfaces_by_commands(vehicle)))
     ]
-    command_columns = [start + lag for start in group_starts for lag in range(lags)]
+    command_columns = [start + lag for start in group_starts for lag in range(n_command_lags)]
     return [
-        *range(1 + 3 * history),
-        *range(first_signal, first_signal + n_signals * vehicle.n_signal_lags(history)),
+        *range(1 + 3 * n_rate_lags),
+        *range(first_signal, first_signal + n_signals * vehicle.n_signal_lags(n_rate_lags)),
         *command_columns,
     ]
 
 
 def fit_least_squares_of_order(
-    stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
+    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> regression.RateRegression:
     """Least squares of given order over all stretches."""
-    what = ("order", vehicle.model_dump_json(), history, lags)
+    what = ("order", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
     return _compute_once(
-        stretches, what, lambda: _fit_least_squares_of_order_uncached(stretches, vehicle, history, lags)
+        stretches,
+        what,
+        lambda: _fit_least_squares_of_order_uncached(stretches, vehicle, n_rate_lags, n_command_lags),
     )
 
 
 def _fit_least_squares_of_order_uncached(
-    stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
+    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> regression.RateRegression:
-    regressors, rates, stretch_number = stacked_regression_data(stretches, vehicle, history, lags)
+    regressors, rates, stretch_number = stacked_regression_data(
+        stretches, vehicle, n_rate_lags, n_command_lags
+    )
     if len(rates) < 10 * regressors.shape[1]:
         raise BadInput(
             f"identify: {len(rates)} samples known to be healthy, allowed: at least "
@@ -278,7 +282,7 @@ def _fit_least_squares_of_order_uncached(
 
 
 def stacked_regression_data(
-    stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int
+    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Regressors, rates and run number over all stretches: the same samples for any order.
 
@@ -290,11 +294,11 @@ def stacked_regression_data(
     )
     regressors, rates, stretch_numbers = [], [], []
     for stretch_index, stretch in enumerate(stretches):
-        one, n_signal_lags = stretch.samples, vehicle.n_signal_lags(history)
+        one, n_signal_lags = stretch.samples, vehicle.n_signal_lags(n_rate_lags)
         past, commands, is_predictable = regression.build_regressors(
-            one, groups, history, lags, True, n_signal_lags
+            one, groups, n_rate_lags, n_command_lags, True, n_signal_lags
         )
-        is_usable = stretch.usable & is_predictable
+        is_usable = stretch.is_usable & is_predictable
         is_usable[:max_lag] = False
         n_samples = len(past)
         regressors.append(
@@ -308,22 +312,28 @@ def stacked_regression_data(
     return np.vstack(regressors), np.vstack(rates), np.concatenate(stretch_numbers)
 
 
-def _fit_model_cached(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
-    what = ("model", vehicle.model_dump_json(), history, lags)
-    return _compute_once(stretches, what, lambda: _fit_model_uncached(stretches, vehicle, history, lags))
+def _fit_model_cached(
+    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+) -> Model:
+    what = ("model", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
+    return _compute_once(
+        stretches, what, lambda: _fit_model_uncached(stretches, vehicle, n_rate_lags, n_command_lags)
+    )
 
 
-def _fit_model_uncached(stretches: Sequence[Stretch], vehicle: Vehicle, history: int, lags: int) -> Model:
-    fit = fit_least_squares_of_order(stretches, vehicle, history, lags)
+def _fit_model_uncached(
+    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+) -> Model:
+    fit = fit_least_squares_of_order(stretches, vehicle, n_rate_lags, n_command_lags)
     names, groups = list(vehicle.surfaces), regression.group_surfaces_by_commands(vehicle)
-    first_command_row = len(fit.coefficients) - len(groups) * lags
-    shape = (len(groups), lags, 3)
+    first_command_row = len(fit.coefficients) - len(groups) * n_command_lags
+    shape = (len(groups), n_command_lags, 3)
     model = Model(
         vehicle=vehicle,
         rate_hz=1.0 / float(np.median([stretch.samples.dt_s for stretch in stretches])),
         groups=[[names[i] for i in group] for group in groups],
-        history=history,
-        lags=lags,
+        history=n_rate_lags,
+        lags=n_command_lags,
         intercept=fit.coefficients[0].tolist(),
         past=fit.coefficients[1:first_command_row].tolist(),
         response=fit.coefficients[first_command_row:].reshape(shape).tolist(),
@@ -347,14 +357,14 @@ def _fit_noise_models(stretches: Sequence[Stretch], model: Model) -> list[NoiseM
 
 
 def _fit_noise_model(
-    average: list[float], residuals: Sequence[tuple[NDArray[np.int64], Floats]]
+    ma_coefficients: list[float], residuals: Sequence[tuple[NDArray[np.int64], Floats]]
 ) -> NoiseModel:
     """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
     and the remaining noise; without a predictor where too few do."""
     parts = [e[begin:end] for rows, e in residuals for begin, end in _consecutive_runs(rows)]
     predicted_residuals = [part[AUTOREGRESSIVE_ORDER:] for part in parts]
     if sum(map(len, predicted_residuals)) < 10 * 3 * AUTOREGRESSIVE_ORDER:
-        return NoiseModel(average=average, noise=np.cov(np.vstack(parts).T).tolist())
+        return NoiseModel(average=ma_coefficients, noise=np.cov(np.vstack(parts).T).tolist())
     regressors = np.vstack([
         np.hstack([part[AUTOREGRESSIVE_ORDER - j : len(part) - j]
                    for j in range(1, AUTOREGRESSIVE_ORDER + 1)])
@@ -363,7 +373,7 @@ def _fit_noise_model(
     residual_rows = np.vstack(predicted_residuals)
     coefficients = np.linalg.lstsq(regressors, residual_rows, rcond=None)[0]
     return NoiseModel(
-        average=average,
+        average=ma_coefficients,
         before=coefficients.tolist(),
         noise=np.cov((residual_rows - regressors @ coefficients).T).tolist(),
     )
@@ -374,7 +384,7 @@ def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> Filt
 
     A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
     """
-    hours = sum(stretch.usable.sum() * stretch.samples.dt_s for stretch in stretches) / 3600.0
+    hours = sum(stretch.is_usable.sum() * stretch.samples.dt_s for stretch in stretches) / 3600.0
     changes, repairs, levels = 0, 0, {}
     names = list(model.vehicle.surfaces)
     for group in model.groups:
@@ -435,7 +445,7 @@ def gain_error_overdispersion(stretches: Sequence[Stretch], model: Model) -> flo
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    flights = [(stretch.samples, stretch.usable) for stretch in stretches]
+    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
     squares = n_gains = float(len(model.groups))
     for part_model, left_out in _cross_validation_fits(
         stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
@@ -455,7 +465,7 @@ def _with_inflated_noise(stretches: Sequence[Stretch], model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
-    flights = [(stretch.samples, stretch.usable) for stretch in stretches]
+    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
     ratios_of_noise: dict[tuple[float, ...], list[float]] = {}
     for part_model, left_out in _cross_validation_fits(
         stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
@@ -517,13 +527,13 @@ def _normalized_squared_gain_error(
     return squares, int(np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information)))
 
 
-def _standardized_group_responses(model: Model, kept: Stretch) -> tuple[Floats, Floats]:
+def _standardized_group_responses(model: Model, held_out: Stretch) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
-    _, residual, rate_responses = whitened_residual_and_responses(model, kept)
+    _, residual, rate_responses = whitened_residual_and_responses(model, held_out)
     whitening = np.linalg.inv(
         np.linalg.cholesky(
-            np.array(model.with_noise_model(kept.samples.noise_ma_coefficients).residual_covariance)
+            np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
         )
     ).T
     responses, standardized_residual = (
@@ -583,9 +593,9 @@ def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _labelled_effectiveness_levels(stretch: Stretch, column: int) -> list[float]:
+def _labelled_effectiveness_levels(stretch: Stretch, surface_index: int) -> list[float]:
     """The levels of one surface's label in their order, edges left out."""
-    values = stretch.samples.labels[:, column][stretch.usable]
+    values = stretch.samples.labels[:, surface_index][stretch.is_usable]
     return [round(level, 6) for level, _ in groupby(values[np.isfinite(values)].tolist())]
 
 
@@ -602,18 +612,20 @@ def validation_folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], 
     return [([first], second, "second half"), ([second], first, "first half")]
 
 
-def _split_in_halves(whole: Stretch) -> tuple[Stretch, Stretch]:
+def _split_in_halves(stretch: Stretch) -> tuple[Stretch, Stretch]:
     """Split the usable samples of a flight into two halves."""
-    usable_rows = np.flatnonzero(whole.usable)
+    usable_rows = np.flatnonzero(stretch.is_usable)
     middle_row = int(usable_rows[len(usable_rows) // 2]) if len(usable_rows) else 0
-    is_early = np.arange(len(whole.usable)) < middle_row
-    return Stretch(whole.samples, whole.usable & is_early), Stretch(whole.samples, whole.usable & ~is_early)
+    is_early = np.arange(len(stretch.is_usable)) < middle_row
+    return Stretch(stretch.samples, stretch.is_usable & is_early), Stretch(
+        stretch.samples, stretch.is_usable & ~is_early
+    )
 
 
-def add_validity_range(stretches: Sequence[Stretch], model: Model) -> Model:
+def add_fitted_ranges_and_alarm_threshold(stretches: Sequence[Stretch], model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
     and at which evidence of a fault they would alarm as often as declared."""
-    flights = [(stretch.samples, stretch.usable) for stretch in stretches]
+    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
     scale, misread_log_likelihood, parts, gain_deviations = (
         1.0,
         0.0,
@@ -707,14 +719,16 @@ def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> 
             - np.linalg.slogdet(np.cov(residuals.T))[1]
         )
         lacking_share = max(lacking_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - chance_share)
-    effect_power = trust.unexplained_effect_power([(one.samples, one.usable) for one in stretches], model)
+    effect_power = trust.effect_power_unexplained_by_others(
+        [(one.samples, one.is_usable) for one in stretches], model
+    )
     return np.minimum(np.sqrt(3.0 * lacking_share / np.maximum(effect_power, MIN_DIVISOR)), _MAX_GAIN_SD)
 
 
-def _squared_gain_deviation(model: Model, kept: Stretch) -> Floats:
+def _squared_gain_deviation(model: Model, held_out: Stretch) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
-    responses, residual = _standardized_group_responses(model, kept)
+    responses, residual = _standardized_group_responses(model, held_out)
     responses = responses.sum(axis=3).reshape(residual.size, -1)
     squared_deviation = np.full(responses.shape[1], np.nan)
     has_known_effect = np.array(trust.is_group_effect_known(model)) & (responses.any(axis=0))
@@ -728,13 +742,13 @@ def _squared_gain_deviation(model: Model, kept: Stretch) -> Floats:
     return squared_deviation
 
 
-def _gain_variance_between_laws(unseen_sd: Floats, deviations: Sequence[Floats]) -> Floats:
+def _gain_variance_between_laws(prior_gain_sd: Floats, squared_deviations: Sequence[Floats]) -> Floats:
     """Variance of each group's gain from a flight to one of another law, (G,).
 
-    unseen_sd: how far another flight's gains may be before any is left out, which counts as one flight;
-    deviations: squares of how far those of flights left out were.
+    prior_gain_sd: how far another flight's gains may be before any is left out, which counts as one flight;
+    squared_deviations: squares of how far those of flights left out were.
     """
-    return np.asarray(np.nanmean([unseen_sd**2, *deviations], axis=0))
+    return np.asarray(np.nanmean([prior_gain_sd**2, *squared_deviations], axis=0))
 
 
 def _choose_alarm_threshold(
@@ -754,10 +768,12 @@ def _choose_alarm_threshold(
     )
 
 
-def _max_column_mistake_log_likelihood_gain(model: Model, kept: Stretch) -> float:
+def _max_column_mistake_log_likelihood_gain(model: Model, held_out: Stretch) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
-    rates = np.where(kept.usable[:, None], kept.samples.rates, np.nan)
-    gain_of_mistake, _ = trust.log_likelihood_gain_of_corrections(replace(kept.samples, rates=rates), model)
+    rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
+    gain_of_mistake, _ = trust.log_likelihood_gain_of_corrections(
+        replace(held_out.samples, rates=rates), model
+    )
     return max(0.0, *gain_of_mistake.values()) if gain_of_mistake else 0.0
 
 
@@ -788,19 +804,24 @@ def _cross_validate_alarm_threshold(
     }
 
 
-def _healthy_alarm_statistics(model: Model, kept: Stretch) -> tuple[float, extremes.PeaksAndHours]:
+def _healthy_alarm_statistics(model: Model, held_out: Stretch) -> tuple[float, extremes.PeaksAndHours]:
     """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
-    posterior, _, noise_scale = hypothesis_posterior(kept.samples, model, bank)
-    evidence_increments, labels = fault_evidence_increments(posterior, bank), kept.samples.labels
-    is_healthy = kept.usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
+    posterior, _, noise_scale = hypothesis_posterior(held_out.samples, model, bank)
+    evidence_increments, labels = fault_evidence_increments(posterior, bank), held_out.samples.labels
+    is_healthy = (
+        held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
+    )
     rows = np.flatnonzero(is_healthy)
     page_sums = [
         page_cusum(evidence_increments[rows[begin:end]], np.inf) for begin, end in _consecutive_runs(rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(one) for one in page_sums])
-    return float(noise_scale[kept.usable].max(initial=1.0)), (peaks, len(rows) * kept.samples.dt_s / 3600.0)
+    return float(noise_scale[held_out.is_usable].max(initial=1.0)), (
+        peaks,
+        len(rows) * held_out.samples.dt_s / 3600.0,
+    )
 
 
 def _cross_validation_splits(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
@@ -903,7 +924,7 @@ def score_folds_and_choose_credible_mass(
     for fitted, kept, name in validation_folds(stretches):
         part_model = fit_with_same_order(fitted, model)
         entry: Document = {"left_out": name, **one_step_prediction_quality(part_model, kept)}
-        labels = np.where(kept.usable[:, None], kept.samples.labels, np.nan)
+        labels = np.where(kept.is_usable[:, None], kept.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
             by_mass = _diagnosis_by_credible_mass(part_model, kept)
             entry["score"] = score_against_labels(by_mass[model.settings.credible_mass], labels)
@@ -921,25 +942,25 @@ def score_folds_and_choose_credible_mass(
     ]
 
 
-def _diagnosis_by_credible_mass(model: Model, kept: Stretch) -> dict[float, DiagnosisRows]:
+def _diagnosis_by_credible_mass(model: Model, held_out: Stretch) -> dict[float, DiagnosisRows]:
     bank = build_hypothesis_bank(model)
-    posterior, _, _ = hypothesis_posterior(kept.samples, model, bank)
+    posterior, _, _ = hypothesis_posterior(held_out.samples, model, bank)
     settings = [
         model.settings.model_copy(update={"credible_mass": m})
         for m in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}
     ]
     return {
         one.credible_mass: rows_of_posterior(
-            kept.samples, model.model_copy(update={"settings": one}), bank, posterior
+            held_out.samples, model.model_copy(update={"settings": one}), bank, posterior
         )
         for one in settings
     }
 
 
-def one_step_prediction_quality(model: Model, kept: Stretch) -> Document:
+def one_step_prediction_quality(model: Model, held_out: Stretch) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
-    rows, residual = one_step_residuals(model, kept)
-    rates = kept.samples.rates[rows]
+    rows, residual = one_step_residuals(model, held_out)
+    rates = held_out.samples.rates[rows]
     if not len(rates):
         return {"samples": 0}
     explained_variance = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), MIN_DIVISOR)
@@ -950,21 +971,23 @@ def one_step_prediction_quality(model: Model, kept: Stretch) -> Document:
     }
 
 
-def whitened_residual_and_responses(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats, Floats]:
+def whitened_residual_and_responses(
+    model: Model, stretch: Stretch
+) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
     is_predictable, unexplained, responses = regression.whitened_rates_and_responses(
-        kept.samples, model, scales_by_labels=True
+        stretch.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(kept.usable & is_predictable)
-    intercept = model.whitened_intercept(kept.samples.noise_ma_coefficients)
+    rows = np.flatnonzero(stretch.is_usable & is_predictable)
+    intercept = model.whitened_intercept(stretch.samples.noise_ma_coefficients)
     return rows, (unexplained - responses.sum(axis=1) - intercept)[rows], responses[rows]
 
 
-def one_step_residuals(model: Model, kept: Stretch) -> tuple[NDArray[np.int64], Floats]:
+def one_step_residuals(model: Model, stretch: Stretch) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
     is_predictable, unexplained, responses = regression.unexplained_rates_and_responses(
-        kept.samples, model, scales_by_labels=True
+        stretch.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(kept.usable & is_predictable)
+    rows = np.flatnonzero(stretch.is_usable & is_predictable)
     return rows, (unexplained - responses.sum(axis=1) - np.array(model.intercept))[rows]

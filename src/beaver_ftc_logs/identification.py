@@ -49,7 +49,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     stretches = fitting.usable_stretches(whiten_flights(flights, vehicle))
     model = fitting.fit_model(stretches, vehicle)
     check_explained_variance(fitting.explained_variance_by_fold(stretches, model), stretches, model)
-    model = add_unseen_noise_models(fitting.add_validity_range(stretches, model), flights)
+    model = add_unseen_noise_models(fitting.add_fitted_ranges_and_alarm_threshold(stretches, model), flights)
     tests, bounds = fitting.score_folds_and_choose_credible_mass(stretches, model)
     identified = {
         "assumed": assumption_lines,
@@ -68,7 +68,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
 def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
-    much of it, the flight itself shows (`filtering.least_scale`)."""
+    much of it, the flight itself shows (`filtering.min_noise_variance_scale`)."""
     if not model.noise_models:
         return model
     known_averages, max_inflation = (
@@ -313,7 +313,7 @@ def check_explained_variance(
         axis: float(np.average(values, weights=weights)) for axis, values in shares.items() if known_tests
     }
     if unexplained_axes := {axis: share for axis, share in explained.items() if share <= 0.0}:
-        minutes = sum(int(one.usable.sum()) * one.samples.dt_s for one in stretches) / 60.0
+        minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in stretches) / 60.0
         stillest_command = min(_command_spread(stretches, model).items(), key=lambda pair: pair[1])
         raise BadInput(
             "identify: on parts it was not fitted on the model explains less of "
@@ -347,12 +347,12 @@ def _remarks_on_rates(stretches: Sequence[fitting.Stretch], model: Model) -> str
 
 def _command_spread(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
     """Standard deviation of each surface's command."""
-    commands = np.vstack([stretch.samples.commands[stretch.usable] for stretch in stretches])
+    commands = np.vstack([stretch.samples.commands[stretch.is_usable] for stretch in stretches])
     return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
 def _used_samples_entry(stretch: fitting.Stretch) -> Document:
-    samples, use = stretch.samples, stretch.usable
+    samples, use = stretch.samples, stretch.is_usable
     return {"name": samples.name, "samples": int(use.sum()), "of": len(use), "notes": list(samples.notes)}
 
 
@@ -498,10 +498,10 @@ def _left_out_test_text(test: Document) -> str:
     )
 
 
-def _servo_lag_text(run: Document) -> str:
-    if run["shorter_than_can_be_told"]:
+def _servo_lag_text(output_error_fit: Document) -> str:
+    if output_error_fit["shorter_than_can_be_told"]:
         return "shorter than this rate can tell"
-    return f"{run['servo_lag_s']:.3f} s (sd {run['servo_lag_sd_s']:.3f})"
+    return f"{output_error_fit['servo_lag_s']:.3f} s (sd {output_error_fit['servo_lag_sd_s']:.3f})"
 
 
 def _variance_inflation_text(factor: float | None) -> str:
@@ -567,7 +567,9 @@ def _cut_free_run_windows(
             [(samples.commands * effectiveness)[:, g].sum(axis=1) for g in groups]
         )
         is_usable = (
-            stretch.usable & np.isfinite(group_commands).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
+            stretch.is_usable
+            & np.isfinite(group_commands).all(axis=1)
+            & np.isfinite(samples.rates).all(axis=1)
         )
         for end in range(n_past_samples + window_samples, len(is_usable), window_samples):
             window = slice(end - n_past_samples - window_samples, end)

@@ -311,13 +311,13 @@ class Model(Section):
 
     def _group_conflicts(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
-        seen: set[str] = set()
+        seen_surfaces: set[str] = set()
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):
-                if name not in self.vehicle.surfaces or name in seen:
-                    what = "is in two groups" if name in seen else "is no surface of the vehicle"
+                if name not in self.vehicle.surfaces or name in seen_surfaces:
+                    what = "is in two groups" if name in seen_surfaces else "is no surface of the vehicle"
                     yield ("groups", i, k), f"{name!r:.60} {what}, allowed: each surface once"
-                seen.add(name)
+                seen_surfaces.add(name)
         known = ["+".join(group) for group in self.groups]
         for name in self.settings.likely_effectiveness_levels:
             if name not in known:
@@ -327,11 +327,11 @@ class Model(Section):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
-    def _shape_conflicts(self, rows: int) -> Iterator[Conflict]:
+    def _shape_conflicts(self, n_past_rows: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         count = len(self.groups)
-        shapes: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.past_coefficients, (rows, 3)),
+        expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
+            (("past",), self.past_coefficients, (n_past_rows, 3)),
             (("response",), self.command_response, (count, self.n_command_lags, 3)),
             (("response_sd",), self.command_response_standard_error, (count, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
@@ -339,7 +339,7 @@ class Model(Section):
         for i, colour in enumerate(self.noise_models):
             at = ("colours", i)
             lengths = -(-len(colour.ar_coefficients) // 3) * 3
-            shapes += [
+            expected_shapes += [
                 ((*at, "noise"), colour.residual_covariance, (3, 3)),
                 ((*at, "before"), colour.ar_coefficients, (lengths, 3)),
             ]
@@ -354,20 +354,20 @@ class Model(Section):
                 ("tied", fitted.effect_share_explained_by_others, (count,)),
                 ("gain_sd", fitted.group_gain_standard_error, (count,)),
             ]  # fmt: skip
-            shapes += [(("fitted", key), given, shape) for key, given, shape in optional if given]
-        for where, given, shape in shapes:
+            expected_shapes += [(("fitted", key), given, shape) for key, given, shape in optional if given]
+        for where, given, shape in expected_shapes:
             if not _has_shape(given, shape):
                 size = " x ".join(map(str, shape))
                 yield where, f"has another shape, allowed: {size} numbers"
 
     def _noise_conflicts(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        noises: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
-        noises += [
+        covariances: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
+        covariances += [
             (("colours", i, "noise"), colour.residual_covariance)
             for i, colour in enumerate(self.noise_models)
         ]
-        for where, given in noises:
+        for where, given in covariances:
             noise = np.array(given)
             if abs(noise - noise.T).max() > 1e-6 * abs(noise).max():
                 yield where, "is not symmetric, allowed: a covariance"
@@ -387,47 +387,49 @@ class Model(Section):
         ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def with_single_noise_model(self, colour: NoiseModel) -> "Model":
-        """The model with one colour of its noise only."""
-        return self.model_copy(update={"noise_models": [colour]})
+    def with_single_noise_model(self, noise_model: NoiseModel) -> "Model":
+        """The model with one of its noise models only."""
+        return self.model_copy(update={"noise_models": [noise_model]})
 
-    def with_noise_model(self, average: Sequence[float]) -> "Model":
+    def with_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its `noise_inflation`;
         the model itself where none was fitted.
 
-        average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
+        ma_coefficients: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
         known = [
             np.array(one.residual_covariance)
             for one in self.noise_models
-            if one.ma_coefficients == list(average)
+            if one.ma_coefficients == list(ma_coefficients)
         ]
         if not known:
             return self
         return self.model_copy(
-            update={"residual_covariance": (self.noise_inflation(average) * known[0]).tolist()}
+            update={"residual_covariance": (self.noise_inflation(ma_coefficients) * known[0]).tolist()}
         )
 
-    def noise_inflation(self, average: Sequence[float]) -> float:
+    def noise_inflation(self, ma_coefficients: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
         return next(
             (
                 float(one.covariance_inflation)
                 for one in self.noise_models
-                if one.ma_coefficients == list(average)
+                if one.ma_coefficients == list(ma_coefficients)
             ),
             1.0,
         )
 
-    def noise_predictor(self, average: Sequence[float]) -> Floats:
+    def noise_predictor(self, ma_coefficients: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        known = [one.ar_coefficients for one in self.noise_models if one.ma_coefficients == list(average)]
+        known = [
+            one.ar_coefficients for one in self.noise_models if one.ma_coefficients == list(ma_coefficients)
+        ]
         return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
 
-    def whitened_intercept(self, average: Sequence[float]) -> Floats:
+    def whitened_intercept(self, ma_coefficients: Sequence[float]) -> Floats:
         """The intercept less its prediction by `noise_predictor`, (3,)."""
         constant = np.array(self.intercept)
-        return np.asarray(constant - constant @ self.noise_predictor(average).sum(axis=0))
+        return np.asarray(constant - constant @ self.noise_predictor(ma_coefficients).sum(axis=0))
 
     def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

@@ -62,18 +62,19 @@ def _render_flight_page(
     surfaces: Sequence[str],
     rows: DiagnosisRows,
     verdict: dict[str, Any],
-    words: dict[str, str],
+    wording: dict[str, str],
 ) -> str:
-    """A flight's page. words: what its bounds are called, what is said without an event, and of the model."""
+    """A flight's page. wording: what its bounds are called, what is said without an event, and of the
+    model."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
         duration_in_words=duration_in_words(verdict),
         events=lasting_events(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
-        words=words,
-        picture=_encode_png(flight_figure(samples, surfaces, rows, words["bounds"])),
+        words=wording,
+        picture=_encode_png(flight_figure(samples, surfaces, rows, wording["bounds"])),
         ages=samples.held_column_mean_age_s,
-        notes=[*_log_notes(samples), words["predicts"]],
+        notes=[*_log_notes(samples), wording["predicts"]],
     )
 
 
@@ -89,10 +90,10 @@ def _log_notes(samples: Samples) -> list[str]:
 
 
 def flight_figure(
-    samples: Samples, surfaces: Sequence[str], rows: DiagnosisRows, bounds: str = "90 % bounds"
+    samples: Samples, surfaces: Sequence[str], rows: DiagnosisRows, bounds_label: str = "90 % bounds"
 ) -> Any:
-    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. bounds:
-    what they are called."""
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault.
+    bounds_label: what they are called."""
     figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
@@ -105,7 +106,7 @@ def flight_figure(
     _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
     for i, surface in enumerate(surfaces):
-        _draw_effectiveness(axes[3 + i], rows, i, bounds)
+        _draw_effectiveness(axes[3 + i], rows, i, bounds_label)
         _label_axis(axes[3 + i], f"{surface}\neffectiveness")
     for axis in axes:
         _shade_alarms(axis, rows)
@@ -131,12 +132,12 @@ def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str]
     _label_axis(axis, label)
 
 
-def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, bounds: str) -> None:
+def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, bounds_label: str) -> None:
     shown_rows = slice(None, None, max(len(rows.t_s) // _MAX_PLOTTED_POINTS, 1))
     axis.fill_between(
         rows.t_s[shown_rows], rows.effectiveness_low[shown_rows, surface_index],
         rows.effectiveness_high[shown_rows, surface_index],
-        color="#9cc4e4", step="post", linewidth=0, label=bounds,
+        color="#9cc4e4", step="post", linewidth=0, label=bounds_label,
     )  # fmt: skip
     axis.step(
         rows.t_s[shown_rows],
@@ -171,7 +172,14 @@ def write_diagnosis(
         for of in zip(rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True)
         for column in of
     )
-    values = rows.t_s, rows.faulty, rows.named_surfaces.tolist(), *each, rows.fault_probability, rows.credible
+    values = (
+        rows.t_s,
+        rows.faulty,
+        rows.isolated_surfaces.tolist(),
+        *each,
+        rows.fault_probability,
+        rows.credible,
+    )
     columns = dict(zip(diagnosis_column_names(model.vehicle.surfaces), values, strict=True))
     return write_results(out, samples.name, columns, verdict, render_diagnosis(samples, model, rows, verdict))
 
@@ -182,9 +190,9 @@ def write_diagnosis_with_aircraft_model(
     surfaces: Sequence[str],
     rows: DiagnosisRows,
     verdict: dict[str, Any],
-    write_more: Callable[[Path], None] | None = None,
+    write_extra_files: Callable[[Path], None] | None = None,
 ) -> Path:
-    """The same of a flight that an aircraft's own model diagnosed; write_more: writes into the folder,
+    """The same of a flight that an aircraft's own model diagnosed; write_extra_files: writes into the folder,
     too."""
     from beaver_ftc_logs.stepped import EFFECTIVENESS_BOUND_WINDOW_S
 
@@ -195,7 +203,9 @@ def write_diagnosis_with_aircraft_model(
         f"is at fault, has stood for {EFFECTIVENESS_BOUND_WINDOW_S:g} s, and the errors declared hold.",
     }
     page = _render_flight_page(samples, surfaces, rows, verdict, words)
-    return write_results(out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_more)
+    return write_results(
+        out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_extra_files
+    )
 
 
 def write_results(
@@ -204,7 +214,7 @@ def write_results(
     columns: dict[str, Any],
     verdict: dict[str, Any],
     page: str | None = None,
-    write_more: Callable[[Path], None] | None = None,
+    write_extra_files: Callable[[Path], None] | None = None,
 ) -> Path:
     """Write `out/<name>` with diagnosis.parquet, verdict.json and report.html, whole or not at all."""
     import pyarrow as pa
@@ -215,8 +225,8 @@ def write_results(
         (folder / "verdict.json").write_text(as_json(verdict), encoding="utf-8")
         if page is not None:
             (folder / "report.html").write_text(page, encoding="utf-8")
-        if write_more is not None:
-            write_more(folder)
+        if write_extra_files is not None:
+            write_extra_files(folder)
     return out / name
 
 
@@ -239,7 +249,7 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
         mark=IDENTIFICATION_PAGE_MARK,
         model=model,
         found=model.identification_results,
-        used=sum(int(stretch.usable.sum()) for stretch in stretches),
+        used=sum(int(stretch.is_usable.sum()) for stretch in stretches),
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encode_png(_prediction_figure(stretches, model)),
         spectrum=_encode_png(_spectrum_figure(stretches, model)),
@@ -265,7 +275,7 @@ def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> An
         (fitting.fit_with_same_order(fitted, model), kept, name)
         for fitted, kept, name in fitting.validation_folds(stretches)
     ]
-    folds = [part for part in folds if part[1].usable.any()][:_MAX_SHOWN_FLIGHTS]
+    folds = [part for part in folds if part[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
     n_shown = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n_shown)
     blocks = figure.subfigures(n_shown, squeeze=False)[:, 0]
@@ -287,18 +297,18 @@ def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> An
 
 
 def _prediction_in_most_active_window(
-    model: Model, kept: fitting.Stretch, window_samples: int
+    model: Model, held_out: fitting.Stretch, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
-    rows, residual = fitting.one_step_residuals(model, kept)
+    rows, residual = fitting.one_step_residuals(model, held_out)
     rates, window_residual = (
-        np.full_like(kept.samples.rates, np.nan),
-        np.full_like(kept.samples.rates, np.nan),
+        np.full_like(held_out.samples.rates, np.nan),
+        np.full_like(held_out.samples.rates, np.nan),
     )
-    rates[rows], window_residual[rows] = kept.samples.rates[rows], residual
+    rates[rows], window_residual[rows] = held_out.samples.rates[rows], residual
     begin = _start_of_most_active_window(rates, rows, window_samples)
     part = slice(begin, begin + window_samples)
-    return kept.samples.t_s[part], rates[part], window_residual[part]
+    return held_out.samples.t_s[part], rates[part], window_residual[part]
 
 
 def _start_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:

@@ -28,13 +28,13 @@ _MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
 @dataclass(frozen=True)
 class AngleRateFit:
     """slope: change of an angle over the integral of its rate; correlation of the two; n_windows: how many
-    were seen; largest_angle, largest_rate: as the log says."""
+    were seen; max_angle_magnitude, max_rate_magnitude: as the log says."""
 
     slope: float
     correlation: float
     n_windows: int
-    largest_angle: float
-    largest_rate: float
+    max_angle_magnitude: float
+    max_rate_magnitude: float
 
     @property
     def has_many_windows(self) -> bool:
@@ -92,19 +92,19 @@ def _pitch_rad_at(roll: Column, pitch: Column, t_s: Floats) -> Floats:
 def _fit_angle_to_rate(
     t_s: Floats,
     angle: Floats,
-    terms: list[Floats],
-    circle: float | None = None,
+    rate_terms: list[Floats],
+    full_circle: float | None = None,
     pitch_rad: Floats | None = None,
 ) -> AngleRateFit | None:
     """How an angle follows the first term of its rate of change, window by window, the others in whatever
-    unit they are; circle: a circle, where it may go round; pitch_rad: the pitch angle, where windows in which
-    it is steep say nothing."""
+    unit they are; full_circle: a circle, where it may go round; pitch_rad: the pitch angle, where windows in
+    which it is steep say nothing."""
     step_s = np.diff(t_s)
     step_without_gaps = np.where(step_s < _INTEGRATION_WINDOW_S, step_s, 0.0)
     integrals = np.vstack(
         [
-            np.zeros(len(terms)),
-            np.cumsum([step_without_gaps * _means_of_neighbours(one) for one in terms], axis=1).T,
+            np.zeros(len(rate_terms)),
+            np.cumsum([step_without_gaps * _means_of_neighbours(one) for one in rate_terms], axis=1).T,
         ]
     )
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
@@ -120,8 +120,8 @@ def _fit_angle_to_rate(
         (angle[end] - angle[begin])[is_whole],
         (integrals[end] - integrals[begin])[is_whole],
     )
-    if circle is not None:
-        angle_changes = (angle_changes + 0.5 * circle) % circle - 0.5 * circle
+    if full_circle is not None:
+        angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
     is_known = np.isfinite(angle_changes) & np.isfinite(rate_integrals).all(axis=1)
     angle_changes, rate_integrals = angle_changes[is_known], rate_integrals[is_known]
     coefficients = np.linalg.lstsq(rate_integrals, angle_changes, rcond=None)[0]
@@ -137,8 +137,8 @@ def _fit_angle_to_rate(
         slope=np.sign(cross_power) * np.sqrt(angle_power / rate_power),
         correlation=cross_power / np.sqrt(rate_power * angle_power),
         n_windows=len(rate_integrals),
-        largest_angle=float(np.nanmax(np.abs(angle))),
-        largest_rate=float(np.nanmax(np.abs(terms[0]))),
+        max_angle_magnitude=float(np.nanmax(np.abs(angle))),
+        max_rate_magnitude=float(np.nanmax(np.abs(rate_terms[0]))),
     )
 
 
@@ -155,9 +155,9 @@ def _interpolate_column(column: Column, t_s: Floats) -> Floats:
     return np.interp(t_s, column.t_s[known], column.values[known], left=np.nan, right=np.nan)
 
 
-def _full_circle(roll: Floats) -> float:
+def _full_circle(angle: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
-    largest = float(np.nanmax(np.abs(roll), initial=0.0))
+    largest = float(np.nanmax(np.abs(angle), initial=0.0))
     return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
 
 
@@ -220,18 +220,18 @@ def _fit_angle_of_axis(
 
 
 def _exchanged_column_text(
-    angle: str, named: tuple[str, AngleRateFit], better: tuple[str, AngleRateFit], rate: str
+    angle_column: str, named: tuple[str, AngleRateFit], better: tuple[str, AngleRateFit], rate_title: str
 ) -> str:
     (named_column, named_fit), (other, other_fit) = named, better
     return (
-        f"{angle} does not follow {named_column} (correlation {named_fit.correlation:.2f}) but {other} "
-        f"({other_fit.correlation:.2f}): {other} is the {rate}"
+        f"{angle_column} does not follow {named_column} (correlation {named_fit.correlation:.2f}) but "
+        f"{other} ({other_fit.correlation:.2f}): {other} is the {rate_title}"
     )
 
 
-def angle_rate_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
+def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
-    nothing is. rate, angle: their columns.
+    nothing is. rate_column, angle_column: their columns.
 
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
@@ -240,24 +240,24 @@ def angle_rate_remark(fit: AngleRateFit, rate: str, angle: str) -> str | None:
     is_near_one = 1.0 / max_slope_factor < slope_magnitude < max_slope_factor
     if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (is_near_one and fit.slope > 0.0):
         return None
-    fits = f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
+    fits = f"the change of {angle_column} is {fit.slope:.4g} times the integral of {rate_column}"
     if is_near_one:
         return f"{fits}: one of them has the other sign, `scale: -1` fits"
-    if fit.largest_angle > _MAX_ROLL_YAW_RAD and (
+    if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
         unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_TOLERANCE)
     ):
-        return f"{fits}: {angle} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
-    if fit.largest_rate > _IMPLAUSIBLE_RATE_RAD_S and (
+        return f"{fits}: {angle_column} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
+    if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
         unit := nearest_unit(RATE, slope_magnitude, _UNIT_TOLERANCE)
     ):
-        return f"{fits}: {rate} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
+        return f"{fits}: {rate_column} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
     return (
-        f"{fits}: a factor of {slope_magnitude:.4g} on {rate} fits, or of "
-        f"{1.0 / slope_magnitude:.4g} on {angle}"
+        f"{fits}: a factor of {slope_magnitude:.4g} on {rate_column} fits, or of "
+        f"{1.0 / slope_magnitude:.4g} on {angle_column}"
     )
 
 
-def pitch_angle_unit_remark(pitch: Column, name: str) -> str | None:
+def pitch_angle_unit_remark(pitch: Column, column_name: str) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
     max_pitch = float(np.nanmax(np.abs(pitch.values), initial=0.0))
@@ -265,10 +265,13 @@ def pitch_angle_unit_remark(pitch: Column, name: str) -> str | None:
         return None
     unit = next((one for one in ("deg", "cdeg") if max_pitch * UNITS[one][1] <= _MAX_PITCH_RAD), None)
     fits = f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
-    return f"{name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' too"
+    return (
+        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' "
+        "too"
+    )
 
 
-def gravity_remark(acceleration: Column, name: str) -> str | None:
+def gravity_remark(acceleration: Column, column_name: str) -> str | None:
     """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
     is."""
     values = acceleration.values[np.isfinite(acceleration.values)]
@@ -280,5 +283,6 @@ def gravity_remark(acceleration: Column, name: str) -> str | None:
         f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits: is 1 g in it?"
     )
     return (
-        f"{name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is {_GRAVITY_MPS2:.4g}: {fits}"
+        f"{column_name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
+        f"{_GRAVITY_MPS2:.4g}: {fits}"
     )

@@ -22,14 +22,14 @@ _UNIT_SIZE_RATIOS = (180.0 / np.pi, 1000.0)
 class CorrectedReading(NamedTuple):
     """A log with one mistake mended.
 
-    says: the mend; samples: the log by it; density: log of the factor by which the mend multiplies the rates.
-    The likelihood of a log is that of the rates as they were logged: where a mend multiplies these by a, the
-    density is a times as large.
+    correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
+    multiplies the rates. The likelihood of a log is that of the rates as they were logged: where a mend
+    multiplies these by a, the density is a times as large.
     """
 
-    correction: str
+    correction_text: str
     samples: Samples
-    log_density: float = 0.0
+    log_jacobian: float = 0.0
 
 
 def corrected_readings(
@@ -52,8 +52,8 @@ def corrected_readings(
     for name in [*rates, *vehicle.signal_columns]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit for unit in _UNIT_SIZE_RATIOS)):
             scaled = _with_columns_from(samples, vehicle, {}, {name: factor})
-            log_density = float(np.log(abs(factor))) if name in rates else 0.0
-            yield CorrectedReading(f"`scale: {factor:.4g}` on {name}", scaled, log_density)
+            log_jacobian = float(np.log(abs(factor))) if name in rates else 0.0
+            yield CorrectedReading(f"`scale: {factor:.4g}` on {name}", scaled, log_jacobian)
 
 
 def _with_columns_from(

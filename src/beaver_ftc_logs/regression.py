@@ -43,8 +43,8 @@ def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
 def build_regressors(
     samples: Samples,
     groups: list[list[int]],
-    history: int,
-    lags: int,
+    n_rate_lags: int,
+    n_command_lags: int,
     scales_by_labels: bool,
     n_signal_lags: int = 1,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -58,14 +58,16 @@ def build_regressors(
     if scales_by_labels:
         surface_commands = surface_commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     grouped = np.column_stack([surface_commands[:, group].sum(axis=1) for group in groups])
-    rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, history + 1)]
+    rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, n_rate_lags + 1)]
     past = np.column_stack(
         [*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, n_signal_lags + 1))]
     )
-    commands = np.stack([_delay_rows(grouped, k, np.nan) for k in range(1, lags + 1)], axis=1)
+    commands = np.stack([_delay_rows(grouped, k, np.nan) for k in range(1, n_command_lags + 1)], axis=1)
     is_known = np.isfinite(past).all(axis=1) & np.isfinite(commands).all(axis=(1, 2))
     is_known &= np.isfinite(samples.rates).all(axis=1)
-    is_known &= samples.stretch_number == _delay_rows(samples.stretch_number, max(history, lags), -1)
+    is_known &= samples.stretch_number == _delay_rows(
+        samples.stretch_number, max(n_rate_lags, n_command_lags), -1
+    )
     return past, commands.transpose(0, 2, 1), is_known
 
 
@@ -152,21 +154,25 @@ class RateRegression:
     error_correlation: Floats
 
 
-def least_squares(x: Floats, y: Floats, stretch_number: NDArray[np.int64], max_lag: int) -> RateRegression:
-    """Ordinary least squares of y (n, 3) on x (n, m), with Newey-West standard errors over `max_lag` lags.
+def least_squares(
+    regressors: Floats, rates: Floats, stretch_number: NDArray[np.int64], max_lag: int
+) -> RateRegression:
+    """Ordinary least squares of rates (n, 3) on regressors (n, m), with Newey-West standard errors over
+    `max_lag` lags.
 
-    stretch_number (n,): products of residuals are formed within one gap-free stretch only. Directions that x
-    does not excite get the least coefficients that fit, and a column of nothing but rounding gets 0.
+    stretch_number (n,): products of residuals are formed within one gap-free stretch only. Directions that
+    the regressors do not excite get the least coefficients that fit, and a column of nothing but rounding
+    gets 0.
     """
-    regressor_rms = np.sqrt((x**2).mean(axis=0))
+    regressor_rms = np.sqrt((regressors**2).mean(axis=0))
     scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
-    scaled_regressors = x / scale
+    scaled_regressors = regressors / scale
     inverse: Floats = np.asarray(
         np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_RIDGE_SHARE), dtype=np.float64
     )
-    coefficients = inverse @ (scaled_regressors.T @ y)
-    residuals = y - scaled_regressors @ coefficients
-    degrees_of_freedom = max(len(y) - x.shape[1], 1)
+    coefficients = inverse @ (scaled_regressors.T @ rates)
+    residuals = rates - scaled_regressors @ coefficients
+    degrees_of_freedom = max(len(rates) - regressors.shape[1], 1)
     residual_covariance = residuals.T @ residuals / degrees_of_freedom
     white_errors = np.sqrt(np.maximum(np.outer(np.diag(inverse), np.diag(residual_covariance)), 0.0))
     newey_west_errors = np.column_stack(
@@ -174,7 +180,7 @@ def least_squares(x: Floats, y: Floats, stretch_number: NDArray[np.int64], max_l
             _newey_west_standard_errors(
                 scaled_regressors, residuals[:, axis], inverse, stretch_number, max_lag
             )
-            for axis in range(y.shape[1])
+            for axis in range(rates.shape[1])
         ]
     )
     error_inflation = np.divide(
@@ -206,18 +212,20 @@ def _newey_west_standard_errors(
     return np.sqrt(np.maximum(np.diag(inverse @ score_covariance @ inverse), 0.0))
 
 
-def coefficient_upper_bounds(x: Floats, y: Floats, effective_sample_share: float) -> tuple[Floats, Floats]:
-    """Least squares of y (n,) on x (n, m): what each coefficient surely does not exceed, (m,), which is much
-    where columns make one another up; and squares of what is left (n,). effective_sample_share: as in
-    `FilterSettings`."""
-    regressor_rms = np.maximum(np.sqrt((x**2).mean(axis=0)), MIN_DIVISOR)
-    scaled_regressors = x / regressor_rms
+def coefficient_upper_bounds(
+    regressors: Floats, outputs: Floats, effective_sample_share: float
+) -> tuple[Floats, Floats]:
+    """Least squares of outputs (n,) on regressors (n, m): what each coefficient surely does not exceed, (m,),
+    which is much where columns make one another up; and squares of what is left (n,). effective_sample_share:
+    as in `FilterSettings`."""
+    regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
+    scaled_regressors = regressors / regressor_rms
     inverse = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
         + _RIDGE_SHARE * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
-    coefficients = inverse @ (scaled_regressors.T @ y)
-    squared_residual = (y - scaled_regressors @ coefficients) ** 2
+    coefficients = inverse @ (scaled_regressors.T @ outputs)
+    squared_residual = (outputs - scaled_regressors @ coefficients) ** 2
     standard_error = np.sqrt(
         np.maximum(np.diag(inverse), 0.0) * squared_residual.mean() / effective_sample_share
     )
@@ -230,11 +238,11 @@ def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] 
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
 
 
-def variance_inflation_factors(x: Floats) -> Floats:
+def variance_inflation_factors(regressors: Floats) -> Floats:
     """How much each column's coefficient's variance is inflated by the others: 1 alone, inf dependent."""
-    centred = x - x.mean(axis=0)
+    centred = regressors - regressors.mean(axis=0)
     column_norm = np.sqrt((centred**2).sum(axis=0))
-    factors = np.full(x.shape[1], np.inf)
+    factors = np.full(regressors.shape[1], np.inf)
     varies = column_norm > 1e-12
     correlation = (centred[:, varies] / column_norm[varies]).T @ (centred[:, varies] / column_norm[varies])
     values, vectors = np.linalg.eigh(correlation)

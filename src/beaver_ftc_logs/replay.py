@@ -56,7 +56,11 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
 def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
-    columns: dict[str, Any] = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named_surfaces.tolist()}
+    columns: dict[str, Any] = {
+        "t_s": rows.t_s,
+        "faulty": rows.faulty,
+        "named": rows.isolated_surfaces.tolist(),
+    }
     for i, surface in enumerate(surfaces):
         columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
         columns[f"{surface}_low"], columns[f"{surface}_high"] = (

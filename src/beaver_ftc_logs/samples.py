@@ -26,7 +26,7 @@ from beaver_ftc_logs.vehicle import Vehicle
 MIN_LOG_RATE_HZ, _MAX_LOG_RATE_HZ = 4.0, 1e5
 _MIN_LOG_SAMPLES = 50
 _MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _IMPLAUSIBLE_RATE_SPREAD_RAD_S = 1e6, 60.0, 3.0
-_PRESSURE_RATIO_LIMITS = (0.1, 10.0)
+_DYNAMIC_PRESSURE_RATIO_LIMITS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 MAX_FIT_SAMPLES, _STRETCH_SAMPLES = 200_000, 5000
 """Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
@@ -50,12 +50,12 @@ class Samples:
     t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
     signals (n, X); labels (n, S) effectiveness, nan where unknown; stretch_number (n,) of the gap-free
     stretch; held_column_mean_age_s: mean age of each; log_stamps_s (m,) the log's own time stamps, s; notes:
-    what is said of the reading; airspeed (n,) m/s, nan where unknown; still_s: for how long each column of
-    rates, commands and signals has been the same, (n,) s; is_rate_clipped (n,); energy_height_rate_mps (n,):
-    rate of the energy height over the last seconds, None where it is not logged; noise_ma_coefficients: the
-    moving average of the noise, that rates, commands and signals are whitened by, none where empty;
-    fit_weight: of a sample in a fit; n_parts: in how many the log was read, of which these are stretches
-    where there are several.
+    what is said of the reading; airspeed (n,) m/s, nan where unknown; unchanged_time_s: for how long each
+    column of rates, commands and signals has been the same, (n,) s; is_rate_clipped (n,);
+    energy_height_rate_mps (n,): rate of the energy height over the last seconds, None where it is not logged;
+    noise_ma_coefficients: the moving average of the noise, that rates, commands and signals are whitened by,
+    none where empty; fit_weight: of a sample in a fit; n_log_parts: in how many the log was read, of which
+    these are stretches where there are several.
     """
 
     name: str
@@ -71,12 +71,12 @@ class Samples:
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
-    still_s: Mapping[str, Floats] = field(default_factory=dict)
+    unchanged_time_s: Mapping[str, Floats] = field(default_factory=dict)
     is_rate_clipped: NDArray[np.bool_] | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
-    n_parts: int = 1
+    n_log_parts: int = 1
 
 
 _PER_SAMPLE_FIELDS = (
@@ -102,19 +102,17 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
             age_s,
         )
 
-    def columns(rate_columns: list[str]) -> Floats:
+    def stacked_columns(names: list[str]) -> Floats:
         return (
-            np.column_stack([values_and_age[name][0] for name in rate_columns])
-            if rate_columns
-            else np.empty((len(t_s), 0))
+            np.column_stack([values_and_age[name][0] for name in names]) if names else np.empty((len(t_s), 0))
         )
 
     samples = Samples(
         name=recording.name,
         t_s=t_s,
-        rates=columns(rate_columns),
-        commands=np.einsum("nc,sc->ns", columns(vehicle.command_columns), mixer_matrix(vehicle)),
-        signals=columns(vehicle.signal_columns),
+        rates=stacked_columns(rate_columns),
+        commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_columns), mixer_matrix(vehicle)),
+        signals=stacked_columns(vehicle.signal_columns),
         labels=_sampled_labels(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
@@ -128,7 +126,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
             *dict.fromkeys(_used_column_defect_texts(recording, used_columns, rate_columns)),
         ),
         airspeed=_sampled_airspeed(recording, vehicle, t_s, step_s),
-        still_s={name: _unchanged_time_s(recording.columns[name], t_s) for name in used_columns},
+        unchanged_time_s={name: _unchanged_time_s(recording.columns[name], t_s) for name in used_columns},
         is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_columns], t_s),
         energy_height_rate_mps=_sampled_energy_height_rate_mps(
             recording, vehicle, (t_s, stretch_number, step_s)
@@ -149,9 +147,9 @@ def scale_by_dynamic_pressure(
     surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
     and stability grow with it; as at the reference where the airspeed is unknown."""
     airspeed = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
-    pressure_ratio = np.clip(np.nan_to_num(airspeed / reference_mps, nan=1.0) ** 2, *_PRESSURE_RATIO_LIMITS)[
-        :, None
-    ]
+    pressure_ratio = np.clip(
+        np.nan_to_num(airspeed / reference_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
+    )[:, None]
     airspeed_products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure_ratio) - 1.0)
     signals = np.column_stack([samples.signals, airspeed_products])
     return replace(
@@ -197,7 +195,9 @@ def _used_column_defect_texts(
 ) -> Iterator[str]:
     """Yield a line for each mistake in the columns that are used."""
     for name in used_columns:
-        yield from signals.column_defect_texts(name, recording.columns[name], measured=name in rate_columns)
+        yield from signals.column_defect_texts(
+            name, recording.columns[name], is_measured_rate=name in rate_columns
+        )
         if (
             name in rate_columns
             and (rate_spread := float(np.nanstd(recording.columns[name].values)))
@@ -481,7 +481,7 @@ def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None =
     """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
     that cannot be used."""
     short_flights = [
-        one if one.n_parts == 1 else None for one in load_flights_for_fit(paths, vehicle, reader)
+        one if one.n_log_parts == 1 else None for one in load_flights_for_fit(paths, vehicle, reader)
     ]
     for path, samples in zip(paths, short_flights, strict=True):
         if samples is not None:
@@ -519,11 +519,11 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
     selected = {
         name: of[rows].copy() for name in _PER_SAMPLE_FIELDS if (of := getattr(samples, name)) is not None
     }
-    still_s = {name: of[rows].copy() for name, of in samples.still_s.items()}
-    return replace(samples, log_stamps_s=selected["t_s"], still_s=still_s, **selected)
+    still_s = {name: of[rows].copy() for name, of in samples.unchanged_time_s.items()}
+    return replace(samples, log_stamps_s=selected["t_s"], unchanged_time_s=still_s, **selected)
 
 
-def _concatenate(name: str, flights: list[Samples], n_parts: int) -> Samples:
+def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
     """Samples one after the other, with a gap between."""
     field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(flights[0], name) is not None]
     joined: dict[str, Any] = {
@@ -532,18 +532,22 @@ def _concatenate(name: str, flights: list[Samples], n_parts: int) -> Samples:
     is_begin = np.diff(joined["stretch_number"], prepend=joined["stretch_number"][0]) != 0
     is_begin[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
     joined["stretch_number"] = np.cumsum(is_begin)
-    still_s = {name: np.concatenate([one.still_s[name] for one in flights]) for name in flights[0].still_s}
+    still_s = {
+        name: np.concatenate([one.unchanged_time_s[name] for one in flights])
+        for name in flights[0].unchanged_time_s
+    }
     long_log_note = (
-        f"a long log, read in {n_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked at"
+        f"a long log, read in {n_log_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked "
+        "at"
     )
     notes = (long_log_note, *dict.fromkeys(note for one in flights for note in one.notes))
     return replace(
         flights[0],
         name=name,
         notes=notes,
-        n_parts=n_parts,
+        n_log_parts=n_log_parts,
         log_stamps_s=joined["t_s"],
-        still_s=still_s,
+        unchanged_time_s=still_s,
         **joined,
     )
 

@@ -68,9 +68,9 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     }
 
 
-def nearest_label_setting(estimate: Floats, settings: Floats) -> np.ndarray:
+def nearest_label_setting(effectiveness: Floats, label_settings: Floats) -> np.ndarray:
     """Index of the setting nearest to each row."""
-    squared_distance = ((estimate[:, None, :] - settings[None, :, :]) ** 2).sum(axis=2)
+    squared_distance = ((effectiveness[:, None, :] - label_settings[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(squared_distance.argmin(axis=1))
 
 
@@ -105,7 +105,7 @@ def score_against_failures(
 
 def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray) -> dict[str, float]:
     """Return the names after the failure, as shares of the rows with an alarm."""
-    names, count = np.unique(rows.named_surfaces[alarm_rows_after].astype(str), return_counts=True)
+    names, count = np.unique(rows.isolated_surfaces[alarm_rows_after].astype(str), return_counts=True)
     return {
         str(name): float(share)
         for name, share in zip(names, count / max(len(alarm_rows_after), 1), strict=True)

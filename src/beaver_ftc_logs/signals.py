@@ -84,20 +84,21 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     )
 
 
-def column_defect_texts(name: str, column: Column, measured: bool) -> list[str]:
-    """Return a line for each mistake in a column over the whole flight. measured: a rate, not a command."""
+def column_defect_texts(name: str, column: Column, is_measured_rate: bool) -> list[str]:
+    """Return a line for each mistake in a column over the whole flight. is_measured_rate: a rate, not a
+    command."""
     values, lines = column.values, [column.note] if column.note else []
     n_missing = int((~np.isfinite(values)).sum())
     if n_missing:
         lines.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
     longest_still_s = float(unchanged_time_s(column).max(initial=0.0))
-    if measured and longest_still_s > MIN_STILL_S:
+    if is_measured_rate and longest_still_s > MIN_STILL_S:
         lines.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
-    if not measured and values.size and np.nanmin(values) == np.nanmax(values):
+    if not is_measured_rate and values.size and np.nanmin(values) == np.nanmax(values):
         lines.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if measured and (rows := is_clipped(values)).any():
+    if is_measured_rate and (rows := is_clipped(values)).any():
         lines.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
-    if measured and len(spike_rows := find_spike_rows(values)):
+    if is_measured_rate and len(spike_rows := find_spike_rows(values)):
         jump_count_text = "1 jump" if len(spike_rows) == 1 else f"{len(spike_rows)} jumps"
         lines.append(f"{name}: {jump_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
     return lines

@@ -28,13 +28,13 @@ _DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between sampl
 @dataclass(frozen=True)
 class ReplayedVerdicts:
     """verdicts, one a sample; effectiveness_low and effectiveness_high (n, S) of each surface if it alone is
-    at fault; max_command_gains (S,): of what each command does at most as much as this in all of it, 1 where
-    it is too short."""
+    at fault; command_gain_upper_bounds (S,): of what each command does at most as much as this in all of it,
+    1 where it is too short."""
 
     verdicts: list[Verdict]
     effectiveness_low: Floats
     effectiveness_high: Floats
-    max_command_gains: Floats
+    command_gain_upper_bounds: Floats
 
 
 def declared_errors(scenario: Any) -> dict[str, Any]:
@@ -72,13 +72,16 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
         1.0 - _sliding_maximum(-loss_bounds[1], memory_samples),
     )
     is_unexplained = low > high
-    max_command_gains = _max_command_gains(innovation, expected_effect)
+    command_gain_upper_bounds = _command_gain_upper_bounds(innovation, expected_effect)
     return ReplayedVerdicts(
-        verdicts, np.where(is_unexplained, 0.0, low), np.where(is_unexplained, 1.0, high), max_command_gains
+        verdicts,
+        np.where(is_unexplained, 0.0, low),
+        np.where(is_unexplained, 1.0, high),
+        command_gain_upper_bounds,
     )
 
 
-def _max_command_gains(innovation: Floats, expected_effect: Floats) -> Floats:
+def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> Floats:
     """Gains as in `ReplayedVerdicts`, from the rates' innovation (n, 3) and the expected effect of each
     surface, (n, 3, S)."""
     finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
@@ -155,7 +158,7 @@ def rows_of_replay(
     return DiagnosisRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
-        named_surfaces=np.array(names, dtype=object),
+        isolated_surfaces=np.array(names, dtype=object),
         effectiveness=estimate,
         effectiveness_low=low,
         effectiveness_high=high,

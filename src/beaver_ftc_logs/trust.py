@@ -50,10 +50,13 @@ correct logs with faults of any kind none was below 0.98 and 0.87, in light turb
 
 
 def fitted_ranges(
-    flights: Sequence[tuple[Samples, Mask]], model: Model, gain_sd: Floats, noise_scale: float
+    flights: Sequence[tuple[Samples, Mask]],
+    model: Model,
+    gain_standard_error: Floats,
+    noise_variance_scale: float,
 ) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. flights: with the samples used; gain_sd (G,) and
-    noise_scale: of parts not fitted."""
+    """Compute the ranges in which a model was fitted. flights: with the samples used; gain_standard_error
+    (G,) and noise_variance_scale: of parts not fitted."""
     groups = regression.surface_indices_by_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights])
@@ -68,9 +71,9 @@ def fitted_ranges(
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_column_correlation(group_commands).tolist(),
         tied=effect_share_explained_by_others(flights, model).tolist(),
-        gain_sd=gain_sd.tolist(),
+        gain_sd=gain_standard_error.tolist(),
         still_s=_longest_unchanged_times_s(flights),
-        scale=noise_scale,
+        scale=noise_variance_scale,
         energy_climb=_unpowered_energy_height_rate_mps(flights),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
     )
@@ -103,9 +106,15 @@ def _column_correlation(values: Floats) -> Floats:
 
 
 def _longest_unchanged_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
-    names = dict.fromkeys(name for samples, _ in flights for name in samples.still_s)
+    names = dict.fromkeys(name for samples, _ in flights for name in samples.unchanged_time_s)
     return {
-        name: max((float(one.still_s[name].max(initial=0.0)) for one, _ in flights if name in one.still_s))
+        name: max(
+            (
+                float(one.unchanged_time_s[name].max(initial=0.0))
+                for one, _ in flights
+                if name in one.unchanged_time_s
+            )
+        )
         for name in names
     }
 
@@ -122,7 +131,7 @@ def effect_share_explained_by_others(flights: Sequence[tuple[Samples, Mask]], mo
     return np.where(has_moved, np.maximum(explained_share, 0.0), 1.0)
 
 
-def unexplained_effect_power(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def effect_power_unexplained_by_others(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
     """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
     sample, (G,)."""
     return _effect_powers(flights, model)[1]
@@ -278,11 +287,11 @@ class _FlightPartGains(NamedTuple):
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
     log likelihood of a sample of each part, (4,), but for what all colours have alike."""
 
-    max_group_gains: list[float]
-    min_group_gains: list[float]
-    max_column_gains: dict[str, float]
+    group_gain_upper_bounds: list[float]
+    group_gain_lower_bounds: list[float]
+    column_gain_upper_bounds: dict[str, float]
     min_noise_variance_scale: float
-    log_likelihoods: Floats
+    log_likelihood_by_part: Floats
 
 
 def check_columns_as_identified(samples: Samples, model: Model) -> None:
@@ -313,7 +322,10 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     mistakes = _column_mistakes(samples, model, part_gains)
     for noise_ma_coefficients in NOISE_MA_CANDIDATES if mistakes else ():
         other_gains = _bound_part_gains(whiten_samples(samples, noise_ma_coefficients), model)
-        if other_gains is not None and other_gains.log_likelihoods.mean() > part_gains.log_likelihoods.mean():
+        if (
+            other_gains is not None
+            and other_gains.log_likelihood_by_part.mean() > part_gains.log_likelihood_by_part.mean()
+        ):
             other_mistakes = _column_mistakes(samples, model, other_gains)
             mistakes = {what: says for what, says in mistakes.items() if what in other_mistakes}
     says = next(iter(mistakes.values()), None) or _likelier_column_mistake(flight, likeliest_model)
@@ -327,7 +339,11 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGain
     first."""
     mistakes, gain_known = {}, is_group_gain_known(model)
     for group, has_known_gain, max_gain, min_gain in zip(
-        model.groups, gain_known, part_gains.max_group_gains, part_gains.min_group_gains, strict=True
+        model.groups,
+        gain_known,
+        part_gains.group_gain_upper_bounds,
+        part_gains.group_gain_lower_bounds,
+        strict=True,
     ):
         name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
         command, motion_text = (
@@ -349,7 +365,7 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGain
             mistakes[f"unit {name}"] = f"{command} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
     if odd_columns := [
         name
-        for name, share in part_gains.max_column_gains.items()
+        for name, share in part_gains.column_gain_upper_bounds.items()
         if share < _min_plausible_column_gain(model, name)
     ]:
         says = (
@@ -359,11 +375,11 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGain
     return mistakes
 
 
-def _min_plausible_column_gain(model: Model, name: str) -> float:
+def _min_plausible_column_gain(model: Model, column_name: str) -> float:
     """The gain of what the rates answer to a column below which it is another: below what the model's error
     explains; none where that may be all of it."""
     gain_sd = (
-        model.fitted_ranges.column_gain_standard_error.get(name, 0.0)
+        model.fitted_ranges.column_gain_standard_error.get(column_name, 0.0)
         if model.fitted_ranges is not None
         else 0.0
     )
@@ -408,10 +424,10 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
     gain_of_mistake = {}
     for correction in corrected:
         corrected_likelihood = _part_log_likelihoods(correction.samples, model)
-        gain_of_mistake[correction.correction] = (
+        gain_of_mistake[correction.correction_text] = (
             -np.inf
             if corrected_likelihood is None
-            else float((corrected_likelihood[0] + correction.log_density - part_likelihoods).min())
+            else float((corrected_likelihood[0] + correction.log_jacobian - part_likelihoods).min())
         )
     return gain_of_mistake, n_part_samples
 
@@ -480,7 +496,7 @@ def _bound_part_gains(samples: Samples, model: Model) -> _FlightPartGains | None
         _flight_noise_whitening(samples, model),
         len(model.groups),
     )
-    max_gains, min_gains, max_column_gains = (
+    max_gains, min_gains, column_gain_upper_bounds = (
         np.full(n_groups, -np.inf),
         np.full(n_groups, np.inf),
         np.full(len(names), -np.inf),
@@ -501,14 +517,14 @@ def _bound_part_gains(samples: Samples, model: Model) -> _FlightPartGains | None
             np.maximum(max_gains, max_gain[3:]),
             np.minimum(min_gains, -negated_min_gain[3:]),
         )
-        max_column_gains = np.maximum(
-            max_column_gains, 1.0 + column_gain[3 + n_groups :]
+        column_gain_upper_bounds = np.maximum(
+            column_gain_upper_bounds, 1.0 + column_gain[3 + n_groups :]
         )  # what the past does is taken off already
         noise_scales.append(_noise_variance_scale(squared_residual))
     return _FlightPartGains(
         max_gains.tolist(),
         min_gains.tolist(),
-        dict(zip(names, max_column_gains.tolist(), strict=True)),
+        dict(zip(names, column_gain_upper_bounds.tolist(), strict=True)),
         min(noise_scales),
         -log_noise_size - 1.5 * np.log(noise_scales),
     )
@@ -560,7 +576,7 @@ def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mas
     reasons: dict[str, Mask] = {}
     for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
         reasons[f"{name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
-            samples.still_s[name] > max_unchanged_time_s
+            samples.unchanged_time_s[name] > max_unchanged_time_s
         )
     if samples.is_rate_clipped is not None:
         reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
@@ -627,10 +643,10 @@ def _rate_column_names(model: Model) -> list[str]:
 
 def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
-    flights of the model; a rate of which these are known, from a third of STILL_S on."""
+    flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
     fitted_unchanged_time_s = model.fitted_ranges.longest_unchanged_time_s if model.fitted_ranges else {}
     usual_unchanged_time_s = {
-        name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.still_s
+        name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.unchanged_time_s
     } | fitted_unchanged_time_s
     min_unchanged_time_s = {
         name: MIN_STILL_S / 3.0
@@ -640,7 +656,7 @@ def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     }
     return {
         name: max(min_unchanged_time_s[name], _UNCHANGED_TIME_FACTOR * usual_unchanged_time_s[name])
-        for name in samples.still_s
+        for name in samples.unchanged_time_s
     }
 
 
@@ -648,7 +664,7 @@ def is_frozen_or_clipped_sample(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
     is_dead = np.zeros(len(samples.t_s), dtype=bool)
     for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
-        is_dead |= samples.still_s[name] > max_unchanged_time_s
+        is_dead |= samples.unchanged_time_s[name] > max_unchanged_time_s
     return is_dead if samples.is_rate_clipped is None else is_dead | samples.is_rate_clipped
 
 

@@ -345,10 +345,10 @@ class Vehicle(Section):
         default_hz = _DEFAULT_MAX_RATE_HZ if is_air_still else _OTHER_LAWS_MAX_RATE_HZ
         return float(self.max_rate_hz or default_hz)
 
-    def n_signal_lags(self, history: int) -> int:
+    def n_signal_lags(self, n_rate_lags: int) -> int:
         """Past samples of the signals, of so many of the rates: noise that is coloured is whitened by
         filtering all that comes in alike."""
-        return history if self.moving_air else 1
+        return n_rate_lags if self.moving_air else 1
 
     @property
     def surface_airspeed_powers(self) -> list[float]:

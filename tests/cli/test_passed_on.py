@@ -195,7 +195,7 @@ IDENTIFY = {
     "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
     "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
     "beaver_ftc_logs__identification__scale_commands_by_dynamic_pressure": (
-        [SimpleNamespace(name="pressed", n_parts=2, notes=["long"])],
+        [SimpleNamespace(name="pressed", n_log_parts=2, notes=["long"])],
         "described",
     ),
     "beaver_ftc_logs__identification__identify": SimpleNamespace(

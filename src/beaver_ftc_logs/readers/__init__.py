@@ -33,7 +33,7 @@ def read_flight(
     columns: those that a log is read for, all where None. Raises BadInput with one line: why the log cannot
     be used.
     """
-    return next(_read(path, reader, time, {"columns": columns, "rows_per_part": None}))
+    return next(_read_with_reader(path, reader, time, {"columns": columns, "rows_per_part": None}))
 
 
 def read_parts(
@@ -43,11 +43,11 @@ def read_parts(
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read(path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART})
+    return _read_with_reader(path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART})
 
 
-def _read(
-    path: Path, reader: str | None, time: tuple[str, str] | None, of_table: dict[str, Any]
+def _read_with_reader(
+    path: Path, reader: str | None, time: tuple[str, str] | None, table_options: dict[str, Any]
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
     name = reader or detect_reader(path)
@@ -55,12 +55,12 @@ def _read(
         raise BadInput(f"--reader {name}: is not known, allowed: {', '.join(READERS)}")
     module = import_module(f"beaver_ftc_logs.readers.{name}")
     if name == "table":
-        yield from module.read_parts(path, *(time or ()), **of_table)
+        yield from module.read_parts(path, *(time or ()), **table_options)
         return
     if time is not None and time != _TIME_COLUMNS[name]:
         column, unit = _TIME_COLUMNS[name]
         raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    wanted = of_table["columns"] if name in ("ulog", "ardupilot") else None
+    wanted = table_options["columns"] if name in ("ulog", "ardupilot") else None
     yield module.read(path, wanted) if wanted is not None else module.read(path)
 
 

@@ -42,7 +42,7 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 
 
 @cache
-def _load_topic_of_column() -> dict[str, dict[str, Any]]:
+def _load_column_and_failure_topics() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
     found: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
@@ -66,7 +66,7 @@ def read(path: Path) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    wanted = {topic for topic, _, _ in _load_topic_of_column()["columns"].values()}
+    wanted = {topic for topic, _, _ in _load_column_and_failure_topics()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
         if topic in wanted or topic.startswith(_FAILURE_STATUS_PREFIX):
@@ -76,11 +76,11 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 
 
 def _read_columns(
-    topics: dict[str, TopicTable], ordered: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
+    topics: dict[str, TopicTable], rows_in_order: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
 ) -> Iterator[tuple[str, Column]]:
-    for name, (topic, field, unit) in _load_topic_of_column()["columns"].items():
+    for name, (topic, field, unit) in _load_column_and_failure_topics()["columns"].items():
         if field in topics.get(topic, {}):
-            kept_rows, note = ordered[topic]
+            kept_rows, note = rows_in_order[topic]
             t_s = (topics[topic][_TIME_FIELD][kept_rows] - origin_ns) * _S_PER_NS
             yield name, Column(t_s, _CONVERSION_OF_UNIT[unit](topics[topic][field])[kept_rows], note)
 
@@ -117,4 +117,6 @@ def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator
             for code in sorted(set(codes[np.isfinite(codes)])):
                 first = int(np.argmax(codes == code))
                 t_s = float((stamps[first] - origin_ns) * _S_PER_NS)
-                yield LoggedFailure(t_s, _load_topic_of_column()["failures"].get(f"{part} {int(code)}", part))
+                yield LoggedFailure(
+                    t_s, _load_column_and_failure_topics()["failures"].get(f"{part} {int(code)}", part)
+                )

@@ -23,18 +23,18 @@ _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 MessageFields = dict[str, Any]
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
-    wanted: the columns that are kept in memory, all where None.
+    wanted_columns: the columns that are kept in memory, all where None.
     """
-    messages = _read_messages(path, wanted)
+    messages = _read_messages(path, wanted_columns)
     if not messages:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
     return RecordedFlight(path.stem, columns_of_topics(messages, _TIME_FIELD)[0])
 
 
-def _read_messages(path: Path, wanted: Collection[str] | None) -> dict[str, MessageFields]:
+def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, MessageFields]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
     values_of_message: dict[str, MessageFields] = {}
     with (
@@ -51,15 +51,19 @@ def _read_messages(path: Path, wanted: Collection[str] | None) -> dict[str, Mess
             if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numbers:
                 name = _message_name(message.get_type(), fields)
                 for field, values in values_of_message.setdefault(
-                    name, _empty_columns(name, numbers, wanted)
+                    name, _empty_columns(name, numbers, wanted_columns)
                 ).items():
                     values.append(numbers.get(field, nan))
     return values_of_message
 
 
-def _empty_columns(name: str, numbers: MessageFields, wanted: Collection[str] | None) -> MessageFields:
+def _empty_columns(
+    name: str, numbers: MessageFields, wanted_columns: Collection[str] | None
+) -> MessageFields:
     kept = [
-        field for field in numbers if wanted is None or field == _TIME_FIELD or f"{name}.{field}" in wanted
+        field
+        for field in numbers
+        if wanted_columns is None or field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
     ]
     return {field: array("d") for field in kept}
 

@@ -84,16 +84,16 @@ def _with_unread_columns(names: Sequence[str], cells: TableCells) -> NumberTable
     return {name: cells.numbers.get(name, nothing) for name in names}
 
 
-def _rows_with_time(path: Path, name: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
+def _rows_with_time(path: Path, time_column: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
     n_lost = int(np.isnan(t_s).sum())
     if not n_lost:
         return None, []
     if n_lost > len(t_s) // 2:
         raise BadInput(
-            f"{path}: {name}: {n_lost} of {len(t_s)} rows hold no number, allowed: increasing time"
+            f"{path}: {time_column}: {n_lost} of {len(t_s)} rows hold no number, allowed: increasing time"
         )
-    return np.isfinite(t_s), [f"{name}: rows without a number, left out: {n_lost} of {len(t_s)}"]
+    return np.isfinite(t_s), [f"{time_column}: rows without a number, left out: {n_lost} of {len(t_s)}"]
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
@@ -134,14 +134,16 @@ def _refuse_unreadable(path: Path) -> Iterator[None]:
         raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
 
 
-def check_time(path: Path, t_s: Floats, name: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
+def check_time(path: Path, t_s: Floats, time_column: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
     """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
     wrong_rows = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
     if wrong_rows.size:
         row = n_rows_before + int(wrong_rows[0]) + 1
-        raise BadInput(f"{path}: {name}: row {row}: time does not increase, allowed: increasing seconds")
+        raise BadInput(
+            f"{path}: {time_column}: row {row}: time does not increase, allowed: increasing seconds"
+        )
 
 
 def _table_parts(

@@ -81,8 +81,8 @@ def find_layout(path: Path) -> TableLayout:
     return max(layouts, key=lambda layout: len(layout.column_names))
 
 
-def _unreadable_error(path: Path, says: str) -> BadInput:
-    return BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet")
+def _unreadable_error(path: Path, reason: str) -> BadInput:
+    return BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet")
 
 
 def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout | None:
@@ -129,7 +129,7 @@ def _describe_unreadable(lines: Sequence[str]) -> str:
     return f"no line of names with a line of as many numbers below it; it begins {first[:60]!r}"
 
 
-def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterator[TableCells]:
+def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -> Iterator[TableCells]:
     """The numbers of some of a file's columns, block by block, one at least."""
     from pyarrow import csv
 
@@ -141,19 +141,22 @@ def read_cells(path: Path, layout: TableLayout, wanted: Sequence[str]) -> Iterat
         "parse_options": csv.ParseOptions(
             delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken_lines)
         ),
-        "convert_options": _all_text_conversion(layout.column_names, wanted),
+        "convert_options": _all_text_conversion(layout.column_names, wanted_columns),
     }
     n_rows_read = 0
     with csv.open_csv(path, **options) as blocks:
         for block in blocks:
             cells = TableCells({}, block.num_rows, n_rows_read)
             cells.numbers = {
-                name: _column_as_numbers(block[name], layout.decimal_mark, name, cells) for name in wanted
+                name: _column_as_numbers(block[name], layout.decimal_mark, name, cells)
+                for name in wanted_columns
             }
             cells.broken_lines, broken_lines[:] = broken_lines[:], []
             n_rows_read += block.num_rows
             yield cells
-    yield TableCells({name: np.empty(0) for name in wanted}, 0, n_rows_read, broken_lines=broken_lines)
+    yield TableCells(
+        {name: np.empty(0) for name in wanted_columns}, 0, n_rows_read, broken_lines=broken_lines
+    )
 
 
 def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> None:
@@ -174,13 +177,13 @@ def _broken_line_recorder(broken_lines: list[str]) -> Callable[[Any], str]:
     return record_line
 
 
-def _all_text_conversion(names: Sequence[str], wanted: Sequence[str]) -> Any:
+def _all_text_conversion(names: Sequence[str], wanted_columns: Sequence[str]) -> Any:
     """Every cell as text: which of them hold numbers is found out here, and not by the first block."""
     import pyarrow as pa
     from pyarrow import csv
 
     return csv.ConvertOptions(
-        include_columns=list(wanted) or list(islice(names, 1)),
+        include_columns=list(wanted_columns) or list(islice(names, 1)),
         column_types=dict.fromkeys(names, pa.string()),
         strings_can_be_null=True,
     )

@@ -16,18 +16,18 @@ _MAX_MESSAGE_BYTES = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted: the columns that are kept in memory, all where None.
+    wanted_columns: the columns that are kept in memory, all where None.
     """
     topics = {
         _topic_name(topic): topic.data
-        for topic in _read_topics(path, wanted)
+        for topic in _read_topics(path, wanted_columns)
         if len(topic.data.get(_TIME_FIELD, ()))
     }
-    if wanted is not None and topics:
-        topics = {name: _select_wanted_fields(name, data, wanted) for name, data in topics.items()}
+    if wanted_columns is not None and topics:
+        topics = {name: _select_wanted_fields(name, data, wanted_columns) for name, data in topics.items()}
     if not topics:
         raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
     columns, origin_s = columns_of_topics(topics, _TIME_FIELD)
@@ -39,11 +39,13 @@ def _topic_name(topic: Any) -> str:
     return str(topic.name) if topic.multi_id == 0 else f"{topic.name}_{topic.multi_id}"
 
 
-def _select_wanted_fields(name: str, data: dict[str, Any], wanted: Collection[str]) -> dict[str, Any]:
-    return {field: of for field, of in data.items() if field == _TIME_FIELD or f"{name}.{field}" in wanted}
+def _select_wanted_fields(name: str, data: dict[str, Any], wanted_columns: Collection[str]) -> dict[str, Any]:
+    return {
+        field: of for field, of in data.items() if field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
+    }
 
 
-def _read_topics(path: Path, wanted: Collection[str] | None) -> list[Any]:
+def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any]:
     """Read the topics of the wanted columns, of any instance; all where none of these is in the log."""
     with open_log_with_package(path, "ULog", "pyulog", "a .ulg file of PX4"):
         from pyulog import ULog
@@ -54,19 +56,19 @@ def _read_topics(path: Path, wanted: Collection[str] | None) -> list[Any]:
                 _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES
             ):  # pyulog writes every field of one out
                 raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
-        names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted or ()}
-        names = (names | {one.partition(".")[0] for one in wanted or ()}) & set(formats)
+        names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted_columns or ()}
+        names = (names | {one.partition(".")[0] for one in wanted_columns or ()}) & set(formats)
         topics = list(ULog(str(path), sorted(names) if names else None).data_list)
     return topics
 
 
-def _min_message_bytes(formats: dict[str, Any], name: str, within: tuple[str, ...]) -> int:
+def _min_message_bytes(formats: dict[str, Any], name: str, enclosing_messages: tuple[str, ...]) -> int:
     """Bytes of a message at least, its nested messages in it."""
-    if name in within:
+    if name in enclosing_messages:
         raise ValueError(f"a message {name} holds itself")
     if name not in formats:  # a number, or a type that pyulog complains about
         return 1
     return sum(
-        max(count, 1) * _min_message_bytes(formats, kind, (*within, name))
+        max(count, 1) * _min_message_bytes(formats, kind, (*enclosing_messages, name))
         for kind, count, _ in formats[name].fields
     )

@@ -23,7 +23,7 @@ from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, d
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.fitting import (
     Stretch,
-    add_validity_range,
+    add_fitted_ranges_and_alarm_threshold,
     fit_model,
     score_folds_and_choose_credible_mass,
     usable_stretches,
@@ -70,7 +70,7 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
-    found = [entry for path in (folder, *sorted(folder.iterdir())) if (entry := _data_set(path))]
+    found = [entry for path in (folder, *sorted(folder.iterdir())) if (entry := _load_data_set(path))]
     if not found:
         raise BadInput(
             f"compare: --flights {folder}: holds no data set, allowed: folders with tables and a "
@@ -79,7 +79,7 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
     return found
 
 
-def _data_set(path: Path) -> FlightDataSet | None:
+def _load_data_set(path: Path) -> FlightDataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
@@ -114,15 +114,15 @@ def result_files(document: Document) -> Files:
     }
 
 
-def _compare_methods(data: FlightDataSet) -> Document:
-    stretches, is_single_flight = usable_stretches(data.flights), len(data.flights) == 1
+def _compare_methods(data_set: FlightDataSet) -> Document:
+    stretches, is_single_flight = usable_stretches(data_set.flights), len(data_set.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    shared = settings_of_whole_flight(stretches, data) if is_single_flight else None
+    shared = settings_of_whole_flight(stretches, data_set) if is_single_flight else None
     flights: list[Document] = []
     for fitted, kept, name in validation_folds(stretches):
-        model = add_validity_range(fitted, fit_model(fitted, data.vehicle, shared))
-        recording = next(one for one in data.recordings if one.name == kept.samples.name)
+        model = add_fitted_ranges_and_alarm_threshold(fitted, fit_model(fitted, data_set.vehicle, shared))
+        recording = next(one for one in data_set.recordings if one.name == kept.samples.name)
         flights += [
             {"left_out": name, "method": method, **_score_against_log(kept, rows, model)}
             for method, rows in _diagnosis_rows_of_methods(recording, kept, model)
@@ -132,33 +132,33 @@ def _compare_methods(data: FlightDataSet) -> Document:
     methods = dict.fromkeys(one["method"] for one in flights)
     rows_of = {m: [one for one in flights if one["method"] == m] for m in methods}
     return {
-        "set": data.name,
-        "vehicle": data.vehicle.name,
+        "set": data_set.name,
+        "vehicle": data_set.vehicle.name,
         "scored_by": "labels" if labelled else "events",
         "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
         "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items()],
-        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
+        "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data_set.name, []),
         "flights": flights,
     }
 
 
 def _diagnosis_rows_of_methods(
-    recording: RecordedFlight, kept: Stretch, model: Model
+    recording: RecordedFlight, held_out: Stretch, model: Model
 ) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
         yield (
             METHOD_TITLES.get(name, f"{name}, of the loop"),
-            diagnose_with_detector(name, kept.samples, model),
+            diagnose_with_detector(name, held_out.samples, model),
         )
-    frozen = diagnose_by_freeze_rule(recording, kept.samples, model)
+    frozen = diagnose_by_freeze_rule(recording, held_out.samples, model)
     if frozen is not None:
         yield FREEZE_RULE_TITLE, frozen
 
 
-def settings_of_whole_flight(stretches: list[Stretch], data: FlightDataSet) -> FilterSettings:
+def settings_of_whole_flight(stretches: list[Stretch], data_set: FlightDataSet) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
-    model = fit_model(stretches, data.vehicle)
+    model = fit_model(stretches, data_set.vehicle)
     if len(stretches) > 1:
         return model.settings
     return model.settings.model_copy(
@@ -166,18 +166,18 @@ def settings_of_whole_flight(stretches: list[Stretch], data: FlightDataSet) -> F
     )
 
 
-def _score_against_log(kept: Stretch, rows: DiagnosisRows, model: Model) -> Document:
-    if np.isfinite(kept.samples.labels).any():
-        return scoring.score_against_labels(rows, labels_in_usable_span(kept))
-    return scoring.score_against_failures(rows, kept.samples.logged_failures, model.groups)
+def _score_against_log(held_out: Stretch, rows: DiagnosisRows, model: Model) -> Document:
+    if np.isfinite(held_out.samples.labels).any():
+        return scoring.score_against_labels(rows, labels_in_usable_span(held_out))
+    return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_in_usable_span(kept: Stretch) -> np.ndarray:
+def labels_in_usable_span(held_out: Stretch) -> np.ndarray:
     """Labels in the whole span of what is kept, their edges included: they count in the score; else NaN."""
-    usable_rows, labels = np.flatnonzero(kept.usable), np.full_like(kept.samples.labels, np.nan)
+    usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
     if usable_rows.size:
         span = slice(usable_rows[0], usable_rows[-1] + 1)
-        labels[span] = kept.samples.labels[span]
+        labels[span] = held_out.samples.labels[span]
     return labels
 
 
@@ -345,8 +345,8 @@ def draw_comparison_figure(document: Document) -> Any:
     return figure
 
 
-def _method_titles(part: Document) -> list[str]:
-    return [row["method"] for row in (*part["rows"], *part.get("published", ()))]
+def _method_titles(data_set: Document) -> list[str]:
+    return [row["method"] for row in (*data_set["rows"], *data_set.get("published", ()))]
 
 
 def _draw_failure_delays(axis: Any, data_set: Document) -> None:
@@ -379,10 +379,10 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     axis.set_xlabel(f"delay, s (grey: not found within {_MAX_SHOWN_DELAY_S:g} s)", fontsize=9)
 
 
-def _draw_label_shares(axis: Any, part: Document) -> None:
+def _draw_label_shares(axis: Any, data_set: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
     keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
-    rows = [*part["rows"], *part["published"]]
+    rows = [*data_set["rows"], *data_set["published"]]
     for i, (key, label) in enumerate(keys.items()):
         known = [place for place, row in enumerate(rows) if row.get(key) is not None]
         heights = [place + 0.22 * (i - 1) for place in known]

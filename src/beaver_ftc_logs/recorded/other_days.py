@@ -180,22 +180,23 @@ def run_other_days(folder: Path) -> Document:
     return {"sets": [_test_data_set_on_days(data) for data in labelled]}
 
 
-def _test_data_set_on_days(data: benchmark.FlightDataSet) -> Document:
-    stretches = usable_stretches(data.flights)
-    settings = benchmark.settings_of_whole_flight(stretches, data)
+def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
+    stretches = usable_stretches(data_set.flights)
+    settings = benchmark.settings_of_whole_flight(stretches, data_set)
     models = [
-        (fit_model(fitted, data.vehicle, settings), kept) for fitted, kept, _ in validation_folds(stretches)
+        (fit_model(fitted, data_set.vehicle, settings), kept)
+        for fitted, kept, _ in validation_folds(stretches)
     ]
-    whole = fit_model(stretches, data.vehicle, settings)
-    surfaces = len(data.vehicle.surfaces)
+    whole = fit_model(stretches, data_set.vehicle, settings)
+    surfaces = len(data_set.vehicle.surfaces)
     kinds = {
-        "one change": one_change_days(mixer_matrix(data.vehicle), data.vehicle.command_columns),
+        "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_columns),
         "drawn, settings chosen on these": random_days(surfaces, TUNING_SEEDS),
         "drawn, not looked at": random_days(surfaces, TEST_SEEDS),
     }
     rows = [row for kind, days in kinds.items() for row in _day_scores(kind, days, models, whole)]
     summaries = [_summarize_days(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
-    return {"set": data.name, "rows": rows, "summary": summaries}
+    return {"set": data_set.name, "rows": rows, "summary": summaries}
 
 
 def _day_scores(

@@ -61,7 +61,9 @@ def test_shares_are_those_of_the_settings(name):
     assert bank.transition_probability == pytest.approx(9.0 / 36000.0)
     assert bank.no_response_index == len(bank.hypothesis_kind) - 1
     assert bank.hypothesis_kind[[0, -1]].tolist() == [HEALTHY, NO_RESPONSE]
-    assert bank.is_fault.tolist() == [kind in (GROUP_LOSS, PAIR_LOSS) for kind in bank.hypothesis_kind]
+    assert bank.is_fault_hypothesis.tolist() == [
+        kind in (GROUP_LOSS, PAIR_LOSS) for kind in bank.hypothesis_kind
+    ]
     lost = (bank.effectiveness < 1.0).sum(axis=1)
     assert {
         kind: set(lost[bank.hypothesis_kind == kind]) for kind in (HEALTHY, GROUP_LOSS, UNKNOWN_OFFSET)

@@ -93,7 +93,7 @@ def test_a_flight_cut_short_says_the_same_up_to_the_cut(log):
     _, cut, _ = diagnose_with_aircraft_model(only(recording, slice(0, 700)), vehicle, BEAVER)
     for name in (
         "faulty",
-        "named_surfaces",
+        "isolated_surfaces",
         "effectiveness",
         "effectiveness_low",
         "effectiveness_high",
@@ -151,10 +151,10 @@ def test_what_each_command_does_in_all_of_a_flight(theta, gain):
     expected, noise = rng.standard_normal((4000, 3, 2)), 0.1 * rng.standard_normal((4000, 3))
     planted = np.repeat(theta, 1000, axis=0)
     innovation = np.einsum("nas,ns->na", expected, planted) + np.array([0.5, 0.0, -0.2]) + noise
-    found = stepped._max_command_gains(innovation, expected)
+    found = stepped._command_gain_upper_bounds(innovation, expected)
     assert np.all(found > gain)
     assert found == pytest.approx(gain, abs=0.1)
-    assert (stepped._max_command_gains(innovation[:200], expected[:200]) == 1.0).all()
+    assert (stepped._command_gain_upper_bounds(innovation[:200], expected[:200]) == 1.0).all()
 
 
 def test_a_command_of_the_other_sign_is_refused_but_in_declared_turbulence(tmp_path):
@@ -420,7 +420,7 @@ def test_stretches_make_one_flight():
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
-    assert found.max_command_gains.tolist() == [0.5, 0.4]
+    assert found.command_gain_upper_bounds.tolist() == [0.5, 0.4]
 
 
 PAIR = SimpleNamespace(
@@ -471,7 +471,7 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     ([(-0.29, 0.9), (0.5, -0.29)], None),
 ])  # fmt: skip
 def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
-    stretches = [SimpleNamespace(max_command_gains=np.array(of)) for of in gains]
+    stretches = [SimpleNamespace(command_gain_upper_bounds=np.array(of)) for of in gains]
     if says is None:
         by_aircraft._check_command_signs("log", PAIR, stretches)
         return

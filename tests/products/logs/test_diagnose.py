@@ -30,7 +30,7 @@ def test_faults_are_named_and_measured(flown, rows):
     for begin, end, surface, level in ((65, 120, 1, 0.5), (165, 220, 0, 0.4)):
         within = (rows.t_s > begin) & (rows.t_s < end)
         assert np.median(rows.effectiveness[within, surface]) == pytest.approx(level, abs=0.101)
-        assert np.mean(rows.named_surfaces[within] == ("right", "left")[surface]) > 0.9
+        assert np.mean(rows.isolated_surfaces[within] == ("right", "left")[surface]) > 0.9
     before = rows.t_s < 60
     assert rows.faulty[before].mean() < 0.02
 
@@ -50,7 +50,7 @@ def test_cutting_the_flight_short_changes_no_earlier_row(wing, wing_folder, wing
     for field in (
         "t_s",
         "faulty",
-        "named_surfaces",
+        "isolated_surfaces",
         "effectiveness",
         "effectiveness_low",
         "effectiveness_high",

@@ -78,9 +78,9 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
     """Where the probability of a fault is what the changes of a sample make of the last, there is none; where
     its odds are tenfold that, log 10."""
     bank = build_hypothesis_bank(small.model(small.TAIL))
-    first = float(bank.prior_probability[bank.is_fault].sum())
+    first = float(bank.prior_probability[bank.is_fault_hypothesis].sum())
     change = bank.transition_probability * float(
-        bank.transition_share[bank.is_fault].sum() / bank.transition_share.sum()
+        bank.transition_share[bank.is_fault_hypothesis].sum() / bank.transition_share.sum()
     )
     second = (1.0 - bank.transition_probability) * first + change
     odds = (
@@ -89,7 +89,7 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
         / (1.0 - ((1.0 - bank.transition_probability) * second + change))
     )
     posterior = np.zeros((3, len(bank.transition_share)))
-    place = int(np.flatnonzero(bank.is_fault)[0])
+    place = int(np.flatnonzero(bank.is_fault_hypothesis)[0])
     posterior[:, place] = first, second, odds / (1.0 + odds)
     posterior[:, 0] = 1.0 - posterior[:, place]
     np.testing.assert_allclose(

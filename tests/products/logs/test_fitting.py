@@ -287,7 +287,7 @@ def test_settings_of_flights_that_change_in_every_way():
     stretches = fitting.usable_stretches([rate, weak, changed(rate, labels=labels)])
     settings = fitting.estimate_filter_settings(stretches, MODEL)
     assert settings.likely_effectiveness_levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
-    hours = sum(stretch.usable.sum() for stretch in stretches) / 36000.0
+    hours = sum(stretch.is_usable.sum() for stretch in stretches) / 36000.0
     assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
     assert settings.repair_share == pytest.approx((1 + 10) / (4 + 20))
 
@@ -310,10 +310,12 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
         [Stretch(small.flight(MODEL, 20), use)]
     )
     assert (late, early) == ("second half", "first half")
-    assert np.flatnonzero(first.usable).tolist() == np.flatnonzero(same.usable).tolist() == [3, 4]
-    assert np.flatnonzero(second.usable).tolist() == np.flatnonzero(other.usable).tolist() == [9, 15, 18]
+    assert np.flatnonzero(first.is_usable).tolist() == np.flatnonzero(same.is_usable).tolist() == [3, 4]
+    assert (
+        np.flatnonzero(second.is_usable).tolist() == np.flatnonzero(other.is_usable).tolist() == [9, 15, 18]
+    )
     nothing = fitting.validation_folds([Stretch(small.flight(MODEL, 20), np.zeros(20, dtype=bool))])
-    assert [kept.usable.any() for _, kept, _ in nothing] == [False, False]
+    assert [kept.is_usable.any() for _, kept, _ in nothing] == [False, False]
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
@@ -352,7 +354,7 @@ def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatc
 def test_what_one_step_prediction_explains(stretches):
     """By the residual of the model itself, written out from its file."""
     (stretch,) = stretches
-    samples, use = stretch.samples, stretch.usable
+    samples, use = stretch.samples, stretch.is_usable
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     rows, residual = fitting.one_step_residuals(MODEL, stretch)
     expected = [k for k in np.flatnonzero(use) if k >= 3]
@@ -437,7 +439,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
         groups=[["rudder"]],
         model_copy=lambda update: update,
     )
-    found = fitting.add_validity_range([], model)
+    found = fitting.add_fitted_ranges_and_alarm_threshold([], model)
     expected = {
         "alarm_peak_tail": None,
         "max_column_mistake_log_likelihood_gain": 0.6,
@@ -450,4 +452,4 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     vehicle.false_alarms_per_hour = 0.5
     more = fitting.extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 120 - 15
     with pytest.raises(BadInput, match=f"_per_hour 0.5: 15.0 min .* allowed: {more:.0f} min more"):
-        fitting.add_validity_range([], model)
+        fitting.add_fitted_ranges_and_alarm_threshold([], model)

@@ -56,12 +56,12 @@ def test_least_squares_by_one_batch(name):
         np.testing.assert_allclose(rows.effectiveness_low[k], np.minimum(low, nearest), atol=1e-9)
         np.testing.assert_allclose(rows.effectiveness_high[k], np.maximum(high, nearest), atol=1e-9)
         named = "+".join(side for side, level in zip(("right", "left"), nearest, strict=True) if level < 1.0)
-        assert (rows.named_surfaces[k], rows.faulty[k], rows.fault_probability[k]) == (
+        assert (rows.isolated_surfaces[k], rows.faulty[k], rows.fault_probability[k]) == (
             named,
             bool(named),
             bool(named),
         )
-    assert rows.named_surfaces[399] == "left"
+    assert rows.isolated_surfaces[399] == "left"
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -74,7 +74,7 @@ def test_without_labels_a_loss_is_sure_by_five_sd(name):
         value, sd = batch(samples, model, k, name == "forgetting")
         np.testing.assert_allclose(rows.effectiveness[k], np.clip(value, 0, 1), atol=1e-9)
         lost = [side for side, v, s in zip(("right", "left"), value, sd, strict=True) if v + 5.0 * s < 1.0]
-        assert rows.named_surfaces[k] == "+".join(lost)
+        assert rows.isolated_surfaces[k] == "+".join(lost)
         sure.append(bool(lost))
     assert 3 < sum(sure) < 14
 
@@ -85,7 +85,7 @@ def test_rows_of_least_squares(changed, name, of):
     model = {"wing": WING, "tail": TAIL}[of]
     rows = detectors.diagnose_with_detector(METHODS[name], small.flight(model, 300, lost=LOST), model)
     said = {name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()}
-    assert not changed(said | {"faulty": in_short(rows.faulty), "named": rows.named_surfaces[::25]})
+    assert not changed(said | {"faulty": in_short(rows.faulty), "named": rows.isolated_surfaces[::25]})
 
 
 def logged(*columns):
@@ -101,7 +101,7 @@ def test_an_output_that_stands_still_for_six_seconds_is_frozen():
     rows = detectors.diagnose_by_freeze_rule(logged(("left_output", t_s, values), moving), samples, TAIL)
     frozen = [3.0 + 6.0 < t < 21.0 for t in samples.t_s]
     assert rows.faulty.tolist() == frozen
-    assert set(rows.named_surfaces[np.array(frozen)]) == {"left_aileron"}
+    assert set(rows.isolated_surfaces[np.array(frozen)]) == {"left_aileron"}
     np.testing.assert_array_equal(
         rows.effectiveness, np.column_stack([1.0 - np.array(frozen), np.ones((60, 2))])
     )
@@ -115,7 +115,7 @@ def test_before_its_first_stamp_an_output_is_not_frozen():
     late = logged(("elevator_output", [20.0, 21.0], [1.0, 1.0]))
     rows = detectors.diagnose_by_freeze_rule(late, samples, TAIL)
     assert np.flatnonzero(rows.faulty).tolist() == list(range(27, 40))
-    assert set(rows.named_surfaces) == {"", "elevator"}
+    assert set(rows.isolated_surfaces) == {"", "elevator"}
     assert detectors.diagnose_by_freeze_rule(logged(), samples, TAIL) is None
     assert detectors.diagnose_by_freeze_rule(late, samples, BARE) is None
 
@@ -202,7 +202,7 @@ def test_a_verdict_of_the_loop_becomes_a_row(name):
     verdict, (named, faulty, estimate, low, probability) = VERDICTS[name]
     samples = small.flight(BARE, 3)
     rows = detectors.rows_of_verdicts([Verdict(), verdict, Verdict()], samples, BARE)
-    assert (rows.named_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
+    assert (rows.isolated_surfaces.tolist(), rows.faulty.tolist()) == (["", named, ""], [0, faulty, 0])
     np.testing.assert_allclose(rows.effectiveness, [[1, 1], estimate, [1, 1]])
     np.testing.assert_allclose(rows.effectiveness_low, [[1, 1], low, [1, 1]])
     np.testing.assert_allclose(rows.effectiveness_high, np.ones((3, 2)))
@@ -212,7 +212,7 @@ def test_a_verdict_of_the_loop_becomes_a_row(name):
 def test_surfaces_that_move_together_share_a_verdict():
     both = LOSS._replace(isolated="aileron")
     rows = detectors.rows_of_verdicts([both], small.flight(TAIL, 1), TAIL)
-    assert rows.named_surfaces.tolist() == ["left_aileron+right_aileron"]
+    assert rows.isolated_surfaces.tolist() == ["left_aileron+right_aileron"]
     assert rows.effectiveness.tolist() == [[0.6, 1.0, 0.6]]
     assert rows.effectiveness_low.tolist() == [[0.0, 1.0, 0.0]]
 

@@ -60,7 +60,7 @@ def test_surfaces_that_move_together_are_said_to_and_named_together(wing_folder)
         samples = sampled(slaved, wing_folder, "one", duration_s=160.0, parts=(part,), seed=62)
         assert isolability_document(samples, model)["together"][0]["surfaces"] == ["right", "left"]
         rows = diagnose(samples, model)
-        named.append(set(rows.named_surfaces[rows.faulty == 1]) - {"unknown"})
+        named.append(set(rows.isolated_surfaces[rows.faulty == 1]) - {"unknown"})
         suspected = rows.faulty == 1
         assert (rows.effectiveness_low[suspected] == 0.0).mean() > 0.9
     assert named[0] == named[1] == {"right+left"}

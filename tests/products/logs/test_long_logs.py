@@ -103,9 +103,11 @@ def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypa
 def test_a_fit_looks_at_stretches_that_are_spread_evenly(tmp_path, parted, wing):
     path = write(tmp_path / "long.csv", synthetic.fly(400.0))
     (found,) = samples.load_flights_for_fit([path], wing)
-    assert found.n_parts > 1
+    assert found.n_log_parts > 1
     assert len(found.t_s) <= 600
-    assert found.notes[0].startswith(f"a long log, read in {found.n_parts} parts: {len(found.t_s)} samples")
+    assert found.notes[0].startswith(
+        f"a long log, read in {found.n_log_parts} parts: {len(found.t_s)} samples"
+    )
     edges = found.t_s[np.flatnonzero(np.diff(found.stretch_number, prepend=-1))]
     assert np.diff(edges) == pytest.approx(80.0, abs=20.0)
     whole = read_flight(path).columns["q_rad_s"]
@@ -120,7 +122,7 @@ def test_parts_say_what_the_whole_says(tmp_path, parted, wing, wing_model):
         rows = diagnose(part, wing_model)
         settled = rows.t_s > rows.t_s[0] + 25.0
         known = np.searchsorted(whole.t_s, rows.t_s[settled])
-        assert (rows.named_surfaces[settled] == whole.named_surfaces[known]).mean() > 0.97
+        assert (rows.isolated_surfaces[settled] == whole.isolated_surfaces[known]).mean() > 0.97
         assert np.abs(rows.effectiveness[settled] - whole.effectiveness[known]).mean() < 0.1
 
 

@@ -216,12 +216,12 @@ def test_columns_are_compared_in_white(moving, colour):
         for one in moving.noise_models
     ]
     likeliest = max(
-        zip(found, moving.noise_models, strict=True), key=lambda pair: pair[0].log_likelihoods.mean()
+        zip(found, moving.noise_models, strict=True), key=lambda pair: pair[0].log_likelihood_by_part.mean()
     )
     assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
-    assert all(1.0 < gain < 1.6 for gain in likeliest[0].max_group_gains)
+    assert all(1.0 < gain < 1.6 for gain in likeliest[0].group_gain_upper_bounds)
     plain = trust._bound_part_gains(flight, moving.model_copy(update={"noise_models": []}))
-    assert colour == (1.0,) or min(plain.max_group_gains) > 1.9  # what coloured noise does to the fit
+    assert colour == (1.0,) or min(plain.group_gain_upper_bounds) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 

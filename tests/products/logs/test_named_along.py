@@ -27,21 +27,21 @@ def biased(wing, wing_folder):
 
 def named(biased, wing_model, name):
     rows = diagnose(biased, wing_model)
-    given = replace(rows, named_surfaces=np.full(len(rows.t_s), name, dtype=object))
+    given = replace(rows, isolated_surfaces=np.full(len(rows.t_s), name, dtype=object))
     return _withdraw_contradicted_isolation(biased, wing_model, given, 12.0)
 
 
 def test_the_other_surface_is_taken_back_and_its_bounds_with_it(biased, wing_model):
     found = named(biased, wing_model, "right")
     late = found.t_s > FROM_S + 1.0
-    assert (found.named_surfaces[late] == "unknown").mean() > 0.99
-    assert (found.effectiveness_low[late & (found.named_surfaces == "unknown")] == 0.0).all()
-    assert (found.named_surfaces[found.t_s < FROM_S] == "right").mean() > 0.95
+    assert (found.isolated_surfaces[late] == "unknown").mean() > 0.99
+    assert (found.effectiveness_low[late & (found.isolated_surfaces == "unknown")] == 0.0).all()
+    assert (found.isolated_surfaces[found.t_s < FROM_S] == "right").mean() > 0.95
 
 
 def test_the_surface_at_fault_keeps_its_name(biased, wing_model):
-    assert (named(biased, wing_model, "left").named_surfaces == "left").all()
-    assert (named(biased, wing_model, "right+left").named_surfaces == "right+left").mean() < 1.0
+    assert (named(biased, wing_model, "left").isolated_surfaces == "left").all()
+    assert (named(biased, wing_model, "right+left").isolated_surfaces == "right+left").mean() < 1.0
 
 
 def test_the_residual_is_white_in_health_and_along_the_bias_after_it(biased, wing_model):

@@ -118,7 +118,7 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
     samples, rows = flown
     assert pages.write_diagnosis(tmp_path, samples, MODEL, rows, {"faulty": True}) == tmp_path / "small"
     table = parquet.read_table(tmp_path / "small" / "diagnosis.parquet").to_pydict()
-    expected = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.named_surfaces}
+    expected = {"t_s": rows.t_s, "faulty": rows.faulty, "named": rows.isolated_surfaces}
     for i, surface in enumerate(("right", "left")):
         its = {
             "effectiveness": rows.effectiveness,
@@ -226,7 +226,7 @@ def test_a_picture_of_one_part_or_none(known, shown):
     model = small.model()
     flights = [small.flight(model, 200, name=str(seed), seed=seed) for seed in (1, 2)]
     fitted, kept_part = usable_stretches(flights)
-    part = Stretch(kept_part.samples, kept_part.usable if known else np.zeros(200, dtype=bool))
+    part = Stretch(kept_part.samples, kept_part.is_usable if known else np.zeros(200, dtype=bool))
     nothing = Stretch(fitted.samples, np.zeros(200, dtype=bool))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

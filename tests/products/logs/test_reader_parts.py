@@ -28,7 +28,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (topic, field, _) in enumerate(alfa._load_topic_of_column()["columns"].values()):
+    for i, (topic, field, _) in enumerate(alfa._load_column_and_failure_topics()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])

@@ -32,10 +32,10 @@ def column(samples, vehicle, name):
 
 def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
     vehicle, samples = log
-    found = {one.correction: one for one in corrected_readings(samples, vehicle)}
+    found = {one.correction_text: one for one in corrected_readings(samples, vehicle)}
     for name in ("q_rad_s", "beta"):
         scaled = found[f"`scale: 57.3` on {name}"]
-        assert scaled.log_density == pytest.approx(np.log(57.29578) if name == "q_rad_s" else 0.0)
+        assert scaled.log_jacobian == pytest.approx(np.log(57.29578) if name == "q_rad_s" else 0.0)
         for other in (*small.RATES.values(), *vehicle.signal_regressor_names):
             factor = 57.29577951 if other.removesuffix(" by airspeed") == name else 1.0
             np.testing.assert_allclose(
@@ -45,7 +45,7 @@ def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
 
 def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
     vehicle, samples = log
-    found = {one.correction: one.samples for one in corrected_readings(samples, vehicle)}
+    found = {one.correction_text: one.samples for one in corrected_readings(samples, vehicle)}
     rates, turned = (
         found["p_rad_s and r_rad_s exchanged"],
         found["the commands of left_aileron and right_aileron exchanged"],

@@ -30,7 +30,7 @@ def test_halves_of_a_flying_wing(enac):
     whole = fit_model(stretches, vehicle)
     for fitted, kept, _ in validation_folds(stretches):
         model = fit_model(fitted, vehicle, whole.settings)
-        labels = np.where(kept.usable[:, None], samples.labels, np.nan)
+        labels = np.where(kept.is_usable[:, None], samples.labels, np.nan)
         found = score_against_labels(diagnose(samples, model), labels)
         assert found["classes"] > 0.75
         assert found["healthy_or_faulty"] > 0.85
@@ -45,8 +45,8 @@ def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
         cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
-        still_s = {name: still[:n] for name, still in samples.still_s.items()}
-        short = diagnose(replace(samples, still_s=still_s, **cut), model)
+        still_s = {name: still[:n] for name, still in samples.unchanged_time_s.items()}
+        short = diagnose(replace(samples, unchanged_time_s=still_s, **cut), model)
         assert np.array_equal(short.credible, whole.credible[:n])
         assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
         assert np.array_equal(short.fault_probability, whole.fault_probability[:n])

@@ -153,7 +153,7 @@ def test_names_by_hand():
     found = diagnose.rows_of_posterior(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
     assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
     aileron = "left_aileron+right_aileron"
-    assert found.named_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
+    assert found.isolated_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
     assert found.effectiveness[0].tolist() == [1.0, 0.25, 1.0]
     assert (found.effectiveness_low[5].tolist(), found.effectiveness_high[5].tolist()) == (
         [0.0, 0.875, 0.0],
@@ -187,7 +187,7 @@ def test_names_under_other_laws(monkeypatch):
     def named_by(of):
         found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
         assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
-        return found.named_surfaces.tolist()
+        return found.isolated_surfaces.tolist()
 
     assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]
     same = model.model_copy(update={"settings": settings})
@@ -208,7 +208,7 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         SimpleNamespace(energy_height_rate_mps="climb"), model, rows
     )
     assert given[0][:2] == ("climb", -1.5)
-    assert found.named_surfaces.tolist() == ["left", UNKNOWN_OFFSET, "right"]
+    assert found.isolated_surfaces.tolist() == ["left", UNKNOWN_OFFSET, "right"]
     for name, value in (("effectiveness", 1.0), ("effectiveness_low", 0.0), ("effectiveness_high", 1.0)):
         values = getattr(rows, name).copy()
         values[1] = value
@@ -235,7 +235,7 @@ def test_rows_at_the_stamps_of_a_faster_log():
     np.testing.assert_array_equal(found.t_s, samples.log_stamps_s)
     for name in (
         "faulty",
-        "named_surfaces",
+        "isolated_surfaces",
         "effectiveness",
         "effectiveness_low",
         "effectiveness_high",
@@ -258,10 +258,10 @@ def test_a_short_flight_through_the_bank(changed, of, settings):
     samples = small.flight(model, 200, lost=((1, 70, 140, 0.4),), gap=100)
     rows = diagnose.diagnose(samples, model)
     assert not changed({
-        "named": rows.named_surfaces[::10], "faulty": rows.faulty[::10],
+        "named": rows.isolated_surfaces[::10], "faulty": rows.faulty[::10],
         "of_a_fault": rows.fault_probability[::10],
         **{name: in_short(getattr(rows, field)) for name, field in small.FIELD_OF_KEPT.items()},
     })  # fmt: skip
     late = slice(110, 140)
-    assert set(rows.named_surfaces[late]) == {"left" if of is small.WING else "elevator"}
+    assert set(rows.isolated_surfaces[late]) == {"left" if of is small.WING else "elevator"}
     assert np.median(rows.effectiveness[late, 1]) == pytest.approx(0.4, abs=0.11)

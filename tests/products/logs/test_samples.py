@@ -165,8 +165,8 @@ def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
     assert np.isnan(found.rates[late, 0]).all()
     assert np.isfinite(found.rates[early, 0]).mean() > 0.6
     assert np.isfinite(found.rates[:, 1:]).all()
-    np.testing.assert_allclose(found.still_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
-    assert found.still_s["p_rad_s"][early].max() < 0.5
+    np.testing.assert_allclose(found.unchanged_time_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
+    assert found.unchanged_time_s["p_rad_s"][early].max() < 0.5
 
 
 def test_the_mixer_has_a_row_a_surface():

@@ -66,7 +66,7 @@ def test_a_rival_finds_a_large_loss(flown, wing_model, name):
     rows = diagnose_with_detector(name, flown, wing_model)
     late = rows.t_s > 90.0
     assert rows.faulty[late].mean() > 0.8
-    assert np.mean(rows.named_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
+    assert np.mean(rows.isolated_surfaces[late & (rows.faulty == 1)] == "left") > 0.8
     assert rows.faulty[(rows.t_s > 30) & (rows.t_s < 60)].mean() < 0.3
 
 
@@ -86,7 +86,7 @@ def test_verdicts_become_rows(flown, wing_model):
         [Verdict(statistic=0.2), said, unknown, said._replace(statistic=0.5)], flown, wing_model
     )
     assert rows.faulty.tolist() == [0, 1, 1, 0]
-    assert rows.named_surfaces.tolist() == ["", "left", "unknown", ""]
+    assert rows.isolated_surfaces.tolist() == ["", "left", "unknown", ""]
     assert rows.effectiveness[1].tolist() == [1.0, pytest.approx(0.6)]
     assert rows.effectiveness_low.tolist() == [[1, 1], [1, 0], [0, 0], [1, 1]]
 

@@ -23,7 +23,7 @@ def trusted(flown=HEALTHY, **changes):
     """A model by hand that knows what it was fitted on."""
     model = small.model(**changes)
     stretches = fitting.usable_stretches([flown])
-    return fitting.add_validity_range(stretches, model)
+    return fitting.add_fitted_ranges_and_alarm_threshold(stretches, model)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def model():
 def silent(rows):
     """Rows that say nothing at all."""
     return (
-        (rows.named_surfaces == "")
+        (rows.isolated_surfaces == "")
         & (rows.faulty == 0)
         & (rows.effectiveness_low == 0.0).all(axis=1)
         & (rows.effectiveness_high == 1.0).all(axis=1)
@@ -45,7 +45,7 @@ def test_a_flight_like_those_fitted_is_credible(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
     assert rows.credible.mean() == 1.0
     assert rows.reasons_not_credible == {}
-    assert "left" in set(rows.named_surfaces[450:])
+    assert "left" in set(rows.isolated_surfaces[450:])
 
 
 @pytest.mark.parametrize(("change", "says"), [
@@ -74,14 +74,14 @@ def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredibl
     flown = small.flight(noisy, n=1500, lost=((1, 600, 1500, 0.0),), seed=21)
     rows = diagnose(flown, model)
     assert rows.credible.mean() > 0.9
-    assert (rows.named_surfaces[900:] == "left").mean() > 0.9
+    assert (rows.isolated_surfaces[900:] == "left").mean() > 0.9
     assert rows.faulty[:600].sum() == 0
 
 
 def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     still = np.zeros(600)
     still[300:400] = 0.1 * np.arange(100)
-    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, unchanged_time_s={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
     assert list(rows.reasons_not_credible) == ["q_rad_s stands still, for longer than 1.5 s"]
@@ -99,7 +99,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
     )
     still = np.zeros(600)
     still[300:320] = 0.1 * np.arange(20)
-    flown = small.flight(model, n=600, seed=4, still_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, unchanged_time_s={"q_rad_s": still})
     assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
 
 
@@ -108,7 +108,7 @@ def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
     known = model.model_copy(update={"fitted_ranges": trained})
     for longest, share in ((11.9, 1.0), (12.5, 0.98)):
         flown = small.flight(
-            model, n=600, seed=4, still_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
+            model, n=600, seed=4, unchanged_time_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
         )
         assert diagnose(flown, known).credible.mean() == pytest.approx(share)
 
@@ -170,8 +170,8 @@ def test_a_surface_that_never_moved_is_not_claimed(model):
     rows = diagnose(small.flight(model, n=600, lost=((0, 200, 600, 0.0),), seed=8), known)
     assert (rows.effectiveness_low[:, 0] == 0.0).all()
     assert (rows.effectiveness_high[:, 0] == 1.0).all()
-    assert set(rows.named_surfaces) <= {"", "unknown", "right+left"}
-    assert not (rows.faulty & (rows.named_surfaces == "")).any()
+    assert set(rows.isolated_surfaces) <= {"", "unknown", "right+left"}
+    assert not (rows.faulty & (rows.isolated_surfaces == "")).any()
     (line,) = trust.unknown_effect_sentences(known)
     assert line.startswith("of what right does, 100.0%")
     with np.errstate(all="raise"):  # no median of nothing: none of its losses is asked for
@@ -188,7 +188,7 @@ def test_few_minutes_mean_wide_bounds():
         model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle())
         errors.append(
             np.array(
-                fitting.add_validity_range(
+                fitting.add_fitted_ranges_and_alarm_threshold(
                     fitting.usable_stretches([flown]), model
                 ).fitted_ranges.group_gain_standard_error
             )
@@ -344,7 +344,7 @@ def test_what_was_clipped_is_remembered_for_half_a_minute():
 def test_for_how_long_each_column_may_stand_still():
     """A rate for a third of 1.5 s where it is known, any column thrice as long as it did; others for ever."""
     names = ["p_rad_s", "q_rad_s", "r_rad_s", "roll", "pitch", "air"]
-    samples = small.flight(small.model(), 20, still_s=dict.fromkeys(names, np.zeros(20)))
+    samples = small.flight(small.model(), 20, unchanged_time_s=dict.fromkeys(names, np.zeros(20)))
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
@@ -353,7 +353,7 @@ def test_for_how_long_each_column_may_stand_still():
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
-    short = replace(samples, t_s=np.arange(3.0), still_s=still_s)
+    short = replace(samples, t_s=np.arange(3.0), unchanged_time_s=still_s)
     assert trust.is_frozen_or_clipped_sample(short, model).tolist() == [False, True, False]
     clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
     assert trust.is_frozen_or_clipped_sample(clipped, model).tolist() == [False, True, True]
@@ -384,9 +384,11 @@ def test_what_is_kept_of_the_flights_fitted():
     climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
     use = np.arange(23) != 21
     one = small.flight(
-        small.model(), 23, energy_height_rate_mps=climbs, still_s={"roll": np.array([0.3, 0.2])}
+        small.model(), 23, energy_height_rate_mps=climbs, unchanged_time_s={"roll": np.array([0.3, 0.2])}
     )
-    other = small.flight(small.model(), 23, still_s={"roll": np.array([0.4]), "air": np.array([0.7])})
+    other = small.flight(
+        small.model(), 23, unchanged_time_s={"roll": np.array([0.4]), "air": np.array([0.7])}
+    )
     flights = [(other, use), (one, use)]
     assert trust._unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)
     assert trust._unpowered_energy_height_rate_mps(flights[:1]) is None
@@ -457,7 +459,9 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     ((what, line),) = wrong.items()
     assert what == ("sign right+left" if says == "sign" else "unit right+left")
     assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
-    faint = trust._column_mistakes(None, model, found._replace(max_column_gains={"V": 0.49, "p": 0.5}))
+    faint = trust._column_mistakes(
+        None, model, found._replace(column_gain_upper_bounds={"V": 0.49, "p": 0.5})
+    )
     assert list(faint) == [what, "columns"]
     assert "answer to V is not" in faint["columns"]
 

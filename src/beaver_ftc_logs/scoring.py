@@ -40,9 +40,12 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
 
     classes: share of rows whose estimate is nearest to the true one of the label's own settings, those that
     it takes for at least a hundredth of the flight, over all surfaces; side: whether the same surfaces are
-    faulty.
+    faulty. Without a row in which every label is known, all figures are None.
     """
     is_known = np.isfinite(labels).all(axis=1)
+    if not is_known.any():
+        names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
+        return {"rows": 0, "settings": [], **dict.fromkeys(names)}
     true_effectiveness, estimated_effectiveness = labels[is_known], rows.effectiveness[is_known]
     label_settings, n_rows_of_setting = np.unique(true_effectiveness, axis=0, return_counts=True)
     frequent_settings = label_settings[n_rows_of_setting >= 0.005 * len(true_effectiveness)]

@@ -228,7 +228,10 @@ def _summarize_delays(surface_failures: Sequence[Document], kind: str) -> Docume
 
 
 def summarize_labels(scores: Sequence[Document]) -> Document:
-    """Mean of the figures over the parts that were left out, weighted by their rows."""
+    """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
+    scores = [one for one in scores if one["rows"]]
+    if not scores:
+        return {**dict.fromkeys(SCORE_TITLES), "rows": 0}
     weights = np.array([one["rows"] for one in scores], dtype=float)
     means = {key: float(np.average([one[key] for one in scores], weights=weights)) for key in SCORE_TITLES}
     return means | {"rows": int(weights.sum())}

@@ -38,6 +38,18 @@ def test_figures_by_labels():
     }
 
 
+def test_labels_that_are_never_known_in_the_same_row_judge_nothing():
+    """By the same path as `diagnose --score`: each surface is labelled, but no row has both labels."""
+    model = small.model()
+    samples = small.flight(model, 4)
+    samples.labels[::2, 0], samples.labels[1::2, 1] = np.nan, np.nan
+    found = scoring.score_diagnosis(samples, small.rows([(4, "left", [1.0, 0.5])], step_s=0.1), model.groups)
+    assert found == {
+        "rows": 0, "settings": [], "classes": None, "healthy_or_faulty": None, "side": None,
+        "mean_error": None, "held_by_bounds": None,
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(("count", "is_one"), [(1, True), (0, False)])
 def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one):
     labels = np.ones((200 + 200 * (not count), 1))

@@ -68,6 +68,15 @@ def test_figures_by_labels_are_weighted_by_rows():
     assert found == {"rows": 4} | {name: pytest.approx(0.375 + 0.1 * k) for k, name in enumerate(names)}
 
 
+def test_a_flight_without_a_row_of_all_labels_does_not_count():
+    names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
+    known = {"rows": 3} | {name: 0.5 + 0.1 * k for k, name in enumerate(names)}
+    nothing = {"rows": 0} | dict.fromkeys(names)
+    found = benchmark.summarize_labels([nothing, known])
+    assert found == {"rows": 3} | {name: pytest.approx(0.5 + 0.1 * k) for k, name in enumerate(names)}
+    assert benchmark.summarize_labels([nothing]) == nothing
+
+
 EVENTS = {
     "set": "gliders", "left_out": "a flight at a time", "scored_by": "events",
     "rows": [{"method": "ours", **benchmark.summarize_failures(SCORES)}],

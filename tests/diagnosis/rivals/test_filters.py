@@ -1,10 +1,17 @@
 """The filters on their own ground: against closed forms, batch solutions and the statistics they promise."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, multivariate_normal
 
-from beaver_ftc.diagnosis.rivals.imm import mix_states, posterior_probabilities, transition_matrix
+from beaver_ftc.diagnosis.rivals.imm import (
+    InteractingMultipleModels,
+    mix_states,
+    posterior_probabilities,
+    transition_matrix,
+)
 from beaver_ftc.diagnosis.rivals.kalman import (
     log_likelihood,
     normalised_innovation_square,
@@ -151,3 +158,34 @@ def test_sigma_points_of_a_covariance_that_rounding_has_bent_are_still_those_of_
     points, weights = sigma_points(np.array([1.0, 2.0, 3.0]), P, 3.0)
     off = points - weights @ points
     assert (off.T * weights) @ off == pytest.approx(P, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("losses", "unknown", "says"),
+    [
+        ([(0.1, 0.2, 0.2), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)], 0.1, {"detected": False}),
+        ([(0.0, 0.0, 0.01), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)], 0.98, {"isolated": "unanticipated"}),
+        (
+            [(0.0, 0.0, 0.01), (0.5, 0.2, 0.2), (0.0, 0.03, 0.0)], 0.05,
+            {"isolated": "elevator", "axis": "q", "estimate": -(0.25 * 0.5 + 0.5 * 0.2 + 0.9 * 0.2) / 0.9},
+        ),
+        (
+            [(0.1, 0.1, 0.04), (0.05, 0.04, 0.01), (0.2, 0.2, 0.1)], 0.15,
+            {"isolated": None, "axis": "r", "candidates": ("aileron", "rudder")},
+        ),
+        ([(0.1, 0.05, 0.04), (0.05, 0.2, 0.01), (0.2, 0.2, 0.1)], 0.04,
+         {"isolated": None, "axis": "r", "candidates": ("elevator", "rudder")}),
+    ],
+)  # fmt: skip
+def test_multiple_models_name_the_surface_that_their_probabilities_add_up_to(losses, unknown, says):
+    """Named from 0.8 on; else all above 0.2 are candidates, by the sum over the levels of a loss."""
+    imm = object.__new__(InteractingMultipleModels)
+    imm.options, imm.detected = {"alarm": 2.0, "isolate": 0.8}, False
+    imm.context = SimpleNamespace(leaders=("aileron", "elevator", "rudder"))
+    healthy = 1.0 - np.sum(losses) - unknown
+    imm.mode_probability = np.array([healthy, *np.ravel(losses), unknown])
+    found = imm.verdict()
+    assert found.statistic == pytest.approx(np.log((1.0 - healthy) / healthy) / 2.0)
+    assert found.detected is says.pop("detected", True)
+    for name, value in says.items():
+        assert getattr(found, name) == (pytest.approx(value) if name == "estimate" else value), name

@@ -65,6 +65,7 @@ def test_a_range_that_holds_the_result_at_its_limit_is_widened():
     found = search(bowl(a=30.0), {"a": narrow}, {"a": 1.0}, 40, 1)
     assert found.values["a"] == pytest.approx(30.0, rel=0.05)
     assert (found.widened, found.ranges["a"].low) == (("a",), 0.1)
+    assert found.start_cost == pytest.approx(1.0 + log(30.0) ** 2)
     assert found.ranges["a"].high == pytest.approx(100.0, rel=1e-3)
 
 

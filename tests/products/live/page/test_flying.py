@@ -220,3 +220,23 @@ def test_a_flight_that_cannot_begin_says_why(tmp_path):
     ((kind, says),) = pipe.sent
     assert kind == BAD_INPUT
     assert says.startswith("high: ")
+
+
+@pytest.mark.parametrize(("now_s", "waiting", "taken", "polls"), [
+    (10.5, 2, 2, [0, 0.0, 0, 0.0, 0]), (10.5, 0, 0, [0]), (9.0, 1, 1, [1.0, 1.0]), (9.0, 0, 0, [1.0]),
+])  # fmt: skip
+def test_a_flight_that_is_late_takes_what_was_asked_before_it_flies_on(
+    monkeypatch, now_s, waiting, taken, polls
+):
+    """The next tick is at 10 s: before it the flight waits so long for a request, after it not."""
+    requests, asked, handled = [(1, f"request {i}") for i in range(waiting)], [], []
+    pipe = SimpleNamespace(
+        poll=lambda wait_s: asked.append(wait_s) or bool(requests), recv=lambda: requests.pop(0)
+    )
+    late = object.__new__(Flying)
+    late._ended, late._pages, late._pace, late._pipe = False, {1: None}, SimpleNamespace(next_s=10.0), pipe
+    late._take = lambda *of: handled.append(of)
+    monkeypatch.setattr(flying, "time", SimpleNamespace(monotonic=lambda: now_s))
+    late._listen()
+    assert handled == [(1, f"request {i}") for i in range(taken)]
+    assert asked == polls

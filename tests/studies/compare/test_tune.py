@@ -153,6 +153,11 @@ def test_ranges_that_are_none_are_refused(monkeypatch, given):
         tunable(DETECTORS, "mine")
 
 
+def test_a_class_that_says_nothing_has_nothing_to_tune(monkeypatch):
+    monkeypatch.setattr("beaver_ftc.plugins.plugin_class", lambda group, name: type("Mine", (), {}))
+    assert tunable(DETECTORS, "mine") == {}
+
+
 def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     with pytest.raises(BadInput, match="nothing to tune"):
         tune([], 5, 1, None, 1, None)

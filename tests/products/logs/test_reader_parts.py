@@ -2,6 +2,7 @@
 
 import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -257,3 +258,10 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     for asked in (None, {"t", "b", "words"}):
         assert table._stored_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
+
+
+def test_a_dataflash_log_has_the_name_of_its_file_without_the_ending(monkeypatch):
+    monkeypatch.setattr(ardupilot, "_read_messages", lambda path, wanted: {"IMU": (path.name, wanted)})
+    monkeypatch.setattr(ardupilot, "columns_of_topics", lambda messages, time: ((messages, time), "rest"))
+    found = ardupilot.read(Path("logs/flight.2.bin"), ["GyrX"])
+    assert (found.name, found.columns) == ("flight.2", ({"IMU": ("flight.2.bin", ["GyrX"])}, "TimeUS"))

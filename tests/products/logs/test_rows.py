@@ -265,3 +265,12 @@ def test_a_short_flight_through_the_bank(changed, of, settings):
     late = slice(110, 140)
     assert set(rows.isolated_surfaces[late]) == {"left" if of is small.WING else "elevator"}
     assert np.median(rows.effectiveness[late, 1]) == pytest.approx(0.4, abs=0.11)
+
+
+def test_rows_of_which_no_more_is_known_are_credible_and_of_evidence_of_their_own_time():
+    rows = small.rows([(3, "", [1.0, 1.0]), (2, "left", [1.0, 0.5])])
+    assert rows.evidence_start_time_s.tolist() == rows.t_s.tolist() == [10.0, 10.5, 11.0, 11.5, 12.0]
+    assert rows.credible.tolist() == [1] * 5
+    given = replace(rows, credible=np.array([1, 0, 1, 1, 0]), evidence_start_time_s=rows.t_s - 0.25)
+    assert given.credible.tolist() == [1, 0, 1, 1, 0]
+    assert given.evidence_start_time_s.tolist() == [9.75, 10.25, 10.75, 11.25, 11.75]

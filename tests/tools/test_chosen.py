@@ -82,10 +82,10 @@ def test_no_flight_of_the_reproduction_is_one_that_its_gains_were_chosen_on():
 
 
 def test_a_row_says_its_constant_its_flights_and_its_results():
-    """Under the same number in each of the three tables."""
+    """Under the same number and name in each of the three tables."""
     head, _, first, *_ = chosen_constants().splitlines()
     assert head == "| " + " | ".join(CONSTANT_HEAD) + " |"
-    assert first.startswith("| 1 | all values in `grades` |")
+    assert first.startswith("| 1 | tuned parameters | all values in `grades` |")
     assert "| 201 to 205, 211 to 216 |" in chosen_flights().splitlines()[2]
     assert "| 101 to 111, 301 to 312 |" in chosen_results().splitlines()[2]
     assert (

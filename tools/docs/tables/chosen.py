@@ -25,9 +25,9 @@ FILE = Path(__file__).parents[1] / "chosen.yaml"
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 TUNED_DRAWS = range(61)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-CONSTANT_HEAD = ("row", "constant", "determines", "file", "chosen by")
-FLIGHT_HEAD = ("row", "flights that chose the constant", "their seeds")
-RESULT_HEAD = ("row", "page", "flights of the results", "their seeds")
+CONSTANT_HEAD = ("row", "name", "constant", "determines", "file", "chosen by")
+FLIGHT_HEAD = ("row", "name", "flights that chose the constant", "their seeds")
+RESULT_HEAD = ("row", "name", "page", "flights of the results", "their seeds")
 
 
 def chosen_constants() -> str:
@@ -124,7 +124,7 @@ def _observer_ratio(ratio: float) -> Iterator[None]:
 
 
 def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) -> str:
-    return markdown_table(head, [(str(row), *cells(choice)) for row, choice in enumerate(choices(), 1)])
+    return markdown_table(head, [(str(row), choice["name"], *cells(choice)) for row, choice in enumerate(choices(), 1)])
 
 
 def _where(choice: Document) -> tuple[str, str]:

@@ -199,7 +199,10 @@ def _rates(number: int, sets: dict[str, Document]) -> str:
     rows = [(str(n), *(_interval(n, share) for share in SHARES)) for n in counts]
     head = ("faulted flights", *(f"measured {100 * share:.0f} %" for share in SHARES))
     return "\n\n".join(
-        [_caption(number, "Wilson 95 % intervals of such shares, rounded to whole faults, %"), markdown_table(head, rows)]
+        [
+            _caption(number, "Wilson 95 % intervals of such shares, rounded to whole faults, %"),
+            markdown_table(head, rows),
+        ]
     )
 
 

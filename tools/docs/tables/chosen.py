@@ -124,7 +124,9 @@ def _observer_ratio(ratio: float) -> Iterator[None]:
 
 
 def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) -> str:
-    return markdown_table(head, [(str(row), choice["name"], *cells(choice)) for row, choice in enumerate(choices(), 1)])
+    return markdown_table(
+        head, [(str(row), choice["name"], *cells(choice)) for row, choice in enumerate(choices(), 1)]
+    )
 
 
 def _where(choice: Document) -> tuple[str, str]:

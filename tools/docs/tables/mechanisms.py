@@ -33,6 +33,12 @@ SIGNED_HEAD = (
     "other sharpened tests", "flights", "same alarm", "same name", "same alarm, name and time of it",
     "earlier name with it", "later name with it",
 )  # fmt: skip
+GROUPS = {  # some criterion is worse, some is better without the mechanism: title
+    (True, False): "Mechanisms that help",
+    (True, True): "Mechanisms that help by one criterion and cost by another",
+    (False, True): "Mechanisms that cost",
+    (False, False): "Mechanisms that change no criterion beyond chance",
+}
 _PICTURED = (
     "Net share of flights that are worse without each mechanism, by four criteria, with 95 % intervals"
 )
@@ -50,8 +56,22 @@ def mechanisms_findings() -> str:
     document, drawn = _flown()
     Path("images").mkdir(exist_ok=True)
     Path("images/mechanisms.png").write_bytes(drawn)
-    says = "\n".join(f"- {sentence}" for sentence in shown.sentences(document))
-    return f"{says}\n\n![{_PICTURED}](images/mechanisms.png)"
+    flown, *_, explained = shown.sentences(document)
+    return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n![{_PICTURED}](images/mechanisms.png)"
+
+
+def _grouped(document: Document) -> str:
+    """The sentence of each mechanism, below the title of its group."""
+    groups: dict[str, list[str]] = {title: [] for title in GROUPS.values()}
+    for row in document["mechanisms"]:
+        groups[GROUPS[_signs(row)]].append(f"- {shown.finding(row)}")
+    return "\n\n".join("\n".join([f"{title}:", "", *says]) for title, says in groups.items() if says)
+
+
+def _signs(row: Document) -> tuple[bool, bool]:
+    """Whether a criterion is worse without the mechanism beyond chance, and whether one is better."""
+    found = [row[name] for name in shown.CRITERIA]
+    return any(one["low"] > 0.0 for one in found), any(one["high"] < 0.0 for one in found)
 
 
 def mechanisms_systems() -> str:

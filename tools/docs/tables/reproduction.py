@@ -22,6 +22,15 @@ from tools.docs.tables import shared
 
 Document = dict[str, Any]
 FOLDER = "images/reproduction"
+IN_WORDS = {  # names of settings and of ablations that the document has, as the page says them
+    "Kp halved, Ki to match": "Kp halved and Ki matched",
+    "Kp doubled, Ki to match": "Kp doubled and Ki matched",
+    "control network_gain halved": "learning gain of the law's network halved",
+    "control parametric_gain halved": "learning gain of the law's effectiveness estimate halved",
+    "square references, which jump themselves": "square references, which jump",
+    "the health (an elevator fault instead)": "nothing is removed; an elevator fault is added",
+}
+MANY = 10  # settings of a row that are written only once, if several rows have the same
 
 
 @shared
@@ -57,19 +66,19 @@ def reproduction_stronger() -> str:
 
 
 def _stronger(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "removed", "ours without it"), [
+    return markdown_table(("published", "statement", "ours", "limit", "removed", "ours without it"), [
         (claim["where"], claim["statement"].rstrip("."), *_both(claim))
         for claim in measured(document)
         if claim["verdict"] == STRONGER and claim["where"].startswith("Fig.") and not claim["construction"]
     ])  # fmt: skip
 
 
-def _both(claim: Document) -> tuple[str, str, str]:
-    """The number as published, what is removed, and the number then."""
+def _both(claim: Document) -> tuple[str, str, str, str]:
+    """The number as published, its limit, what is removed, and the number then."""
     as_flown, without = (
         number(claim[key], claim["unit"], claim["none"]) for key in ("number", "number_without")
     )
-    return as_flown, claim["without"], without
+    return as_flown, limit(claim), IN_WORDS.get(claim["without"], claim["without"]), without
 
 
 def reproduction_not_everywhere() -> str:
@@ -79,18 +88,26 @@ def reproduction_not_everywhere() -> str:
 
 
 def _not_everywhere(document: Document) -> str:
-    return markdown_table(("published", "statement", "settings", "not in"), [
+    claims = [
+        claim for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
+    ]
+    where = ["; ".join(_where_not(document, claim)) for claim in claims]
+    common = [said for said in dict.fromkeys(where) if where.count(said) > 1 and said.count(";") >= MANY]
+    names = {said: f"list {letter}" for said, letter in zip(common, "ABCDEF", strict=False)}
+    table = markdown_table(("published", "statement", "settings", "not in"), [
         (claim["where"], claim["statement"].rstrip("."), f"{claim['borne_out_in']} of {claim['elsewhere']}",
-         "; ".join(_where_not(document, claim)))
-        for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
+         names.get(said, said))
+        for claim, said in zip(claims, where, strict=True)
     ])  # fmt: skip
+    return "\n\n".join([table, *(f"*{name.replace('l', 'L', 1)}:* {said}." for said, name in names.items())])
 
 
 def _where_not(document: Document, claim: Document) -> Iterator[str]:
     for row in document["sensitivity"]:
         for one in (*row["missed"], *row["also_without"]):
             if one["statement"] == claim["statement"]:
-                yield row["variant"] + (" (holds without it)" if one in row["also_without"] else "")
+                said = IN_WORDS.get(row["variant"], row["variant"])
+                yield said + (" (holds without it)" if one in row["also_without"] else "")
 
 
 def reproduction_unsettled() -> str:
@@ -99,7 +116,7 @@ def reproduction_unsettled() -> str:
 
 
 def _unsettled(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "removed", "ours without it"), [
+    return markdown_table(("published", "statement", "ours", "limit", "removed", "ours without it"), [
         (claim["where"], claim["statement"].rstrip("."), *_both(claim))
         for claim in measured(document) if claim["verdict"] == CANNOT_BE_JUDGED
     ])  # fmt: skip

@@ -19,6 +19,7 @@ def verification_map_probe() -> str:
     return _surveyed(speeds_mps=(44.0,), altitudes_m=(1000.0,))
 
 
+COUNTED = ("points", "best point, %", "worst point, %")
 SCALES = (0.5, 2.0)  # of the references of `fault-free`
 
 
@@ -30,8 +31,8 @@ def _surveyed(**where: Any) -> str:
 
 def _map_of(rows: list[dict[str, Any]]) -> str:
     head = (
-        "loss of", "references times", "points", "always: points", "always: least, %", "always: largest, %",
-        "half: points", "half: least, %", "half: largest, %",
+        "loss of", "references times", "points",
+        *(f"{when}: {of}" for when in ("every instant", "half of the instants") for of in COUNTED),
     )  # fmt: skip
     faults = dict.fromkeys(row["fault"] for row in rows)
     return markdown_table(head, [

@@ -164,12 +164,14 @@ def headline(document: Document) -> str:
     """What became of the statements, in sentences."""
     tested, built = document["testable"], document["construction"]
     settings = len(document["sensitivity"])
+    some, count = built["hold"], built["statements"]
+    holding = "all of these hold" if some == count else f"{some} of these {count} hold"
     return (
         f"Of {tested['statements']} testable statements, {tested['hold']} hold, {tested['do_not']} do not "
         f"hold, and {tested['unsettled']} hold even without the mechanism that the statement credits. "
         f"{tested['elsewhere']} of the {tested['hold']} also hold in every one of {settings} settings that "
-        f"the paper did not fly. {built['statements']} other statements follow from the construction of the "
-        f"code, so they show nothing about the scheme; {built['hold']} of these {built['statements']} hold "
+        f"the paper did not fly. {count} other statements follow from the construction of the "
+        f"code, so they show nothing about the scheme; {holding} "
         f"in our flights. The last {document['background']} statements contain nothing that can be measured."
     )
 

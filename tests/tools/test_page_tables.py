@@ -1,0 +1,53 @@
+"""Tables of pages that group rows, or write what several rows share only once."""
+
+from tools.docs.tables import mechanisms, reproduction
+
+from beaver_ftc.studies.mechanisms.shown import CRITERIA
+from beaver_ftc.studies.reproduce.claims import BORNE_OUT
+
+
+def mechanism(name, **ends):
+    """A row of the study; of each criterion, the interval of its net share."""
+    found = {key: {"value": 0.0, "low": -0.1, "high": 0.1} for key in CRITERIA}
+    for key, (low, high) in ends.items():
+        found[key] = {"value": (low + high) / 2, "low": low, "high": high}
+    counts = {"flights": 9, "same_verdict": 4, "same_tracking": 3}
+    return {"mechanism": name, "system": "default", **counts, **found}
+
+
+def test_mechanisms_stand_below_what_they_do():
+    rows = [
+        mechanism("a", late=(-0.3, -0.2)),
+        mechanism("b", late=(0.2, 0.3)),
+        mechanism("c", late=(0.2, 0.3), names=(-0.3, -0.2)),
+        mechanism("d"),
+        mechanism("e", names=(0.1, 0.4)),
+    ]
+    lines = [line for line in mechanisms._grouped({"mechanisms": rows}).splitlines() if line]
+    assert [line[:3] if line.startswith("- ") else line for line in lines] == [
+        "Mechanisms that help:", "- b", "- e",
+        "Mechanisms that help by one criterion and cost by another:", "- c",
+        "Mechanisms that cost:", "- a",
+        "Mechanisms that change no criterion beyond chance:", "- d",
+    ]  # fmt: skip
+
+
+def test_a_long_list_of_settings_that_rows_share_is_written_once():
+    names = ["Kp halved, Ki to match", *(f"s{i}" for i in range(10))]
+    statements = {"x.": names, "y.": names, "z.": names[:1]}
+    claims = [
+        {
+            "where": "I", "statement": statement, "verdict": BORNE_OUT, "construction": False, "reason": "",
+            "borne_out_in": 20 - len(missed), "elsewhere": 20,
+        }
+        for statement, missed in statements.items()
+    ]  # fmt: skip
+    sensitivity = [
+        {"variant": name, "also_without": [], "missed": [
+            {"statement": statement} for statement, missed in statements.items() if name in missed]}
+        for name in names
+    ]  # fmt: skip
+    text = reproduction._not_everywhere({"claims": claims, "sensitivity": sensitivity})
+    rows = [line.split(" | ")[-1].rstrip(" |") for line in text.splitlines()[2:5]]
+    assert rows == ["list A", "list A", "Kp halved and Ki matched"]
+    assert text.splitlines()[-1] == f"*List A:* Kp halved and Ki matched; {'; '.join(names[1:])}."

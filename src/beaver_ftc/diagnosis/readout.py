@@ -157,14 +157,14 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
     residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
-    second of the sample. gust_gain: effect on it of 1 m/s that a gust changes by. filtered_residual,
-    filtered_bound (poles,): through the filters.
+    second of the sample. residual_per_gust_speed: effect on it of 1 m/s that a gust changes by.
+    filtered_residual, filtered_bound (poles,): through the filters.
     """
 
     residual: float
     bound_per_s: float
     bound_per_sample: float
-    gust_gain: float
+    residual_per_gust_speed: float
     filtered_residual: np.ndarray
     filtered_bound: np.ndarray
 
@@ -451,7 +451,8 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     test = redundancy["test"][worst_test]
     worst_sensor_test = SensorTest(
         float(test["residual"]), float(test["bound_per_s"]), float(test["bound_per_sample"]),
-        float(test["gust_gain"]), test["filtered_residual"].copy(), test["filtered_bound"].copy(),
+        float(test["residual_per_gust_speed"]), test["filtered_residual"].copy(),
+        test["filtered_bound"].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test,

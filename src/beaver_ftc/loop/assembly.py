@@ -254,7 +254,9 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     design = prediction["design"]
     prediction["u"] = prediction["commanded"] = frame["control"]["layout"]["trim"] = trim.u
     anchor(design, *trim)
-    redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors)
+    redundancy.configure_sensor_monitor(
+        fdi["sensor_monitor"], scenario, design, trim.y, declared.monitors_sensors
+    )
     mass = mass_of(scenario.design_model, scenario.airframe)
     statistical.configure_statistical_detector(
         fdi, scenario.fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz

@@ -331,7 +331,9 @@ class Loop:
         if not wanted or fdi["sensor_monitor"]["config"]["enabled"]:
             return False
         design = self.frames[0]["prediction"]["design"]
-        redundancy.configure_monitor(fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True)
+        redundancy.configure_sensor_monitor(
+            fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True
+        )
         stop_accelerometers(fdi["statistical"]["gust"])
         fdi["statistical"]["inertial_gust"]["output"]["is_turbulent"] = 0
         return True

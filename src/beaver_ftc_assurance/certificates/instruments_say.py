@@ -69,7 +69,7 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s
         + test.bound_per_sample
-        + test.gust_gain * monitor.gust_change_bound_mps[pole]
+        + test.residual_per_gust_speed * monitor.gust_change_bound_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
     filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]

@@ -257,11 +257,11 @@ def test_a_climb_that_shows_clears_nobody():
         1,
         1.0,
     )
-    assert not sensor_monitor.error_would_exceed_other_test(monitor, level())
+    assert not sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
     monitor["memory"]["exceeded_tests"][CLIMB_TEST] = 0
-    assert sensor_monitor.error_would_exceed_other_test(monitor, level())
+    assert sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
     monitor["output"]["alarm_test"] = BETA_FLOW_TEST
-    assert not sensor_monitor.error_would_exceed_other_test(monitor, level())
+    assert not sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
 
 
 def test_other_alarms_are_none_of_theirs():

@@ -308,7 +308,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
     test, relations = np.zeros(1, TEST_RECORD)[0], new_step()
     relations["config"]["filter_decay"] = keep = np.array([0.0, 0.8, 0.97])
-    relations["config"]["gust_change_bound_mps"], test["gust_gain"] = [0.1, 0.2, 0.3], 0.5
+    relations["config"]["gust_change_bound_mps"], test["residual_per_gust_speed"] = [0.1, 0.2, 0.3], 0.5
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["bound_per_s"], test["bound_per_sample"] = residual[k], rate[k], noise[k]
@@ -337,7 +337,7 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
         0.25,
     )
     redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
-    relations["test"]["filtered_sample_bound"] = 1e-6
+    relations["test"]["filtered_bound_per_sample_part"] = 1e-6
     redundancy.run_redundancy_tests(relations, signal, engine)
     assert (relations["test"]["residual_bound_ratio"][:CLIMB_TEST] < 1.0).all()
     # 100 rpm too fast where 10 are declared, 0.5 inHg too low where a quarter is

@@ -54,7 +54,7 @@ def new_watch(**fields):
         monitor["config"]["enabled"],
         monitor["config"]["substeps"],
         monitor["output"]["isolated_sensor"],
-        monitor["config"]["attitude_correction_share"],
+        monitor["config"]["replaced_rate_correction_share"],
     ) = 1, 4, NO_SENSOR, 1.0
     (
         monitor["redundancy"]["config"]["sample_time_s"],
@@ -549,13 +549,13 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test["filtered_bound"][TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
     test["residual"][TURN_TEST + 1] = size * limit + H * 0.5
-    watching.exclude_gyros(monitor)
+    watching.exclude_gyros_if_attitude_disagrees(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
-    assert monitor["memory"]["gyro_error_difference"][1] == pytest.approx([size * limit] * 3)
-    watching.exclude_gyros(monitor)
+    assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
+    watching.exclude_gyros_if_attitude_disagrees(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
-    assert monitor["memory"]["gyro_error_difference"][1] == pytest.approx(size * limit * kept)
-    assert monitor["memory"]["gyro_error_difference_bound"][1] == pytest.approx(
+    assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx(size * limit * kept)
+    assert monitor["memory"]["filtered_turn_difference_bound"][1] == pytest.approx(
         H * 0.4 * (1.0 + np.array([0.0, 0.9, 0.99]))
     )
 
@@ -584,7 +584,7 @@ def test_a_watch_begins_with_its_first_look():
     assert relations["memory"]["previous_reading"][AIRSPEED] == 45.0
     assert relations["memory"]["previous_body_acceleration"] == pytest.approx([1.0, 2.0, 0.8])
     assert relations["test"]["previous_bound_per_sample"][CLIMB_TEST] == pytest.approx(0.7)
-    assert relations["test"]["filtered_sample_bound"][CLIMB_TEST] == pytest.approx([0.7] * 3)
+    assert relations["test"]["filtered_bound_per_sample_part"][CLIMB_TEST] == pytest.approx([0.7] * 3)
     assert relations["test"]["previous_bound_per_sample"].shape == (N_TESTS,)
 
 
@@ -644,9 +644,9 @@ def test_a_rate_is_what_the_attitude_shows_and_the_models_change_since(gyro, sub
 
 
 def test_where_the_attitude_is_noisy_a_rate_follows_it_slowly_after_one_step():
-    value, _ = stood_in(1, attitude_correction_share=0.1)
+    value, _ = stood_in(1, replaced_rate_correction_share=0.1)
     assert value == pytest.approx(0.2 + 10.0 * 0.5 + H * 2.35)
-    value, _ = stood_in(1, attitude_correction_share=0.1, is_rate_replaced=(0, 1, 0))
+    value, _ = stood_in(1, replaced_rate_correction_share=0.1, is_rate_replaced=(0, 1, 0))
     assert value == pytest.approx(0.2 + 0.1 * 0.02 / H + H * 2.35)
 
 
@@ -704,7 +704,7 @@ def test_the_rates_are_asked_once_a_frame(substep, asked):
             {TURN_TEST: 2.0, ANGLE_TEST: 1.5},
             substep=substep,
             apparent_gyro_error=(0, 0.3, 0),
-            start_stage=watching.RATES_COMPARABLE_STAGE,
+            start_stage=watching.START_STAGE_WITH_COMPARABLE_RATES,
         ),
         new_fdi(),
     )
@@ -765,9 +765,9 @@ def test_of_a_kind_the_first_filter_says_how_large_it_is():
     monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test=TURN_TEST + 1)
     monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST : TURN_TEST + 3, 1:] = 1e3
     monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 50.0
-    assert watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    assert watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
     monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 70.0
-    assert not watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
     (
         monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0],
         monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST + 2, 0],
@@ -775,14 +775,14 @@ def test_of_a_kind_the_first_filter_says_how_large_it_is():
         0.0,
         -70.0,
     )
-    assert not watching.exceeds_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
     for c in (TURN_TEST, ANGLE_TEST):
         small = new_watch()
         (
             small["redundancy"]["test"]["residual_bound_ratio"][c],
             small["redundancy"]["test"]["filtered_residual"][c, 0],
         ) = 2.0, 1e-6
-        assert watching.exceeds_beyond_cross_coupling(small, c, c), (
+        assert watching.exceeds_bound_beyond_cross_coupling(small, c, c), (
             "of small residuals the largest is involved"
         )
 
@@ -835,4 +835,4 @@ def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
         monitor["memory"]["gyro_error_estimate"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
         monitor["redundancy"]["config"]["error_offset"][:] = 1.0
         looked(monitor, fdi)
-        assert bool(monitor["memory"]["gyro_error_difference"].any()) == bool(attitude_is_noisy)
+        assert bool(monitor["memory"]["filtered_turn_difference"].any()) == bool(attitude_is_noisy)

@@ -31,18 +31,25 @@ THRUST_SIGNAL, YAWING_MOMENT_SIGNAL = "thrust", "engines_n"  # signals: CT and C
 MAX_CENTRE_OF_MASS_OFFSET_M = 0.05
 
 # n_engines: engines, 0 where they are not monitored. thrust_index, yawing_moment_index: places of the signals
-# in y. mean_arm: a. thrust_offset_tolerance: of the bound, per CT.
-ENGINE_CONFIG_RECORD = record(
-    n_engines=int, thrust_index=int, yawing_moment_index=int, mean_arm=float, thrust_offset_tolerance=float
+# in y. mean_thrust_arm_over_span: a. yawing_moment_tolerance_per_thrust: of the bound, per CT.
+ENGINE_MONITOR_CONFIG_RECORD = record(
+    n_engines=int,
+    thrust_index=int,
+    yawing_moment_index=int,
+    mean_thrust_arm_over_span=float,
+    yawing_moment_tolerance_per_thrust=float,
 )
-ENGINE_MEMORY_RECORD = record(disabled=int)  # a law has moved an engine apart: the levers are no longer alike
-ENGINE_OUTPUT_RECORD = record(failed=int)  # an engine has failed
+# A law has moved an engine apart: the levers are no longer alike.
+ENGINE_MONITOR_MEMORY_RECORD = record(disabled_by_differential_thrust=int)
+ENGINE_MONITOR_OUTPUT_RECORD = record(engine_failed=int)  # an engine has failed
 ENGINE_MONITOR_RECORD = record(
-    config=ENGINE_CONFIG_RECORD, memory=ENGINE_MEMORY_RECORD, output=ENGINE_OUTPUT_RECORD
+    config=ENGINE_MONITOR_CONFIG_RECORD,
+    memory=ENGINE_MONITOR_MEMORY_RECORD,
+    output=ENGINE_MONITOR_OUTPUT_RECORD,
 )
 
 
-def mean_thrust_arm(aircraft: Aircraft) -> float:
+def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
     """a: the yawing moment of the thrust with all levers alike, per CT."""
     return -sum(of.share * of.right_m for of in aircraft.effectors.values()) / aircraft.geometry.span_m
 
@@ -52,11 +59,14 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     known, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if known is None or not known.knows_engines or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals):
         return
-    config["n_engines"], config["mean_arm"] = len(aircraft.effectors), mean_thrust_arm(aircraft)
+    config["n_engines"], config["mean_thrust_arm_over_span"] = (
+        len(aircraft.effectors),
+        mean_thrust_arm_over_span(aircraft),
+    )
     config["thrust_index"], config["yawing_moment_index"] = (
         DPT + signals.index(name) for name in (THRUST_SIGNAL, YAWING_MOMENT_SIGNAL)
     )
-    config["thrust_offset_tolerance"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
+    config["yawing_moment_tolerance_per_thrust"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
 
 
 @kernel
@@ -65,17 +75,18 @@ def disable_if_differential_thrust(engines, levers):
     to the common one."""
     for e in range(engines.config.n_engines):
         if levers[e] != 0.0:
-            engines.memory.disabled = 1
+            engines.memory.disabled_by_differential_thrust = 1
 
 
 @kernel
-def detect_engine_failure(engines, bound, y):
-    """Whether an engine has failed, by these signals y or before; bound: on |Cn - a CT| here."""
+def detect_engine_failure(engines, yawing_moment_bound, y):
+    """Whether an engine has failed, by these signals y or before; yawing_moment_bound: on |Cn - a CT|
+    here."""
     config = engines.config
-    if config.n_engines > 0 and not engines.memory.disabled:
+    if config.n_engines > 0 and not engines.memory.disabled_by_differential_thrust:
         thrust = y[config.thrust_index]
         if abs(
-            y[config.yawing_moment_index] - config.mean_arm * thrust
-        ) > bound + config.thrust_offset_tolerance * abs(thrust):
-            engines.output.failed = 1
-    return engines.output.failed == 1
+            y[config.yawing_moment_index] - config.mean_thrust_arm_over_span * thrust
+        ) > yawing_moment_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust):
+            engines.output.engine_failed = 1
+    return engines.output.engine_failed == 1

@@ -17,15 +17,15 @@ samples, s; test t; and filter pole m
                                     (error_bound_at_start). Then, at each sample,
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
                                     and for each test, or pair of tests, that couples with the error
-                                      b <- min(b, (r + B + 2 d W_tm) / (MIN_REMAINING_COUPLING_SHARE C))
+                                      b <- min(b, (r + B + 2 d W_tm) / (MIN_REMAINING_SIGNED_EFFECT_SHARE C))
     error_change_bound              d: bound on the change of x within the memory of the slowest filter,
                                     d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
                                     of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
 
-r: |filtered residual|; B: bound on it for sound sensors; C: filtered coupling, a lower bound on the effect of
-a unit of x. Of several tests r + B + 2 d W_tm is the root of the sum of squares. For the airspeed it counts
-1 + b times in the tests of flow; in that of the density 2 (1 + b) / V times r + B of SPEED is added to it. A
-test refutes a hypothesis with
+r: |filtered residual|; B: bound on it for sound sensors; C: filtered signed effect, a lower bound on the
+effect of a unit of x. Of several tests r + B + 2 d W_tm is the root of the sum of squares. For the airspeed
+it counts 1 + b times in the tests of flow; in that of the density 2 (1 + b) / V times r + B of SPEED is added
+to it. A test refutes a hypothesis with
 
     r > B + (b + d) W_tm
     r > (1 + b + d) B + (b + d) W_tm     for the airspeed, in SPEED and the tests after it
@@ -86,17 +86,17 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
 MAX_FLOW_ANGLE_RAD = 0.7  # an aircraft whose attitude and flow are tested flies at less, to either side
-MAX_READING_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
-MAX_ANGLE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
+MAX_AIRSPEED_READING_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
+MAX_CHORD_OF_ATTITUDE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
 MAX_DENSITY_DEVIATION = 0.25  # of the density from the standard atmosphere at a height, as a share of it
 MIN_DENSITY_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
-MIN_REMAINING_COUPLING_SHARE = 0.8
-SLOWEST_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
+MIN_REMAINING_SIGNED_EFFECT_SHARE = 0.8
+SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Places in `coupling`: effects of a unit of an error that are followed with their sign, per sample. Two of
-# them, at right angles, make the effect of phi on the attitude, and on the velocity. The reading that is off
-# comes first; VANE: of alpha and of beta.
+# Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
+# per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
+# reading that is off comes first; VANE: of alpha and of beta.
 (
     PHI_PITCH_RATE_COUPLING,  # h q
     PHI_YAW_RATE_COUPLING,  # h r
@@ -148,8 +148,10 @@ def set_error_bounds_at_start(initial_errors, signal):
         V / expected_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION),
         V / expected_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION),
     )
-    at_start[AIRSPEED_HYPOTHESIS] = min(max(max_ratio - 1.0, 1.0 - min_ratio), MAX_READING_RATIO - 1.0)
-    at_start[PHI_HYPOTHESIS] = at_start[THETA_HYPOTHESIS] = MAX_ANGLE_ERROR
+    at_start[AIRSPEED_HYPOTHESIS] = min(
+        max(max_ratio - 1.0, 1.0 - min_ratio), MAX_AIRSPEED_READING_RATIO - 1.0
+    )
+    at_start[PHI_HYPOTHESIS] = at_start[THETA_HYPOTHESIS] = MAX_CHORD_OF_ATTITUDE_ERROR
     initial_errors.error_bound[:] = at_start
 
 
@@ -163,13 +165,13 @@ def test_showing_error_change(hypothesis):
 def update_error_change_bounds(redundancy, initial_errors):
     """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
     part of it that this filter forgets in a sample."""
-    forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE]
+    forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         test_index, at_start = test_showing_error_change(i), initial_errors.error_bound_at_start[i]
         change = (
-            max_error_effect(redundancy, test_index, SLOWEST_POLE)
+            max_error_effect(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
-            * initial_errors.filtered_effect_per_unit_error[i, test_index, SLOWEST_POLE]
+            * initial_errors.filtered_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
         )
         if i == AIRSPEED_HYPOTHESIS:  # from m/s to a share of the truth, which is at least V / (1 + b)
             change *= (1.0 + initial_errors.error_bound[i]) / max(
@@ -181,15 +183,16 @@ def update_error_change_bounds(redundancy, initial_errors):
 
 
 @kernel
-def fill_effects_per_unit_error(redundancy, initial_errors, signal):
-    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and `coupling` (N_COUPLINGS,).
+def fill_effects_and_signed_effects(redundancy, initial_errors, signal):
+    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and `signed_effect_per_unit_error`
+    (N_COUPLINGS,).
 
     Both are taken at the sample before, from which this sample, signal (N_SENSORS,), is predicted.
     """
     reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
     p, q, r = reading[0], reading[1], reading[2]
     V, phi, theta = max(reading[AIRSPEED], MIN_AIRSPEED_MPS), reading[PHI], reading[THETA]
-    effect, coupling = initial_errors.effect_per_unit_error, initial_errors.coupling
+    effect, signed_effect = initial_errors.effect_per_unit_error, initial_errors.signed_effect_per_unit_error
     effect[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
@@ -214,32 +217,33 @@ def fill_effects_per_unit_error(redundancy, initial_errors, signal):
             (heading_turn if i != 1 else 0.0) + true_secant * second_order
         )
     (
-        coupling[PHI_PITCH_RATE_COUPLING],
-        coupling[PHI_YAW_RATE_COUPLING],
-        coupling[THETA_HEADING_RATE_COUPLING],
+        signed_effect[PHI_PITCH_RATE_COUPLING],
+        signed_effect[PHI_YAW_RATE_COUPLING],
+        signed_effect[THETA_HEADING_RATE_COUPLING],
     ) = (
         h * q,
         h * r,
         h * (q * np.sin(phi) + r * np.cos(phi)),
     )
-    fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
+    fill_flow_effects_and_signed_effects(redundancy, initial_errors, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
     log_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
     effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_change)
-    coupling[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_change
+    signed_effect[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_change
 
 
 @kernel
-def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
-    """Fill `effect_per_unit_error` and `coupling` for the tests of speed, flow and climb, and by gravity.
+def fill_flow_effects_and_signed_effects(redundancy, initial_errors, V, p, q, r):
+    """Fill `effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and climb,
+    and by gravity.
 
     V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
     for the second order in h. x: the error of the row's hypothesis.
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
     reading, a = memory.previous_reading, memory.body_acceleration
-    effect, coupling = initial_errors.effect_per_unit_error, initial_errors.coupling
+    effect, signed_effect = initial_errors.effect_per_unit_error, initial_errors.signed_effect_per_unit_error
     sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
     sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
     sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
@@ -292,7 +296,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     )
     # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
     effect[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb) / (
-        1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_READING_RATIO)
+        1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
     )
     # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
     effect[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
@@ -300,12 +304,12 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
     # is turned by the error
-    coupling[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
-    coupling[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
+    signed_effect[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
+    signed_effect[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch = abs(reading[THETA])
-    coupling[THETA_GRAVITY_COUPLING] = (
+    signed_effect[THETA_GRAVITY_COUPLING] = (
         h
         * g
         * np.cos(
@@ -320,23 +324,23 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    coupling[ALPHA_CLIMB_COUPLING] = (
+    signed_effect[ALPHA_CLIMB_COUPLING] = (
         h * V * cos_beta * vertical_size * np.cos(min(max_mean_angle, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
     # x cos(e / 2) roll over both cosines. The part of the force, of either sign, is an uncertainty of both
-    coupling[VANE_ROLL_RATE_COUPLING], coupling[VANE_YAW_RATE_COUPLING] = h * roll, h * yaw
-    coupling[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * size / V
-    coupling[BETA_FORCE_UNCERTAINTY] = (
+    signed_effect[VANE_ROLL_RATE_COUPLING], signed_effect[VANE_YAW_RATE_COUPLING] = h * roll, h * yaw
+    signed_effect[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * size / V
+    signed_effect[BETA_FORCE_UNCERTAINTY] = (
         h * np.sin(min(max_sideslip, 0.5 * np.pi)) * secant * true_secant * abs(normal) / V
     )
     # V: a across the flow, over the airspeed
-    coupling[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal * secant / V
-    coupling[AIRSPEED_SIDE_FORCE_COUPLING] = h * side / V
+    signed_effect[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal * secant / V
+    signed_effect[AIRSPEED_SIDE_FORCE_COUPLING] = h * side / V
 
 
 @kernel
-def filter_effects_and_couplings(redundancy, initial_errors):
+def filter_effects_and_signed_effects(redundancy, initial_errors):
     """Pass effects per unit error and couplings through the filters of the tests."""
     decay = redundancy.config.filter_decay
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
@@ -346,10 +350,11 @@ def filter_effects_and_couplings(redundancy, initial_errors):
                     decay[m] * initial_errors.filtered_effect_per_unit_error[i, t, m]
                     + initial_errors.effect_per_unit_error[i, t]
                 )
-    for j in range(initial_errors.coupling.size):
+    for j in range(initial_errors.signed_effect_per_unit_error.size):
         for m in range(decay.size):
-            initial_errors.filtered_coupling[j, m] = (
-                decay[m] * initial_errors.filtered_coupling[j, m] + initial_errors.coupling[j]
+            initial_errors.filtered_signed_effect_per_unit_error[j, m] = (
+                decay[m] * initial_errors.filtered_signed_effect_per_unit_error[j, m]
+                + initial_errors.signed_effect_per_unit_error[j]
             )
 
 
@@ -373,17 +378,18 @@ def max_current_error_effect(redundancy, initial_errors, hypothesis, test_index,
 
 
 @kernel
-def tighten_error_bound(initial_errors, hypothesis, max_effect, min_coupling):
-    """Lower the bound on an error whose effect is at most max_effect, and at least min_coupling a unit."""
-    if min_coupling > 0.0:
+def tighten_error_bound(initial_errors, hypothesis, max_effect, min_effect_per_unit_error):
+    """Lower the bound on an error whose effect is at most max_effect, and at least min_effect_per_unit_error
+    a unit."""
+    if min_effect_per_unit_error > 0.0:
         initial_errors.error_bound[hypothesis] = min(
             initial_errors.error_bound[hypothesis],
-            max_effect / (MIN_REMAINING_COUPLING_SHARE * min_coupling),
+            max_effect / (MIN_REMAINING_SIGNED_EFFECT_SHARE * min_effect_per_unit_error),
         )
 
 
 @kernel
-def max_velocity_error_effect(redundancy, initial_errors, hypothesis, pole_index):
+def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis, pole_index):
     """The bound of `max_current_error_effect` on the velocity, m/s, in any direction."""
     V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     flow_angle = np.hypot(
@@ -397,7 +403,7 @@ def max_velocity_error_effect(redundancy, initial_errors, hypothesis, pole_index
 
 
 @kernel
-def max_turn_error_effect(redundancy, initial_errors, hypothesis, pole_index):
+def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis, pole_index):
     """The bound of `max_current_error_effect` on the rotation about the body's second and third axes, rad."""
     return np.hypot(
         max_current_error_effect(redundancy, initial_errors, hypothesis, TURN_TEST + 1, pole_index),
@@ -409,31 +415,31 @@ def max_turn_error_effect(redundancy, initial_errors, hypothesis, pole_index):
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        coupling = initial_errors.filtered_coupling[:, m]
+        signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
-            max_turn_error_effect(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(coupling[PHI_PITCH_RATE_COUPLING], coupling[PHI_YAW_RATE_COUPLING]),
+            max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
+            np.hypot(signed_effect[PHI_PITCH_RATE_COUPLING], signed_effect[PHI_YAW_RATE_COUPLING]),
         )
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
-            max_velocity_error_effect(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(coupling[PHI_GRAVITY_DOWN_COUPLING], coupling[PHI_GRAVITY_SIDE_COUPLING]),
+            max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
+            np.hypot(signed_effect[PHI_GRAVITY_DOWN_COUPLING], signed_effect[PHI_GRAVITY_SIDE_COUPLING]),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
-            max_velocity_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            coupling[THETA_GRAVITY_COUPLING],
+            max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
+            signed_effect[THETA_GRAVITY_COUPLING],
         )
         rotation = np.hypot(
             max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, TURN_TEST, m),
-            max_turn_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, m),
+            max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, THETA_HYPOTHESIS, m),
         )
         tighten_error_bound(
-            initial_errors, THETA_HYPOTHESIS, rotation, abs(coupling[THETA_HEADING_RATE_COUPLING])
+            initial_errors, THETA_HYPOTHESIS, rotation, abs(signed_effect[THETA_HEADING_RATE_COUPLING])
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -442,35 +448,35 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    coupling = initial_errors.filtered_coupling[:, pole_index]
+    signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
-    min_coupling = (
-        np.cos(half_error) * abs(coupling[VANE_ROLL_RATE_COUPLING])
-        - np.sin(half_error) * abs(coupling[VANE_YAW_RATE_COUPLING])
-        - coupling[ALPHA_FORCE_UNCERTAINTY]
+    min_effect_per_unit_error = (
+        np.cos(half_error) * abs(signed_effect[VANE_ROLL_RATE_COUPLING])
+        - np.sin(half_error) * abs(signed_effect[VANE_YAW_RATE_COUPLING])
+        - signed_effect[ALPHA_FORCE_UNCERTAINTY]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        coupling[ALPHA_CLIMB_COUPLING],
+        signed_effect[ALPHA_CLIMB_COUPLING],
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, BETA_FLOW_TEST, pole_index),
-        min_coupling,
+        min_effect_per_unit_error,
     )
-    min_coupling = (
+    min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(coupling[VANE_ROLL_RATE_COUPLING])
-        - coupling[BETA_FORCE_UNCERTAINTY]
+        * abs(signed_effect[VANE_ROLL_RATE_COUPLING])
+        - signed_effect[BETA_FORCE_UNCERTAINTY]
     )
     tighten_error_bound(
         initial_errors,
         BETA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, BETA_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index),
-        min_coupling,
+        min_effect_per_unit_error,
     )
 
 
@@ -481,7 +487,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    coupling = initial_errors.filtered_coupling[:, pole_index]
+    signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     max_ratio = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]  # of reading and truth
     tighten_error_bound(
         initial_errors,
@@ -490,7 +496,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(coupling[AIRSPEED_NORMAL_FORCE_COUPLING]),
+        abs(signed_effect[AIRSPEED_NORMAL_FORCE_COUPLING]),
     )
     tighten_error_bound(
         initial_errors,
@@ -499,7 +505,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(coupling[AIRSPEED_SIDE_FORCE_COUPLING]),
+        abs(signed_effect[AIRSPEED_SIDE_FORCE_COUPLING]),
     )
     change_effect = (
         2.0
@@ -512,7 +518,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
         + change_effect,
-        abs(coupling[AIRSPEED_DENSITY_COUPLING]),
+        abs(signed_effect[AIRSPEED_DENSITY_COUPLING]),
     )
 
 
@@ -520,11 +526,11 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
 def update_initial_error_bounds(redundancy, initial_errors, signal):
     """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
     if max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD:  # the tests of the attitude restart
-        initial_errors.filtered_coupling[:] = 0.0
+        initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
     update_error_change_bounds(redundancy, initial_errors)
-    fill_effects_per_unit_error(redundancy, initial_errors, signal)
-    filter_effects_and_couplings(redundancy, initial_errors)
+    fill_effects_and_signed_effects(redundancy, initial_errors, signal)
+    filter_effects_and_signed_effects(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)
 
 
@@ -547,7 +553,7 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis, tes
 
 
 @kernel
-def keep_error_bounds_at_alarm(initial_errors):
+def store_error_bounds_at_alarm(initial_errors):
     """Keep the bounds of the moment of the alarm: later residuals may be the effect of another error."""
     initial_errors.sensor_error_bound_at_alarm[:] = initial_errors.error_bound
 

@@ -67,7 +67,7 @@ N_COMPUTED_TESTS = 13  # tests with an equation; then those of sensors that shou
 DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_COMPUTED_TESTS + len(DUPLICATE_SENSORS)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
-TEST_NUMBERS = {
+TEST_INDEX_BY_NAME = {
     "roll": TURN_TEST, "pitch": TURN_TEST + 1, "yaw": TURN_TEST + 2,
     "bank angle": ANGLE_TEST, "pitch angle": ANGLE_TEST + 1, "heading": ANGLE_TEST + 2,
     "speed": SPEED_TEST, "incidence": ALPHA_FLOW_TEST, "sideslip": BETA_FLOW_TEST, "density": DENSITY_TEST,
@@ -78,8 +78,8 @@ TEST_NUMBERS = {
 # difference of the two quantities, SI.
 DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSORS], np.int64)
 DUPLICATED_READING_INDEX = np.array([SENSORS.index(to.reading) for _, to in DUPLICATE_SENSORS], np.int64)
-DUPLICATED_READING_TEST = np.array(
-    [TEST_NUMBERS[ROWS[SENSORS.index(to.reading)].test] for _, to in DUPLICATE_SENSORS], np.int64
+DUPLICATED_READING_TEST_INDEX = np.array(
+    [TEST_INDEX_BY_NAME[ROWS[SENSORS.index(to.reading)].test] for _, to in DUPLICATE_SENSORS], np.int64
 )
 DUPLICATE_TOLERANCE = np.array([to.within for _, to in DUPLICATE_SENSORS], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
@@ -88,7 +88,8 @@ NO_SENSOR = -1
 MIN_FAULTY_FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
 GYRO_ERROR_UNDECIDED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED = 0, 1, 2  # of `gyro_error_verdict`
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
-ATTITUDE_CORRECTION_PER_S = 3.0  # at which the attitude corrects a replaced rate, if its noise is declared
+# at which the attitude corrects a replaced rate, if its noise is declared
+REPLACED_RATE_CORRECTION_PER_S = 3.0
 FROZEN_SAMPLES_WITHOUT_ROUNDING = 3  # samples of the sensor: so many are never identical without resolution
 FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
 NEVER_FROZEN_SAMPLES = (
@@ -103,13 +104,14 @@ ALPHA_HYPOTHESIS, BETA_HYPOTHESIS, AIRSPEED_HYPOTHESIS, PHI_HYPOTHESIS, THETA_HY
 N_INITIAL_ERROR_HYPOTHESES, N_COUPLINGS = 5, 14
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
-# sample, the first for each second of it. gust_gain: effect on the residual of 1 m/s that a gust changes by.
-# filtered_bound: on filtered_residual; filtered_rate_bound, filtered_sample_bound: its parts.
-# residual_bound_ratio: largest |filtered_residual| / filtered_bound over the poles.
+# sample, the first for each second of it. residual_per_gust_speed: effect on the residual of 1 m/s that a
+# gust changes by. filtered_bound: on filtered_residual; filtered_bound_per_s_part,
+# filtered_bound_per_sample_part: its parts. residual_bound_ratio: largest |filtered_residual| /
+# filtered_bound over the poles.
 TEST_RECORD = record(
     residual=float, bound_per_s=float, bound_per_sample=float, previous_bound_per_sample=float,
-    gust_gain=float, filtered_bound=N_POLES,
-    filtered_residual=N_POLES, filtered_rate_bound=N_POLES, filtered_sample_bound=N_POLES,
+    residual_per_gust_speed=float, filtered_bound=N_POLES,
+    filtered_residual=N_POLES, filtered_bound_per_s_part=N_POLES, filtered_bound_per_sample_part=N_POLES,
     residual_bound_ratio=float,
 )  # fmt: skip
 
@@ -150,13 +152,14 @@ INITIAL_ERRORS_RECORD = record(
     # bound on the effect of a unit of the error on a residual: in one sample, and through the filters
     effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
     filtered_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
-    coupling=N_COUPLINGS, filtered_coupling=(N_COUPLINGS, N_POLES),  # effects of a unit with their sign
+    # effects of a unit with their sign
+    signed_effect_per_unit_error=N_COUPLINGS, filtered_signed_effect_per_unit_error=(N_COUPLINGS, N_POLES),
     is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 
 MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine_sensors=int, trim_reading=N_SENSORS,
-    attitude_correction_share=float,  # share of its error that a replaced rate corrects in one sample
+    replaced_rate_correction_share=float,  # share of its error that a replaced rate corrects in one sample
     attitude_is_noisy=int,  # then a surface is isolated only once no gyro can be the cause
     min_frozen_samples=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
     rate_damping_per_s=(3, 3),  # D: body rates decay with rate' = -D rate
@@ -171,16 +174,17 @@ MONITOR_MEMORY_RECORD = record(
     # W of sensor_monitor.py, rad/s, by axis: the gyro's error if the dynamics are right; and its bound
     gyro_error_estimate=3, gyro_error_estimate_bound=3, previous_gyro_error_estimate_bound=3,
     previous_gyro_error_estimate=3,
-    has_agreed=(int, max(len(DUPLICATE_SENSORS), 1)),  # a sensor with the reading that it should equal
+    # a sensor with the reading that it should equal
+    has_duplicate_agreed=(int, max(len(DUPLICATE_SENSORS), 1)),
     # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
     # beyond it no gyro can be broken
-    gyros_excluded=int, gyro_error_difference=(3, N_POLES), gyro_error_difference_bound=(3, N_POLES),
+    gyros_excluded=int, filtered_turn_difference=(3, N_POLES), filtered_turn_difference_bound=(3, N_POLES),
     gyro_error_verdict=(int, 3), is_rate_replaced=(int, 3),
     n_identical_samples=(int, N_SENSORS), reading_two_samples_ago=N_SENSORS, is_cleared=(int, N_SENSORS),
     max_accelerometer_jump=float,  # m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings
-    n_summed_samples=int, residual_sum=3, bound_sum=3, initial_error_sum=3, min_flow_reading=3,
+    n_summed_samples=int, residual_sum=3, bound_sum=3, initial_error_effect_sum=3, min_flow_reading=3,
     max_flow_reading=3,
     filtered_climb_error_m=N_POLES,  # of an incidence with the error that its residuals show
     spurious_velocity=3,  # m/s, body axes: what the residuals add up to
@@ -204,7 +208,7 @@ SENSOR_MONITOR_RECORD = record(
 )
 
 
-def configure_monitor(
+def configure_sensor_monitor(
     monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool
 ) -> None:
     """Fill the monitor's record at the trim: y, the measured signals there; design: the designer's record.
@@ -263,8 +267,8 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
     config["attitude_is_noisy"] = np.any(
         bounds["error_offset"][attitude] > bounds["constant_error"][attitude]
     )
-    config["attitude_correction_share"] = (
-        min(1.0, sample_time_s * ATTITUDE_CORRECTION_PER_S) if config["attitude_is_noisy"] else 1.0
+    config["replaced_rate_correction_share"] = (
+        min(1.0, sample_time_s * REPLACED_RATE_CORRECTION_PER_S) if config["attitude_is_noisy"] else 1.0
     )
 
 
@@ -316,14 +320,15 @@ MIN_AIRSPEED_MPS = 1.0  # at least so much where an airspeed divides
 MIN_DYNAMIC_PRESSURE_PA = 1.0  # the same of the dynamic pressure
 MIN_QDYN_PER_AIRSPEED_SQUARED = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
 MIN_PREDICTED_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
-MIN_LOG_BASE_SHARE = 0.01  # of a reading that its constant error leaves, at least, under a logarithm
-READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
+# of a reading that its constant error leaves, at least, under a logarithm
+MIN_READING_SHARE_IN_LOGARITHM = 0.01
+READING_ROUNDING_SHARE = 1e-10  # of a reading: the part of each bound that covers rounding
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
 INTEGRATION_WEIGHT, PREVIOUS_INTEGRATION_WEIGHT = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
-POSITION_INTEGRATION_ERROR = 4.0 / 3.0
+POSITION_INTEGRATION_ERROR_FACTOR = 4.0 / 3.0
 
 
 @kernel
@@ -364,14 +369,15 @@ def small_rotation_angle(from_quaternion, to_quaternion, component):
 
 
 @kernel
-def body_turn_per_euler_angle(redundancy, axis, angle):
-    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (angle 0, 1, 2), rad/rad."""
+def body_turn_per_euler_angle(redundancy, axis, angle_index):
+    """Rotation about a body axis (0, 1, 2) for a change of phi, theta or psi (angle_index 0, 1, 2),
+    rad/rad."""
     phi, theta = redundancy.memory.previous_reading[PHI], redundancy.memory.previous_reading[THETA]
     if axis == 0:
-        return (1.0, 0.0, -np.sin(theta))[angle]
+        return (1.0, 0.0, -np.sin(theta))[angle_index]
     if axis == 1:
-        return (0.0, np.cos(phi), np.sin(phi) * np.cos(theta))[angle]
-    return (0.0, -np.sin(phi), np.cos(phi) * np.cos(theta))[angle]
+        return (0.0, np.cos(phi), np.sin(phi) * np.cos(theta))[angle_index]
+    return (0.0, -np.sin(phi), np.cos(phi) * np.cos(theta))[angle_index]
 
 
 @kernel
@@ -402,7 +408,7 @@ def fill_reading_error_bounds(redundancy, signal):
         whole = (config.error_offset[i] + config.error_slope[i] * size) / (1.0 - config.error_slope[i])
         memory.reading_error_bound[i] = whole
         memory.reading_error_change_bound[i] = (
-            whole - config.constant_error[i] + READING_ROUNDING * abs(signal[i])
+            whole - config.constant_error[i] + READING_ROUNDING_SHARE * abs(signal[i])
         )
     for i in range(PHI, PHI + 3):
         memory.reading_error_bound[i] += memory.attitude_drift_bound_rad
@@ -510,13 +516,13 @@ def max_pitch_angle(redundancy, signal):
 
 
 @kernel
-def extrapolated_error_bound(redundancy, i):
-    """Bound the error of 3/2 a - 1/2 a_before by the errors of reading i in the two samples. A constant error
-    counts once."""
+def extrapolated_error_bound(redundancy, sensor):
+    """Bound the error of 3/2 a - 1/2 a_before by the errors of the reading of a sensor in the two samples. A
+    constant error counts once."""
     return (
-        INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[i]
-        + PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[i]
-        - redundancy.config.constant_error[i]
+        INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[sensor]
+        + PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
+        - redundancy.config.constant_error[sensor]
     )
 
 
@@ -639,14 +645,17 @@ def bound_flow_tests(redundancy, signal, turn_rate, gyro_error):
         )
         + secant * gyro_error
     )
-    test[SPEED_TEST].gust_gain, test[SPEED_TEST].bound_per_sample = gust_factor, error_change[AIRSPEED]
+    test[SPEED_TEST].residual_per_gust_speed, test[SPEED_TEST].bound_per_sample = (
+        gust_factor,
+        error_change[AIRSPEED],
+    )
     test[SPEED_TEST].bound_per_s = (
         acceleration_error
         + second_order * max_acceleration * vane_error
         + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error[AIRSPEED]
     )
     for c, vane in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
-        test[c].gust_gain, test[c].bound_per_sample, test[c].bound_per_s = (
+        test[c].residual_per_gust_speed, test[c].bound_per_sample, test[c].bound_per_s = (
             gust_factor * secant / min_airspeed,
             error_change[vane],
             second_order * flow_rate_error,
@@ -666,18 +675,19 @@ def bound_flow_tests(redundancy, signal, turn_rate, gyro_error):
         config.max_vertical_wind_mps
         + config.max_gust_speed_mps
         + climb_rate_error
-        + POSITION_INTEGRATION_ERROR * config.sample_time_s * largest_acceleration
+        + POSITION_INTEGRATION_ERROR_FACTOR * config.sample_time_s * largest_acceleration
     )
     test[CLIMB_TEST].bound_per_sample = error_change[ALTITUDE]
 
 
 @kernel
-def log_change_error_bound(redundancy, signal, i):
-    """Bound the apparent change of the logarithm of reading i, qdyn or airspeed, by its constant error."""
-    constant, previous = redundancy.config.constant_error[i], redundancy.memory.previous_reading[i]
-    smallest = max(min(signal[i], previous), 1.0)
-    change = constant * abs(1.0 / max(signal[i], 1.0) - 1.0 / max(previous, 1.0))
-    return change / max(1.0 - constant / smallest, MIN_LOG_BASE_SHARE)
+def log_change_error_bound(redundancy, signal, sensor):
+    """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
+    constant error."""
+    constant, previous = redundancy.config.constant_error[sensor], redundancy.memory.previous_reading[sensor]
+    smallest = max(min(signal[sensor], previous), 1.0)
+    change = constant * abs(1.0 / max(signal[sensor], 1.0) - 1.0 / max(previous, 1.0))
+    return change / max(1.0 - constant / smallest, MIN_READING_SHARE_IN_LOGARITHM)
 
 
 @kernel
@@ -725,15 +735,17 @@ def filter_residual(redundancy, test):
     test.residual_bound_ratio = 0.0
     for m, decay in enumerate(config.filter_decay):
         test.filtered_residual[m] = decay * test.filtered_residual[m] + test.residual
-        test.filtered_rate_bound[m] = advance_residual_bound(
-            test.filtered_rate_bound[m], test.bound_per_s, decay, config.sample_time_s
+        test.filtered_bound_per_s_part[m] = advance_residual_bound(
+            test.filtered_bound_per_s_part[m], test.bound_per_s, decay, config.sample_time_s
         )
-        test.filtered_sample_bound[m] = advance_gyro_error_bound(
-            test.filtered_sample_bound[m], test.previous_bound_per_sample, decay
+        test.filtered_bound_per_sample_part[m] = advance_gyro_error_bound(
+            test.filtered_bound_per_sample_part[m], test.previous_bound_per_sample, decay
         )
-        sample_bound = test.filtered_sample_bound[m] + test.bound_per_sample
+        sample_bound = test.filtered_bound_per_sample_part[m] + test.bound_per_sample
         test.filtered_bound[m] = (
-            test.filtered_rate_bound[m] + sample_bound + test.gust_gain * config.gust_change_bound_mps[m]
+            test.filtered_bound_per_s_part[m]
+            + sample_bound
+            + test.residual_per_gust_speed * config.gust_change_bound_mps[m]
         )
         test.residual_bound_ratio = max(
             test.residual_bound_ratio, abs(test.filtered_residual[m]) / test.filtered_bound[m]
@@ -745,8 +757,8 @@ def filter_residual(redundancy, test):
 def restart_test(test):
     """Restart a test with this sample: its filters are empty, and the whole bound per sample is still due."""
     test.residual_bound_ratio = test.residual = 0.0
-    test.filtered_residual[:], test.filtered_rate_bound[:] = 0.0, 0.0
-    test.filtered_sample_bound[:] = test.bound_per_sample
+    test.filtered_residual[:], test.filtered_bound_per_s_part[:] = 0.0, 0.0
+    test.filtered_bound_per_sample_part[:] = test.bound_per_sample
     test.previous_bound_per_sample = test.bound_per_sample
 
 

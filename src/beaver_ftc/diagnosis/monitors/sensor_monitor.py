@@ -54,10 +54,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import advance_residual_bound, bank_alarm_axis
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     initial_error_explains_alarm,
-    keep_error_bounds_at_alarm,
     max_error_effect_at_alarm,
     record_refuted_hypotheses,
     set_error_bounds_at_start,
+    store_error_bounds_at_alarm,
     update_initial_error_bounds,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -74,7 +74,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     DENSITY_TEST,
     DUPLICATE_SENSOR_INDEX,
     DUPLICATED_READING_INDEX,
-    DUPLICATED_READING_TEST,
+    DUPLICATED_READING_TEST_INDEX,
     FILTER_POLES_PER_S,
     GYRO_ERROR_CONFIRMED,
     GYRO_ERROR_REFUTED,
@@ -115,13 +115,14 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 # Accelerometers or flow sensor
-JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
-JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
-MIN_READING_JUMP_SHARE = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
+JUMP_WINDOW_AFTER_ALARM_S = 1.0  # after the alarm: later, a jump by chance is too likely
+ACCELEROMETER_JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+MIN_READING_JUMP_PER_RESIDUAL = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
 MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
 # An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
 MIN_CLEARING_BOUND_RATIO = 3.0
-MIN_SHARE_OF_LARGEST_COMPONENT = 0.5  # of the spurious velocity, along the axis of a suspected accelerometer
+# of the spurious velocity, along the axis of a suspected accelerometer
+MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT = 0.5
 TIME_ROUNDING_S = 1e-9
 
 
@@ -150,9 +151,11 @@ def is_flow_test(test_index):
 @kernel
 def count_identical_samples(monitor, signal):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
-    of an accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S."""
+    of an accelerometer from one sample to the next, m/s2, which fades within ACCELEROMETER_JUMP_MEMORY_S."""
     memory, previous = monitor.memory, monitor.redundancy.memory.previous_reading
-    memory.max_accelerometer_jump *= 1.0 - monitor.redundancy.config.sample_time_s / JUMP_MEMORY_S
+    memory.max_accelerometer_jump *= (
+        1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_MEMORY_S
+    )
     for i in range(N_SENSORS):
         memory.n_identical_samples[i] = memory.n_identical_samples[i] + 1 if signal[i] == previous[i] else 0
         if AX <= i < N_IN_EQUATIONS:
@@ -172,7 +175,7 @@ def update_cleared_sensors(monitor, signal):
     if not is_flow_test(alarm_test):
         return
     since_alarm_s = memory.n_summed_samples * monitor.redundancy.config.sample_time_s
-    if since_alarm_s < JUMP_WINDOW_S - TIME_ROUNDING_S and flow_reading_jumped(monitor, signal):
+    if since_alarm_s < JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S and flow_reading_jumped(monitor, signal):
         clear_accelerometers(monitor)
     sum_flow_residuals(monitor, signal)
     flow_sensor = flow_sensor_of_test(alarm_test)
@@ -184,7 +187,7 @@ def update_cleared_sensors(monitor, signal):
     if (
         accelerometer_is_frozen
         or residual_sum_exceeds_reading_range(monitor)
-        or error_would_exceed_other_test(monitor, signal)
+        or flow_sensor_error_would_exceed_other_test(monitor, signal)
     ):
         memory.is_cleared[flow_sensor] = 1
 
@@ -209,7 +212,7 @@ def flow_reading_jumped(monitor, signal):
     residual_per_m_s = 1.0 if alarm_test == SPEED_TEST else 1.0 / max(previous[AIRSPEED], MIN_AIRSPEED_MPS)
     residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
     second_difference = signal[sensor] - 2.0 * previous[sensor] + memory.reading_two_samples_ago[sensor]
-    min_jump = MIN_READING_JUMP_SHARE * abs(test.residual)
+    min_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(test.residual)
     accelerometer_effect = INTEGRATION_WEIGHT * memory.max_accelerometer_jump * residual_per_m_s2
     return (
         abs(test.residual) > test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
@@ -228,13 +231,13 @@ def sum_flow_residuals(monitor, signal):
         if memory.n_summed_samples == 0:
             memory.min_flow_reading[j] = memory.max_flow_reading[j] = reading
             memory.bound_sum[j] = (  # noise of the first and of the last sample
-                2.0 * test.bound_per_sample + test.gust_gain * config.max_gust_speed_mps
+                2.0 * test.bound_per_sample + test.residual_per_gust_speed * config.max_gust_speed_mps
             )
             continue
         memory.residual_sum[j] += test.residual
         hypothesis = initial_error_hypothesis_of_test(SPEED_TEST + j)
         memory.bound_sum[j] += config.sample_time_s * test.bound_per_s
-        memory.initial_error_sum[j] += (
+        memory.initial_error_effect_sum[j] += (
             initial_errors.sensor_error_bound_at_alarm[hypothesis]
             * initial_errors.effect_per_unit_error[hypothesis, SPEED_TEST + j]
         )
@@ -243,7 +246,7 @@ def sum_flow_residuals(monitor, signal):
             max(memory.max_flow_reading[j], reading),
         )
     alpha_error = np.sign(memory.residual_sum[1]) * max(
-        abs(memory.residual_sum[1]) - memory.bound_sum[1] - memory.initial_error_sum[1],
+        abs(memory.residual_sum[1]) - memory.bound_sum[1] - memory.initial_error_effect_sum[1],
         0.0,
     )
     climb_error = (
@@ -261,7 +264,7 @@ def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     memory, j = monitor.memory, monitor.output.alarm_test - SPEED_TEST
     reading_range = memory.max_flow_reading[j] - memory.min_flow_reading[j]
-    explained = memory.bound_sum[j] + memory.initial_error_sum[j]
+    explained = memory.bound_sum[j] + memory.initial_error_effect_sum[j]
     return (
         reading_range > 0.0
         and abs(memory.residual_sum[j])
@@ -270,7 +273,7 @@ def residual_sum_exceeds_reading_range(monitor):
 
 
 @kernel
-def error_would_exceed_other_test(monitor, signal):
+def flow_sensor_error_would_exceed_other_test(monitor, signal):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
     redundancy, initial_errors = monitor.redundancy, monitor.initial_errors
@@ -330,7 +333,7 @@ def suspect_accelerometers(monitor, gyro_explains_it):
     for i in range(AX, N_IN_EQUATIONS):
         explains = frozen_sensor == i or (
             frozen_sensor < 0
-            and abs(velocity[i - AX]) + velocity_bound >= MIN_SHARE_OF_LARGEST_COMPONENT * largest
+            and abs(velocity[i - AX]) + velocity_bound >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest
         )
         is_suspect[i] = explains and not gyro_explains_it and not memory.is_cleared[i]
 
@@ -347,19 +350,19 @@ def mark_accelerometers_unusable(monitor, measured):
 MIN_SHARE_OF_LARGEST_RESIDUAL = 0.03
 # start_stage: 1 after the first sample, 2 with the first whole frame, 3 from the next frame on: only then the
 # innovation contains the change of a gyro's error between two frames
-RATES_COMPARABLE_STAGE = 3
+START_STAGE_WITH_COMPARABLE_RATES = 3
 MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
-FAST_POLE = 1  # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
+# index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
+FAST_POLE_INDEX = 1
 
 # Gyro or attitude (judge_gyro_errors)
 DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
-GYRO_ERROR_DAMPING_PER_S = (
-    10.0  # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
-)
-JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_FOLLOWED_SHARE = 0.7  # of a gyro's error, which W shows
+# innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
+MAX_INNOVATION_PER_GYRO_ERROR_PER_S = 10.0
+GYRO_JUMP_TOLERANCE_SHARE = 0.1  # share of a gyro's jump by which the innovation may differ from it
+MIN_FOLLOWED_GYRO_ERROR_SHARE = 0.7  # of a gyro's error, which W shows
 NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
 MIN_TRANSIENT_NOISE_RATIO = (
     2.0  # of the size of a transient to the bound on noise: else noise may be all of it
@@ -368,9 +371,9 @@ MAX_REMAINING_TRANSIENT_SHARE = 0.003  # of a jump of the attitude within a fram
 RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
 
 # Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign
-HIDDEN_ERROR_PER_BOUND = 2.0
+MAX_HIDDEN_ERROR_PER_BOUND = 2.0
 # Margin on the bound of the flow's test, for the gyro that turns the flow by all of its error
-OWN_GYRO_BOUND_FACTOR = 2.0
+FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 
 @kernel
@@ -406,10 +409,10 @@ def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, 
             memory.apparent_gyro_error[i] = gyro_error
         else:
             memory.substep_gyro_error_peak[i] = max(memory.substep_gyro_error_peak[i], abs(gyro_error))
-    if memory.start_stage < RATES_COMPARABLE_STAGE:
+    if memory.start_stage < START_STAGE_WITH_COMPARABLE_RATES:
         widen_bound_by_initial_gyro_error(monitor)
     if monitor.config.attitude_is_noisy:
-        exclude_gyros(monitor)
+        exclude_gyros_if_attitude_disagrees(monitor)
     isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t)
     replace_isolated_readings(monitor, prediction, measured)
     mark_accelerometers_unusable(monitor, measured)
@@ -443,7 +446,7 @@ def widen_bound_by_initial_gyro_error(monitor):
     memory = monitor.memory
     if memory.substep == 0:
         memory.start_stage += 1
-    if memory.start_stage == RATES_COMPARABLE_STAGE - 1 and memory.substep == 0:
+    if memory.start_stage == START_STAGE_WITH_COMPARABLE_RATES - 1 and memory.substep == 0:
         for i in range(3):
             memory.gyro_error_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
 
@@ -470,7 +473,7 @@ def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
 
 
 @kernel
-def exclude_gyros(monitor):
+def exclude_gyros_if_attitude_disagrees(monitor):
     """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
     Where the attitude is noisy, a surface is isolated only after that.
@@ -482,17 +485,17 @@ def exclude_gyros(monitor):
             memory.gyro_error_estimate[i]
         )
         for m, decay in enumerate(config.filter_decay):
-            memory.gyro_error_difference[i, m] = (
-                decay * memory.gyro_error_difference[i, m]
+            memory.filtered_turn_difference[i, m] = (
+                decay * memory.filtered_turn_difference[i, m]
                 + test.residual
                 + config.sample_time_s * memory.gyro_error_estimate[i]
             )
-            memory.gyro_error_difference_bound[i, m] = advance_residual_bound(
-                memory.gyro_error_difference_bound[i, m], W_error_bound, decay, config.sample_time_s
+            memory.filtered_turn_difference_bound[i, m] = advance_residual_bound(
+                memory.filtered_turn_difference_bound[i, m], W_error_bound, decay, config.sample_time_s
             )
             if (
-                abs(memory.gyro_error_difference[i, m])
-                > memory.gyro_error_difference_bound[i, m] + test.filtered_bound[m]
+                abs(memory.filtered_turn_difference[i, m])
+                > memory.filtered_turn_difference_bound[i, m] + test.filtered_bound[m]
             ):
                 memory.gyros_excluded = 1
 
@@ -513,9 +516,9 @@ def isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t):
     if output.worst_test_ratio > 1.0 and not output.alarmed:
         raise_alarm(monitor, conclusion, t)
         output.alarm_test = output.worst_test
-        keep_error_bounds_at_alarm(monitor.initial_errors)
+        store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
-        if memory.substep == 0 and memory.start_stage == RATES_COMPARABLE_STAGE:
+        if memory.substep == 0 and memory.start_stage == START_STAGE_WITH_COMPARABLE_RATES:
             judge_gyro_errors(monitor, bank, bound, dt)
         record_exceeded_tests(monitor)
         update_cleared_sensors(monitor, measured.signal)
@@ -585,9 +588,9 @@ def judge_gyro_errors(monitor, bank, bound, dt):
             memory.previous_apparent_gyro_error[i],
         )
         jump = (gyro_error - previous_gyro_error) / dt  # rad/s2
-        jump_tolerance = GYRO_ERROR_DAMPING_PER_S * max(
+        jump_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
             abs(gyro_error), abs(previous_gyro_error)
-        ) + JUMP_TOLERANCE * abs(jump)
+        ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump)
         noise_bound = (  # of gyro_error, rad/s, by the attitude's noise
             NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[TURN_TEST + i].bound_per_sample
@@ -609,7 +612,7 @@ def judge_gyro_errors(monitor, bank, bound, dt):
         )
         innovation_fits = abs(innovation[i] - jump) <= max_innovation + jump_tolerance + noise_bound / dt
         W_fits = (
-            MIN_FOLLOWED_SHARE * abs(gyro_error)
+            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(gyro_error)
             <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + noise_bound
         )
         if not innovation_fits or (not dynamics_show_error and (is_transient or not W_fits)):
@@ -619,12 +622,12 @@ def judge_gyro_errors(monitor, bank, bound, dt):
 
 
 @kernel
-def exceeds_beyond_cross_coupling(monitor, test_index, first_of_three):
-    """Whether a test, one of the three from first_of_three on, exceeds its bound by more than an error on one
-    of the other two axes explains."""
+def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_of_three):
+    """Whether a test, one of the three from first_test_of_three on, exceeds its bound by more than an error
+    on one of the other two axes explains."""
     largest = 0.0
     for i in range(3):
-        largest = max(largest, abs(monitor.redundancy.test[first_of_three + i].filtered_residual[0]))
+        largest = max(largest, abs(monitor.redundancy.test[first_test_of_three + i].filtered_residual[0]))
     test = monitor.redundancy.test[test_index]
     return (
         test.residual_bound_ratio > 1.0
@@ -637,9 +640,9 @@ def record_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
     redundancy, exceeded_tests = monitor.redundancy, monitor.memory.exceeded_tests
     for c in range(N_TESTS):
-        first_of_three = TURN_TEST if c < ANGLE_TEST else ANGLE_TEST
+        first_test_of_three = TURN_TEST if c < ANGLE_TEST else ANGLE_TEST
         exceeded = (
-            exceeds_beyond_cross_coupling(monitor, c, first_of_three)
+            exceeds_bound_beyond_cross_coupling(monitor, c, first_test_of_three)
             if c < SPEED_TEST
             else redundancy.test[c].residual_bound_ratio > 1.0
         )
@@ -658,7 +661,7 @@ def find_suspects(monitor):
         suspect_disagreeing_sensors(monitor, alarm_test - N_COMPUTED_TESTS)
         return
     if alarm_test < SPEED_TEST:
-        suspect_attitude(monitor)
+        suspect_gyros_and_attitude(monitor)
     if alarm_test == SPEED_TEST:
         suspect_accelerometers(monitor, False)
         is_suspect[AIRSPEED] = not monitor.memory.is_cleared[AIRSPEED]
@@ -672,8 +675,8 @@ def find_suspects(monitor):
             or may_be_frozen
         )
     is_suspect[QDYN] = alarm_test == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
-    suspect_vane(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
-    suspect_vane(monitor, BETA, BETA_FLOW_TEST, 2)
+    find_suspects_of_flow_test(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
+    find_suspects_of_flow_test(monitor, BETA, BETA_FLOW_TEST, 2)
     is_suspect[ALTITUDE] = alarm_test == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
     is_suspect[ENGINE_SPEED] = alarm_test == RPM_TEST
     is_suspect[MANIFOLD] = alarm_test == MANIFOLD_PRESSURE_TEST
@@ -689,12 +692,12 @@ def record_agreeing_duplicates(monitor, fresh):
     for k in range(DUPLICATE_SENSOR_INDEX.size):
         agrees = monitor.redundancy.test[N_COMPUTED_TESTS + k].residual_bound_ratio <= 1.0
         if fresh[DUPLICATE_SENSOR_INDEX[k] - N_IN_EQUATIONS] and agrees and not monitor.output.alarmed:
-            monitor.memory.has_agreed[k] = 1
+            monitor.memory.has_duplicate_agreed[k] = 1
 
 
 @kernel
-def suspect_disagreeing_sensors(monitor, k):
-    """Suspect duplicate sensor k, or the reading that it no longer equals.
+def suspect_disagreeing_sensors(monitor, duplicate_index):
+    """Suspect a duplicate sensor, or the reading that it no longer equals.
 
     The reading is suspected if its own test shows an error, the sensor if an error of the reading of this
     size would have exceeded that test, both if neither is certain.
@@ -702,19 +705,24 @@ def suspect_disagreeing_sensors(monitor, k):
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
     redundancy, memory = monitor.redundancy, monitor.memory
-    reading, test_of_reading = DUPLICATED_READING_INDEX[k], DUPLICATED_READING_TEST[k]
-    own_test, test = redundancy.test[test_of_reading], redundancy.test[N_COMPUTED_TESTS + k]
+    reading, test_of_reading = (
+        DUPLICATED_READING_INDEX[duplicate_index],
+        DUPLICATED_READING_TEST_INDEX[duplicate_index],
+    )
+    own_test, test = redundancy.test[test_of_reading], redundancy.test[N_COMPUTED_TESTS + duplicate_index]
     min_error = abs(test.residual) - test.filtered_bound[0]  # of the reading, if it is the broken one
-    may_be_hidden = min_error <= HIDDEN_ERROR_PER_BOUND * max(
+    may_be_hidden = min_error <= MAX_HIDDEN_ERROR_PER_BOUND * max(
         own_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading]
     )
     reading_is_frozen = is_frozen(monitor, reading)
-    monitor.output.is_suspect[DUPLICATE_SENSOR_INDEX[k]] = not memory.exceeded_tests[test_of_reading]
+    monitor.output.is_suspect[DUPLICATE_SENSOR_INDEX[duplicate_index]] = not memory.exceeded_tests[
+        test_of_reading
+    ]
     monitor.output.is_suspect[reading] = (
         memory.exceeded_tests[test_of_reading] == 1
         or may_be_hidden
         or reading_is_frozen
-        or not memory.has_agreed[k]
+        or not memory.has_duplicate_agreed[duplicate_index]
     )
 
 
@@ -742,9 +750,9 @@ def any_suspect_frozen(monitor):
 
 
 @kernel
-def suspect_vane(monitor, vane, flow_test, own_gyro):
+def find_suspects_of_flow_test(monitor, vane, flow_test, fully_acting_gyro):
     """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude; all
-    of own_gyro's error turns the flow. No flow sensor moves the attitude's tests."""
+    of fully_acting_gyro's error turns the flow. No flow sensor moves the attitude's tests."""
     if monitor.output.alarm_test != flow_test:
         return
     exceeded, is_suspect = monitor.memory.exceeded_tests, monitor.output.is_suspect
@@ -754,25 +762,32 @@ def suspect_vane(monitor, vane, flow_test, own_gyro):
     for i in range(3):
         is_shown = n_turn_tests == 1 and exceeded[TURN_TEST + i] == 1
         is_suspect[i] = is_shown or (
-            n_turn_tests == 0 and gyro_error_may_be_hidden(monitor, flow_test, i, i == own_gyro)
+            n_turn_tests == 0 and gyro_error_may_be_hidden(monitor, flow_test, i, i == fully_acting_gyro)
         )
 
 
 @kernel
-def gyro_error_may_be_hidden(monitor, flow_test, gyro, is_own):
+def gyro_error_may_be_hidden(monitor, flow_test, gyro, acts_fully_on_flow):
     """Whether an error of a gyro explains the test of the flow, and stays within the bound of the test of its
-    axis; is_own: all of its error turns the flow. Of another gyro's error a share does, by kinematics."""
+    axis; acts_fully_on_flow: all of its error turns the flow. Of another gyro's error a share does, by
+    kinematics."""
     redundancy, reading = monitor.redundancy, monitor.redundancy.memory.previous_reading
     alpha = reading[ALPHA]
     roll_share = np.cos(alpha) if gyro == 0 else np.sin(alpha)
     share = abs(np.tan(reading[BETA]) * roll_share) if flow_test == ALPHA_FLOW_TEST else abs(np.sin(alpha))
     test, turn = redundancy.test[flow_test], redundancy.test[TURN_TEST + gyro]
     for m in range(test.filtered_residual.size):
-        flow_bound = OWN_GYRO_BOUND_FACTOR * test.filtered_bound[m] if is_own else test.filtered_bound[m]
-        hidden_turn = HIDDEN_ERROR_PER_BOUND * (1.0 if is_own else share) * turn.filtered_bound[m]
+        flow_bound = (
+            FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO * test.filtered_bound[m]
+            if acts_fully_on_flow
+            else test.filtered_bound[m]
+        )
+        hidden_turn = (
+            MAX_HIDDEN_ERROR_PER_BOUND * (1.0 if acts_fully_on_flow else share) * turn.filtered_bound[m]
+        )
         if abs(test.filtered_residual[m]) > hidden_turn + flow_bound:
             return False
-    return is_own or gyro == 0 or flow_test == ALPHA_FLOW_TEST  # q does not act on the sideslip
+    return acts_fully_on_flow or gyro == 0 or flow_test == ALPHA_FLOW_TEST  # q does not act on the sideslip
 
 
 @kernel
@@ -788,13 +803,13 @@ def airspeed_error_would_exceed_own_test(monitor):
         )
         # a relative change of the airspeed changes log(density) by twice as much
         airspeed_error = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained
-        if airspeed_error > HIDDEN_ERROR_PER_BOUND * max_ratio * speed.filtered_bound[m]:
+        if airspeed_error > MAX_HIDDEN_ERROR_PER_BOUND * max_ratio * speed.filtered_bound[m]:
             return True
     return False
 
 
 @kernel
-def suspect_attitude(monitor):
+def suspect_gyros_and_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
@@ -820,35 +835,37 @@ def suspect_attitude(monitor):
 
 
 @kernel
-def no_other_angle_test_exceeded(monitor, angle):
+def no_other_angle_test_exceeded(monitor, angle_index):
     """Whether no test of another angle (0, 1, 2: phi, theta, psi) shows an error that one of this angle from
     the start does not explain."""
     for j in range(3):
         exceeded = (
             monitor.memory.exceeded_tests[ANGLE_TEST + j]
-            if angle == 2
-            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle, ANGLE_TEST + j]
+            if angle_index == 2
+            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, ANGLE_TEST + j]
         )
-        if j != angle and exceeded:
+        if j != angle_index and exceeded:
             return False
     return True
 
 
 @kernel
-def angle_error_explains_turn_tests(monitor, angle):
+def angle_error_explains_turn_tests(monitor, angle_index):
     """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
     the residual of the angle's own test allows."""
-    redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[ANGLE_TEST + angle]
+    redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[ANGLE_TEST + angle_index]
     error_bound = redundancy.memory.reading_error_bound
     tilt_error_bound = error_bound[PHI] + error_bound[THETA]
     for j in range(3):
         turn = redundancy.test[TURN_TEST + j]
-        turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle)) + tilt_error_bound
+        turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
         for m in range(redundancy.config.filter_decay.size):
             max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
             initial_error_effect = (
-                max_error_effect_at_alarm(monitor.initial_errors, PHI_HYPOTHESIS + angle, TURN_TEST + j, m)
-                if angle < 2
+                max_error_effect_at_alarm(
+                    monitor.initial_errors, PHI_HYPOTHESIS + angle_index, TURN_TEST + j, m
+                )
+                if angle_index < 2
                 else 0.0
             )
             if (
@@ -962,9 +979,13 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     acceleration = prediction.f[axis]
     for s in range(u.size):
         acceleration += prediction.G[axis, s] * u[s]
-    correction = monitor.config.attitude_correction_share * test.residual  # rad
-    if not monitor.memory.is_rate_replaced[axis] and monitor.config.attitude_correction_share < 1.0:
-        correction = config.sample_time_s * FILTER_POLES_PER_S[FAST_POLE] * test.filtered_residual[FAST_POLE]
+    correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
+    if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
+        correction = (
+            config.sample_time_s
+            * FILTER_POLES_PER_S[FAST_POLE_INDEX]
+            * test.filtered_residual[FAST_POLE_INDEX]
+        )
     monitor.memory.is_rate_replaced[axis] = 1
     previous_rate = memory.previous_reading[axis] + correction / config.sample_time_s
     return previous_rate + config.sample_time_s * acceleration

@@ -144,7 +144,7 @@ def isolate_fault(fdi, measured, t, was_detected_before):
     if (
         sensors_are_sound
         and sensor_monitor.allows_surface_isolation(monitor, was_detected_before)
-        and not fdi.engine_monitor.output.failed
+        and not fdi.engine_monitor.output.engine_failed
     ):
         isolate_by_variant(variant, fdi, measured, t, was_detected_before)
 

@@ -40,7 +40,7 @@ def fill(record, **values):
 
 # Short names of fields, for cases that say a few of them.
 SHORT = {
-    "whole": "is_single_instant", "length": "frames_per_block", "thresholds": "threshold_kind",
+    "whole": "frame_shows_single_instant", "length": "frames_per_block", "thresholds": "threshold_kind",
     "memory": "uses_reach_test", "shared": "shares_theta_across_axes", "membership": "narrows_theta_sets",
     "forgetting": "forgetting_factor", "instants": "n_substeps",
 }  # fmt: skip
@@ -66,18 +66,19 @@ _ACTUATOR = {
     **{name: name for name in ("travel_low", "travel_high", "reachable_low", "reachable_high")},
     "min_runaway_rate": "min_runaway_rate",
     "approach": "lag_share_per_substep", "step": "max_motion_per_substep",
-    "slowest_step": "min_motion_per_substep",
+    "slowest_step": "min_rate_limited_motion_per_substep",
 }  # fmt: skip
 _OBSERVED = {
     "command": "healthy_position", "low": "position_low", "high": "position_high",
-    **{name: name for name in ("is_anomalous", "effectiveness_variation", "stop_can_hide_deflection")},
+    **{name: name for name in ("is_anomalous", "weighted_mean_error_per_position_range",
+    "stop_can_hide_deflection")},
 }  # fmt: skip
 _EVIDENCE = (
     "n_rest_frames",
     "n_frames_since_stop_could_hide",
     "first_anomalous_frame",
-    "first_position_low",
-    "first_position_high",
+    "first_anomalous_position_low",
+    "first_anomalous_position_high",
 )
 OF_SURFACE = {
     **{name: ("actuator", field) for name, field in _ACTUATOR.items()},
@@ -88,8 +89,8 @@ OF_SURFACE = {
     },
     "evidence": ("evidence", "n_anomalous_frames"),
     **{name: ("evidence", name) for name in _EVIDENCE},
-    "n_frames_absent": ("accommodation", "n_frames_absent"),
-    "in_question": ("status", "is_candidate"), "standing": ("status", "decision_basis"),
+    "n_frames_since_fault_showed": ("accommodation", "n_frames_since_fault_showed"),
+    "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "decision_basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
     "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),
 }  # fmt: skip
@@ -123,7 +124,7 @@ def of_stages(fdi, kernel):
         "n_substeps": fdi["config"]["n_substeps"], "bank": fdi["bank"], "fdae": fdi["fdae"],
         "innovation": fdi["bank"]["output"]["innovation"],
         **dict.fromkeys(("detected", "is_fault_detected"), fdi["verdict"]["detected"]),
-        "frame_bound": fdi["bound"]["frame_innovation_bound"],
+        "innovation_bound": fdi["bound"]["frame_innovation_bound"],
         **dict.fromkeys(("noise", "gyro_change_bound"), fdi["bound"]["gyro_change_bound"]), "dt":
         fdi["config"]["dt"], "statistical_alarm": fdi["statistical"]["alarm"],
         **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),

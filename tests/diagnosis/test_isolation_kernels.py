@@ -346,7 +346,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
     G, Gu = rng.normal(size=(2, 3, 4))
     (
-        fdi["bound"]["has_surface_errors"],
+        fdi["bound"]["has_declared_surface_errors"],
         fdi["bound"]["effectiveness_error_per_rad"],
         fdi["bound"]["frame_innovation_bound"],
     ) = (
@@ -401,7 +401,7 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
         fdi["isolation"]["config"]["n_estimators"],
         fdi["types"]["config"]["slowest_half_cycle_frames"],
         fdi["config"]["n_substeps"],
-        fdi["types"]["config"]["is_single_instant"],
+        fdi["types"]["config"]["frame_shows_single_instant"],
     ) = 4, 9, 1, 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = POSITION, s, -1.0, 1.0

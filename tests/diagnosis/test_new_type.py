@@ -55,7 +55,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="reversed", has_constant_parameter=True, consistent_interval=consistent_interval,
-        possible_deflection=deflection, estimate=estimate,
+        possible_deflection_range=deflection, estimate=estimate,
     ),
 )  # fmt: skip
 '''
@@ -134,7 +134,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="overdrive", has_constant_parameter=False, sort_rank=5, reset_memory=reset_memory,
-        consistent_interval=consistent_interval, record_name="overdrive",
+        consistent_interval=consistent_interval, memory_record_name="overdrive",
         memory_dtype=record(least=float), accommodation_mode=SUBTRACT_OFFSET, estimate=estimate,
         deflection_relation=DeflectionRelation(
             1.0, theta_is_share=True, theta_range=lambda low, high: (0.0, MOST - 1.0)
@@ -431,14 +431,14 @@ def test_a_forged_certificate_of_it_is_refused(certified, forged, says):
 def test_every_type_keeps_the_contract():
     for row in registry.TYPES:
         assert callable(row.consistent_interval)
-        assert row.possible_deflection is not types.reachable_range or not row.has_constant_parameter
-        assert bool(row.memory_dtype) == bool(row.record_name)
+        assert row.possible_deflection_range is not types.reachable_range or not row.has_constant_parameter
+        assert bool(row.memory_dtype) == bool(row.memory_record_name)
 
 
 def test_types_of_a_constant_parameter_come_first():
     constant = [row.has_constant_parameter for row in registry.TYPES]
     assert constant == sorted(constant, reverse=True)
-    assert sum(constant) == registry.N_CONSTANT_TYPES
+    assert sum(constant) == registry.N_CONSTANT_PARAMETER_TYPES
 
 
 def test_types_stand_by_their_rank_those_of_a_constant_parameter_first():

@@ -143,7 +143,7 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
         model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_change_bound=3,
         gyro_change_bound_before=3,
         frame_innovation_bound=3,
-        has_surface_errors=int, effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        has_declared_surface_errors=int, effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
         additional_map_error=(MAX_LEVELS, 3),
     )  # fmt: skip
 
@@ -562,7 +562,7 @@ def fill_uncertainty_bound_now(bound, design, measured, u):
     if bound.declared_errors.has_declared_errors:
         set_air_rotation_bound(bound.declared_errors, measured.altitude)
         add_declared_error_bound(bound.declared_errors, design, x, y, u, bound.eta_bar_now)
-        if bound.has_surface_errors:
+        if bound.has_declared_surface_errors:
             for s in range(u.size):
                 fill_acceleration_error_per_rad(bound.declared_errors, design, s)
     if bound.model_error_map.n_boxes > 0:
@@ -619,7 +619,7 @@ def configure_uncertainty_bound(
     declared_errors = bound["declared_errors"]
     fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
     fill_declared_engine_errors(declared_errors, scenario, declared)
-    bound["has_surface_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
+    bound["has_declared_surface_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
 
 
 def fill_declared_errors(

@@ -190,13 +190,13 @@ def error_map_level_at_position(error_map, fie, position_range, n_substeps):
 
 
 @kernel
-def is_theta_consistent(fie, innovation, frame_bound):
+def is_theta_consistent(fie, innovation, innovation_bound):
     """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
-    if is_healthy(innovation, frame_bound):
+    if is_healthy(innovation, innovation_bound):
         return True
     low, high = fie.theta_min, fie.theta_max
     for i in range(3):
-        axis_low, axis_high = consistent_parameters_on_axis(innovation, frame_bound, fie, fie.effect, i)
+        axis_low, axis_high = consistent_parameters_on_axis(innovation, innovation_bound, fie, fie.effect, i)
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
@@ -220,13 +220,13 @@ def intersect_parameter_sets(fie, i, interval, shared_by_axes):
 
 
 @kernel
-def narrow_parameter_sets(fie, innovation, frame_bound, shared_by_axes):
+def narrow_parameter_sets(fie, innovation, innovation_bound, shared_by_axes):
     """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
 
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
     """
     for i in range(3):
-        consistent_in_frame = consistent_parameters_on_axis(innovation, frame_bound, fie, fie.effect, i)
+        consistent_in_frame = consistent_parameters_on_axis(innovation, innovation_bound, fie, fie.effect, i)
         intersect_parameter_sets(fie, i, consistent_in_frame, shared_by_axes)
         filtered_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
         intersect_parameter_sets(
@@ -398,7 +398,7 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
     fill_hypothesis(fie.hypothesis_kind, fie.surface, G, Gu, effect.base_acceleration, effect.regressor)
     set_effect_error_bound(effect, effect_error_bound, fie.surface)
     if (
-        bound.has_surface_errors or bound.model_error_map.one_surface_anywhere
+        bound.has_declared_surface_errors or bound.model_error_map.one_surface_anywhere
     ) and fie.hypothesis_kind == POSITION:
         widen_tolerance_by_surface_errors(fie, bound, bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
@@ -462,11 +462,11 @@ def update_residual(fie, threshold_kind, x):
 
 
 @kernel
-def is_fault_possible(isolation, fie, bank, frame_bound, abrupt, x, isolation_has_run):
+def is_fault_possible(isolation, fie, bank, innovation_bound, abrupt, x, isolation_has_run):
     """True if no test that is switched on excludes the fault of estimator fie.
 
-    frame_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as it
-    is; x (3,) rad/s: measured; isolation_has_run: it started a frame or more ago.
+    innovation_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as
+    it is; x (3,) rad/s: measured; isolation_has_run: it started a frame or more ago.
     """
     is_possible = update_residual(fie, isolation.config.threshold_kind, x)
     if isolation.config.uses_reach_test:
@@ -476,10 +476,10 @@ def is_fault_possible(isolation, fie, bank, frame_bound, abrupt, x, isolation_ha
     if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION) and (
         isolation_has_run or isolation.config.uses_reach_test
     ):
-        is_possible = is_possible and is_theta_consistent(fie, bank.output.innovation, frame_bound)
+        is_possible = is_possible and is_theta_consistent(fie, bank.output.innovation, innovation_bound)
     if isolation.config.narrows_theta_sets and abrupt and isolation_has_run and fie.hypothesis_kind == LOSS:
         is_possible = is_possible and narrow_parameter_sets(
-            fie, bank.output.innovation, frame_bound, isolation.config.shares_theta_across_axes
+            fie, bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
         )
     return is_possible
 

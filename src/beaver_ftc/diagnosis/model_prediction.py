@@ -97,7 +97,7 @@ def add_instant_to_sums(prediction, bound, layout, diagnoses_all_types):
         for s in range(u.size):
             sums.G[i, s] += G[i, s]
             sums.Gu[i, s] += G[i, s] * u[s]
-            if bound.has_surface_errors:
+            if bound.has_declared_surface_errors:
                 sums.effectiveness_error_per_rad[i, s] += bound.declared_errors.acceleration_error_per_rad[
                     i, s
                 ]
@@ -133,7 +133,7 @@ def fill_frame_means(prediction, bound):
         bound.eta_bar[i] = frame_share * sums.eta_bar[i]
     means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
     means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
-    if bound.has_surface_errors:
+    if bound.has_declared_surface_errors:
         bound.effectiveness_error_per_rad[:] = frame_share * sums.effectiveness_error_per_rad
         bound.surface_error_at_command[:] = frame_share * sums.surface_error_at_command
     if frame_share < 1.0:
@@ -188,7 +188,7 @@ def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
     sums.G[:], sums.Gu[:] = 0.0, 0.0
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
-    if bound.has_surface_errors:
+    if bound.has_declared_surface_errors:
         sums.effectiveness_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
     bound.additional_map_error[:] = 0.0
     add_instant_to_sums(prediction, bound, layout, diagnoses_all_types)

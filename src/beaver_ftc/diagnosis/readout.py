@@ -41,15 +41,15 @@ class Layout(NamedTuple):
 class FaultTypesConfig(NamedTuple):
     """How fault types are examined.
 
-    is_single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
-    returns_via_actuator: a released surface returns by its actuator. slowest_half_cycle_frames: blocks in
-    half of the slowest oscillation. frames_per_block: frames in a block, 1 where every frame is examined by
-    itself; block_duration_s: its duration.
+    frame_shows_single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
+    released_surface_returns_via_actuator: a released surface returns by its actuator.
+    slowest_half_cycle_frames: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
+    1 where every frame is examined by itself; block_duration_s: its duration.
     """
 
-    is_single_instant: bool
+    frame_shows_single_instant: bool
     n_substeps: int
-    returns_via_actuator: bool
+    released_surface_returns_via_actuator: bool
     slowest_half_cycle_frames: int
     frames_per_block: int
     block_duration_s: float
@@ -59,14 +59,14 @@ class FaultTypesConfig(NamedTuple):
 class Actuator(NamedTuple):
     """The actuator of a surface as fault types take it; rad, rad/s.
 
-    min_runaway_rate_rad_s: of a hardover. min_motion_per_substep_rad: of a rate limit, in an instant.
-    lag_share_per_substep: share of the way to the command that is made in an instant.
+    min_runaway_rate_rad_s: of a hardover. min_rate_limited_motion_per_substep_rad: of a rate limit, in an
+    instant. lag_share_per_substep: share of the way to the command that is made in an instant.
     """
 
     travel_low_rad: float
     travel_high_rad: float
     min_runaway_rate_rad_s: float
-    min_motion_per_substep_rad: float
+    min_rate_limited_motion_per_substep_rad: float
     lag_share_per_substep: float
 
 
@@ -249,8 +249,8 @@ class DiagnosisReadout:
         """How fault types are examined."""
         config = self._fdi["types"]["config"]
         return FaultTypesConfig(
-            bool(config["is_single_instant"]), int(config["n_substeps"]),
-            bool(config["returns_via_actuator"]),
+            bool(config["frame_shows_single_instant"]), int(config["n_substeps"]),
+            bool(config["released_surface_returns_via_actuator"]),
             int(config["slowest_half_cycle_frames"]),
             int(config["frames_per_block"]), float(config["block_duration_s"]), float(config["dt"]),
         )  # fmt: skip
@@ -417,7 +417,7 @@ def _read_surface(surface: np.void) -> SurfaceFaultTypes:
         "travel_low",
         "travel_high",
         "min_runaway_rate",
-        "min_motion_per_substep",
+        "min_rate_limited_motion_per_substep",
         "lag_share_per_substep",
     )
     actuator = Actuator(*(float(surface["actuator"][name]) for name in field_names))

@@ -43,11 +43,11 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 def reason_not_certified(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm.diagnosis.types_config
-    if TYPES[kind].has_shown is not None and not config.is_single_instant:
+    if TYPES[kind].has_shown is not None and not config.frame_shows_single_instant:
         return OSCILLATION_AT_STOP
     return (
         RETURNING_SURFACE
-        if config.returns_via_actuator and TYPES[kind].on_possible_release is not None
+        if config.released_surface_returns_via_actuator and TYPES[kind].on_possible_release is not None
         else None
     )
 

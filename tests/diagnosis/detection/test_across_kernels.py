@@ -70,7 +70,7 @@ def fdi(rng):
     air["output"]["axes_turn_variance"] = (
         air["output"]["axes_turn_variance"] @ air["output"]["axes_turn_variance"].T
     )
-    fdi["bound"]["effectiveness_error_per_rad"], fdi["bound"]["has_surface_errors"] = (
+    fdi["bound"]["effectiveness_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
         1,
     )
@@ -178,16 +178,18 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     assert not before.any()
 
 
-@pytest.mark.parametrize(("size", "has_surface_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
-def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi, size, has_surface_errors):
+@pytest.mark.parametrize(("size", "has_declared_surface_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
+def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
+    fdi, size, has_declared_surface_errors
+):
     """The column g + e, |e| up to the tolerance of either axis: the most, by its corners, of e across over
     what is left of g + e along; where little is left, a tenth of the column is."""
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
-    G[0, AILERON], G[2, AILERON], fdi["bound"]["has_surface_errors"] = (
+    G[0, AILERON], G[2, AILERON], fdi["bound"]["has_declared_surface_errors"] = (
         0.8 * size,
         0.6 * size,
-        has_surface_errors,
+        has_declared_surface_errors,
     )
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
@@ -196,7 +198,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(fdi
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
     least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE * size)
-    shown = has_surface_errors * most / least * (along @ innovation[[0, 2]])
+    shown = has_declared_surface_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
 

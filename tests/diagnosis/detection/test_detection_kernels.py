@@ -168,15 +168,18 @@ def instants(count, seed=5):
 
 
 @pytest.mark.parametrize("count", [1, 4])
-@pytest.mark.parametrize("has_surface_errors", [0, 1])
-def test_means_over_a_frame_are_of_its_instants(count, has_surface_errors):
+@pytest.mark.parametrize("has_declared_surface_errors", [0, 1])
+def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_errors):
     fdi, record = new_fdi(), new_prediction(1.0 / count)
-    fdi["bound"]["has_surface_errors"], fdi["config"]["diagnoses_all_types"] = has_surface_errors, 1
+    fdi["bound"]["has_declared_surface_errors"], fdi["config"]["diagnoses_all_types"] = (
+        has_declared_surface_errors,
+        1,
+    )
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
     record["sums"]["surface_error_at_command"], record["sums"]["effectiveness_error_per_rad"] = (
-        (99.0, 99.0) if has_surface_errors else (0.0, 0.0)
+        (99.0, 99.0) if has_declared_surface_errors else (0.0, 0.0)
     )
     fdi["bound"]["gyro_change_bound"] = 0.1, 0.2, 0.3
     measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
@@ -207,9 +210,11 @@ def test_means_over_a_frame_are_of_its_instants(count, has_surface_errors):
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["effectiveness_error_per_rad"] == pytest.approx(own if has_surface_errors else 0.0)
+    assert fdi["bound"]["effectiveness_error_per_rad"] == pytest.approx(
+        own if has_declared_surface_errors else 0.0
+    )
     assert fdi["bound"]["surface_error_at_command"] == pytest.approx(
-        at_command if has_surface_errors else 0.0
+        at_command if has_declared_surface_errors else 0.0
     )
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
     assert mean["Gu_spread"] == pytest.approx(spread)

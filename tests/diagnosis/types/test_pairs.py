@@ -58,7 +58,7 @@ def test_ailerons_and_rudder(seed, uncertainty, kind, other, at, later, share, o
     check(plant, faults)
     for surface, one, _, _ in faults:
         assert not plant.fdi["types"]["surface"][surface]["feasible_sets"]["excluded"][TYPES[one][1]]
-    assert not plant.fdi["types"]["pair"]["lateral_outside_class"]
+    assert not plant.fdi["types"]["pair"]["lateral_fault_outside_class"]
 
 
 @settings(max_examples=samples(40), deadline=None)

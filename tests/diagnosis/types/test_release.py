@@ -109,12 +109,12 @@ def test_later_releases_become_the_earlier_ones_when_of_those_none_is_left(earli
     plant = DesignPlant(seed=1, surface=0, position=lambda k, u: u, fault_class="all", actuators="servo")
     surface, kind = plant.fdi["types"]["surface"][0], fault_kinds.STUCK
     held, jam = surface["release"], surface["stuck"]
-    held["return_low"][:, kind] = 0.1 if earlier else np.inf, 0.2
-    held["return_high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
+    held["return_position_low"][:, kind] = 0.1 if earlier else np.inf, 0.2
+    held["return_position_high"][:, kind] = 0.15 if earlier else -np.inf, 0.3
     jam["feasible_low_before_release"], jam["feasible_high_before_release"] = (0.01, 0.02), (0.05, 0.06)
     surface["feasible_sets"]["low"][kind], surface["feasible_sets"]["high"][kind] = -0.4, 0.4
     held_surface.promote_sets_before_release(surface, kind)
-    low, high = list(held["return_low"][:, kind]), list(held["return_high"][:, kind])
+    low, high = list(held["return_position_low"][:, kind]), list(held["return_position_high"][:, kind])
     if earlier:
         assert (low, high) == ([0.1, 0.2], [0.15, 0.3])
         assert (list(jam["feasible_low_before_release"]), list(jam["feasible_high_before_release"])) == (

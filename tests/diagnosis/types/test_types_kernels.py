@@ -51,7 +51,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
         min(LOW, 0.0),
         max(HIGH, 0.0),
     )
-    registry.restart_surface_types(surface)
+    registry.restart_fault_types_of_surface(surface)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, np.inf
     (
         surface["judged_observation"]["position_low"],
@@ -85,7 +85,7 @@ def test_what_is_known_of_a_surface_as_it_begins():
         5,
     )
     surface["last_observation"]["position_low"], surface["last_observation"]["position_high"] = 0.1, 0.2
-    registry.restart_surface_types(surface)
+    registry.restart_fault_types_of_surface(surface)
     assert not surface["feasible_sets"]["excluded"].any()
     assert (
         surface["evidence"]["n_anomalous_frames"],
@@ -190,7 +190,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in (
         (BIAS, commanded_surface.consistent_bias_interval),
-        (GROWING_BIAS, commanded_surface.growing_bias_consistent_set),
+        (GROWING_BIAS, commanded_surface.consistent_growing_bias_interval),
     ):
         judged(judge, fdi, surface, kind, 5)
         assert surface["feasible_sets"]["excluded"][kind]
@@ -225,13 +225,13 @@ def test_a_bias_keeps_the_offsets_that_explain_every_frame():
         (-0.17, -0.15)
     )
     surface["last_observation"]["healthy_position"] = 0.05
-    assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
+    assert on(commanded_surface.bias_deflection_range, fdi, surface, BIAS) == pytest.approx((-0.12, -0.1))
     commands, surface["last_observation"]["healthy_position"] = surface["commands"], -0.2
     commands["min_healthy_position"][0], commands["max_healthy_position"][0] = (
         -0.24,
         -0.1,
     )  # where it was meanwhile: to -0.41 and to -0.25
-    assert on(commanded_surface.bias_deflection, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
+    assert on(commanded_surface.bias_deflection_range, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
     commands["min_healthy_position"][0] = commands["max_healthy_position"][0] = 0.0
     assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
     assert types.parameter_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
@@ -254,14 +254,14 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
             offset - 0.01,
             offset + 0.01,
         )
-        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
     assert surface["feasible_sets"]["excluded"][GROWING_BIAS] == excluded
 
 
 def test_at_a_stop_a_growing_bias_says_nothing():
     for low, high in ((0.45, 0.5), (-0.4, -0.35)):
         fdi, surface = new_surface(low=low, high=high)
-        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
+        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
         assert surface["growing_bias"]["min_growth_up"] == surface["growing_bias"]["min_growth_down"] == 0.0
 
 
@@ -285,26 +285,26 @@ def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(place
                 place - 0.01,
                 min(place + 0.01, HIGH),
             )
-            judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
-    assert surface["growing_bias"]["has_run_to_stop"].tolist() == ran
+            judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+    assert surface["growing_bias"]["has_run_towards_stop"].tolist() == ran
 
 
 def test_of_several_instants_a_mean_may_be_that_of_the_last():
     fdi, surface = new_surface(min_runaway_rate=0.05 / DT)
-    fdi["types"]["config"]["is_single_instant"] = 0
+    fdi["types"]["config"]["frame_shows_single_instant"] = 0
     for place, ran in ((0.0, 0), (0.19, 0), (0.31, 1)):  # beyond 0.01 + 3 * 0.09 after two frames
         on(commanded_surface.widen_offset_interval, fdi, surface, GROWING_BIAS)
         surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
             place - 0.01,
             place + 0.01,
         )
-        judged(commanded_surface.growing_bias_consistent_set, fdi, surface, GROWING_BIAS, 5)
-        assert surface["growing_bias"]["has_run_to_stop"][1] == ran
+        judged(commanded_surface.consistent_growing_bias_interval, fdi, surface, GROWING_BIAS, 5)
+        assert surface["growing_bias"]["has_run_towards_stop"][1] == ran
 
 
 def slow_run(places, commands=(0.0, 0.0), whole=1, frames=None, slowest_step=0.0):
     fdi, surface = new_surface(slowest_step=slowest_step)
-    fdi["types"]["config"]["is_single_instant"] = whole
+    fdi["types"]["config"]["frame_shows_single_instant"] = whole
     surface["commands"]["min_command"], surface["commands"]["max_command"] = commands[0], commands[1]
     for k, place in enumerate(places):
         surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
@@ -345,13 +345,13 @@ def test_which_side_of_its_orders_a_surface_stands_on():
     fdi, surface = new_surface(low=0.1, high=0.2)
     commands = surface["commands"]
     for newest, whole in ((1, 0), (2, 1)):
-        fdi["types"]["config"]["is_single_instant"] = whole
+        fdi["types"]["config"]["frame_shows_single_instant"] = whole
         for low, high, side in ((-0.1, 0.05, 1), (0.25, 0.3, -1), (0.05, 0.15, 0), (0.15, 0.3, 0)):
             commands["min_command"], commands["max_command"] = 9.0, -9.0
             commands["min_command"][newest], commands["max_command"][newest] = low, high
             commands["min_command"][2] = min(commands["min_command"][2], low)
             commands["max_command"][2] = max(commands["max_command"][2], high)
-            assert on(commanded_surface.side_of_all_commands, fdi, surface) == side
+            assert on(commanded_surface.surface_side_of_commands, fdi, surface) == side
 
 
 def swung(signs, slowest_half_cycle_frames=20):
@@ -403,7 +403,10 @@ def test_a_sign_that_stays_for_longer_than_the_slowest_half_cycle_is_none():
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi, surface = new_surface(
-        first_anomalous_frame=3, first_position_low=0.1, first_position_high=0.2, min_runaway_rate=1.0
+        first_anomalous_frame=3,
+        first_anomalous_position_low=0.1,
+        first_anomalous_position_high=0.2,
+        min_runaway_rate=1.0,
     )
     fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
@@ -432,7 +435,11 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
 def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside):
     for (low, high), excluded in ((inside, 0), (outside, 1)):
         fdi, surface = new_surface(
-            low=low, high=high, first_anomalous_frame=3, first_position_low=0.1, first_position_high=0.2
+            low=low,
+            high=high,
+            first_anomalous_frame=3,
+            first_anomalous_position_low=0.1,
+            first_anomalous_position_high=0.2,
         )
         surface["actuator"]["min_runaway_rate"] = 1.0
         surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
@@ -448,7 +455,10 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
 )
 def test_at_a_stop_the_mean_of_a_quick_swing_keeps_its_sign(whole, stop_can_hide_deflection, excluded):
     fdi, surface = new_surface(low=-0.2, high=-0.1, command=0.1)  # below its command all the time
-    fdi["types"]["config"]["is_single_instant"], surface["judged_observation"]["stop_can_hide_deflection"] = (
+    (
+        fdi["types"]["config"]["frame_shows_single_instant"],
+        surface["judged_observation"]["stop_can_hide_deflection"],
+    ) = (
         whole,
         stop_can_hide_deflection,
     )
@@ -475,15 +485,15 @@ def test_a_stop_hides_what_is_no_wider_than_the_interval_of_a_deflection(
 def test_a_jam_narrows_to_where_it_is_seen():
     fdi, surface = new_surface(low=0.1, high=0.2)
     judged(held_surface.consistent_stuck_interval, fdi, surface, STUCK, 5)
-    assert on(held_surface.stuck_deflection, fdi, surface, STUCK) == (0.1, 0.2)
+    assert on(held_surface.stuck_deflection_range, fdi, surface, STUCK) == (0.1, 0.2)
     assert types.feasible_set(fdi, 0, STUCK) == (0.1, 0.2)
 
 
 def test_where_types_have_a_surface():
     fdi, surface = new_surface(
         first_anomalous_frame=3,
-        first_position_low=0.1,
-        first_position_high=0.2,
+        first_anomalous_position_low=0.1,
+        first_anomalous_position_high=0.2,
         min_runaway_rate=1.0,
         command=0.2,
     )
@@ -492,30 +502,35 @@ def test_where_types_have_a_surface():
         0.25,
     )
     fdi["types"]["frame_index"] = 5
-    assert on(commanded_surface.loss_deflection, fdi, surface, CONSTANT_LOSS) == pytest.approx((-0.2, -0.05))
-    assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.0, 0.0)
+    assert on(commanded_surface.loss_deflection_range, fdi, surface, CONSTANT_LOSS) == pytest.approx(
+        (-0.2, -0.05)
+    )
+    assert on(held_surface.float_deflection_range, fdi, surface, FLOAT) == (0.0, 0.0)
     surface["actuator"]["travel_low"] = 0.1  # the lower stop is as near to neutral as it comes
-    assert on(held_surface.float_deflection, fdi, surface, FLOAT) == (0.1, 0.1)
+    assert on(held_surface.float_deflection_range, fdi, surface, FLOAT) == (0.1, 0.1)
     assert held_surface.neutral_deflection_rad(fdi, 0, FLOAT) == 0.1
     surface["actuator"]["travel_low"] = LOW
-    assert on(held_surface.hardover_up_deflection, fdi, surface, UP) == pytest.approx((0.14, HIGH))
-    assert on(held_surface.hardover_down_deflection, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
+    assert on(held_surface.hardover_up_deflection_range, fdi, surface, UP) == pytest.approx((0.14, HIGH))
+    assert on(held_surface.hardover_down_deflection_range, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
     assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,
         LOW,
     ]
-    assert commanded_surface.loss_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
+    assert commanded_surface.loss_theta_interval(fdi, 0, CONSTANT_LOSS) == (-0.75, 0.0)
 
 
 def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
     fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["types"]["config"]["returns_via_actuator"], fdi["types"]["config"]["n_substeps"] = 1, instants
+    fdi["types"]["config"]["released_surface_returns_via_actuator"], fdi["types"]["config"]["n_substeps"] = (
+        1,
+        instants,
+    )
     surface["commands"]["command_history"][1] = order
     for which in (held_surface.EARLIER_RELEASE, held_surface.LATER_RELEASE):
         held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["return_low"][held_surface.LATER_RELEASE, STUCK] = low
-    surface["release"]["return_high"][held_surface.LATER_RELEASE, STUCK] = high
+    surface["release"]["return_position_low"][held_surface.LATER_RELEASE, STUCK] = low
+    surface["release"]["return_position_high"][held_surface.LATER_RELEASE, STUCK] = high
     return fdi, surface
 
 
@@ -541,7 +556,9 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
-    surface["judged_observation"]["effectiveness_variation"] = 0.25 * (G.max() - G.min()) / G.mean()
+    surface["judged_observation"]["weighted_mean_error_per_position_range"] = (
+        0.25 * (G.max() - G.min()) / G.mean()
+    )
     mean, _, room = on(held_surface.mean_return_position, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     (
@@ -553,21 +570,23 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         shown - 1e-12,
         shown + 1e-12,
     )
-    assert on(held_surface.return_explains, fdi, surface, STUCK)
+    assert on(held_surface.return_explains_frame, fdi, surface, STUCK)
 
 
 def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
-    assert on(held_surface.return_explains, fdi, surface, STUCK)
+    assert on(held_surface.return_explains_frame, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((0.22, 0.28))
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
+        (0.22, 0.28)
+    )
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
-        assert not on(held_surface.return_explains, fdi, surface, STUCK)
-        assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK)
+        assert not on(held_surface.return_explains_frame, fdi, surface, STUCK)
+        assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
-        held_surface.return_explains, fdi, surface, STUCK
+        held_surface.return_explains_frame, fdi, surface, STUCK
     )  # it is back: no release explains that anything is wrong
 
 
@@ -586,8 +605,8 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
             1.0,
             0.05,
         )
-        surface["judged_observation"]["effectiveness_variation"] = 0.2
-        assert on(held_surface.return_explains, fdi, surface, STUCK) == there
+        surface["judged_observation"]["weighted_mean_error_per_position_range"] = 0.2
+        assert on(held_surface.return_explains_frame, fdi, surface, STUCK) == there
 
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
@@ -596,29 +615,37 @@ def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
     held_surface.add_release(surface, STUCK, 0.1, 0.15)
     held_surface.add_release(surface, STUCK, 0.5, 0.4)  # nowhere
     held = surface["release"]
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.1, 0.3)
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.1, 0.3)
     held["has_released"][STUCK] = 1
     held_surface.add_release(surface, STUCK, -0.4, 0.5)
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.1, 0.3)
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.1, 0.3)
     surface["judged_observation"]["is_anomalous"] = 1
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((0.05, 0.2))
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
+        (0.05, 0.2)
+    )
     assert held["has_released"][STUCK] == 1
     surface["judged_observation"]["is_anomalous"] = 0
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     assert held["has_released"][STUCK] == 0
 
 
-@pytest.mark.parametrize("returns_via_actuator", [0, 1])
-def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(returns_via_actuator):
+@pytest.mark.parametrize("released_surface_returns_via_actuator", [0, 1])
+def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
+    released_surface_returns_via_actuator,
+):
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns_via_actuator"] = returns_via_actuator
-    elsewhere = held_surface.STATUS_RETURNING if returns_via_actuator else held_surface.STATUS_REFUTED
+    fdi["types"]["config"]["released_surface_returns_via_actuator"] = released_surface_returns_via_actuator
+    elsewhere = (
+        held_surface.STATUS_RETURNING
+        if released_surface_returns_via_actuator
+        else held_surface.STATUS_REFUTED
+    )
     judged(held_surface.held_or_returning_set, fdi, surface, STUCK, -0.1, 0.1)
-    assert surface["feasible_sets"]["excluded"][STUCK] == (not returns_via_actuator)
-    assert surface["release"]["has_released"][STUCK] == returns_via_actuator
+    assert surface["feasible_sets"]["excluded"][STUCK] == (not released_surface_returns_via_actuator)
+    assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))
-    fdi["types"]["config"]["returns_via_actuator"] = returns_via_actuator
+    fdi["types"]["config"]["released_surface_returns_via_actuator"] = released_surface_returns_via_actuator
     assert on(held_surface.hold_status_in_frame, fdi, surface, STUCK, 0.3, 0.4) == held_surface.STATUS_HELD
     assert on(held_surface.hold_status_in_frame, fdi, surface, STUCK, 0.1, 0.2) == held_surface.STATUS_HELD
     surface["release"]["has_released"][STUCK] = 1
@@ -628,45 +655,56 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(ret
 def test_where_a_surface_was_as_the_judged_frame_began():
     fdi, surface = new_surface(low=0.1, high=0.2, low_before=0.3, high_before=0.4)
     assert on(held_surface.position_at_frame_start, fdi, surface) == (0.1, 0.2, 9)
-    fdi["types"]["config"]["is_single_instant"] = 0
+    fdi["types"]["config"]["frame_shows_single_instant"] = 0
     assert on(held_surface.position_at_frame_start, fdi, surface) == (0.3, 0.4, 8)
 
 
 @pytest.mark.parametrize("kind", [STUCK, FLOAT, UP, DOWN])
 def test_from_where_each_type_lets_go(kind):
     fdi, surface = released(
-        low=np.inf, high=-np.inf, judged=(-0.1, 0.2), first_anomalous_frame=7, first_position_low=0.0
+        low=np.inf,
+        high=-np.inf,
+        judged=(-0.1, 0.2),
+        first_anomalous_frame=7,
+        first_anomalous_position_low=0.0,
     )
-    surface["actuator"]["min_runaway_rate"], surface["evidence"]["first_position_high"] = 1.0, 0.1
+    surface["actuator"]["min_runaway_rate"], surface["evidence"]["first_anomalous_position_high"] = 1.0, 0.1
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.05, 0.3
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
     if kind == STUCK:
         (
-            surface["release"]["return_low"][held_surface.EARLIER_RELEASE, STUCK],
-            surface["release"]["return_high"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["return_position_low"][held_surface.EARLIER_RELEASE, STUCK],
+            surface["release"]["return_position_high"][held_surface.EARLIER_RELEASE, STUCK],
         ) = 0.0, 0.1
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
     expected = {STUCK: (0.05, 0.2), FLOAT: (0.0, 0.0), UP: (0.04, 0.2), DOWN: (-0.1, 0.06)}[kind]
-    assert (held["return_low"][1, kind], held["return_high"][1, kind]) == pytest.approx(expected)
+    assert (held["return_position_low"][1, kind], held["return_position_high"][1, kind]) == pytest.approx(
+        expected
+    )
 
 
 @pytest.mark.parametrize(("kind", "expected"), [(UP, (0.02, HIGH)), (DOWN, (LOW, 0.08))])
 def test_within_a_frame_of_several_instants_a_runaway_may_be_let_go_further_on(kind, expected):
     fdi, surface = released(
-        first_anomalous_frame=7, first_position_low=0.0, first_position_high=0.1, min_runaway_rate=1.0
+        first_anomalous_frame=7,
+        first_anomalous_position_low=0.0,
+        first_anomalous_position_high=0.1,
+        min_runaway_rate=1.0,
     )
     (
         surface["earlier_observation"]["position_low"],
         surface["earlier_observation"]["position_high"],
-        fdi["types"]["config"]["is_single_instant"],
+        fdi["types"]["config"]["frame_shows_single_instant"],
     ) = -0.1, 0.2, 0
     for which in (0, 1):
         held_surface.clear_releases(surface, which, kind)
     on(TYPES[kind].on_possible_release, fdi, surface, kind)
     held = surface["release"]
-    assert (held["return_low"][1, kind], held["return_high"][1, kind]) == pytest.approx(expected)
+    assert (held["return_position_low"][1, kind], held["return_position_high"][1, kind]) == pytest.approx(
+        expected
+    )
 
 
 def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
@@ -682,8 +720,8 @@ def test_a_jam_that_may_have_let_go_returns_to_what_was_known_before():
         surface, STUCK
     )  # no earlier release: the later are the earlier ones now
     held = surface["release"]
-    assert (held["return_low"][0, STUCK], held["return_high"][0, STUCK]) == (0.2, 0.3)
-    assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK)
+    assert (held["return_position_low"][0, STUCK], held["return_position_high"][0, STUCK]) == (0.2, 0.3)
+    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK)
     assert (
         surface["stuck"]["feasible_low_before_release"].tolist(),
         surface["stuck"]["feasible_high_before_release"].tolist(),
@@ -704,7 +742,7 @@ def within_block(commands, held=(0.2, 0.3), judged=(-1.0, 1.0)):
     fdi["types"]["config"]["frames_per_block"] = len(commands)
     surface["commands"]["command_history"][1, : len(commands)] = commands
     surface["release"]["held_position_min"][STUCK], surface["release"]["held_position_max"][STUCK] = held
-    surface["judged_observation"]["effectiveness_variation"] = UNEVEN
+    surface["judged_observation"]["weighted_mean_error_per_position_range"] = UNEVEN
     return fdi, surface
 
 
@@ -748,17 +786,17 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
         (-1.0, beyond) if end == "low" else (beyond, 1.0)
     )
-    assert on(held_surface.block_release_explains, fdi, surface, STUCK) == inside
-    assert on(held_surface.return_explains, fdi, surface, STUCK) == inside
+    assert on(held_surface.release_within_block_explains_it, fdi, surface, STUCK) == inside
+    assert on(held_surface.return_explains_frame, fdi, surface, STUCK) == inside
     held = surface["release"]["held_position_min"][STUCK] <= surface["release"]["held_position_max"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["frames_per_block"] = 1
-    assert not on(held_surface.block_release_explains, fdi, surface, STUCK)
+    assert not on(held_surface.release_within_block_explains_it, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not on(held_surface.block_release_explains, fdi, surface, STUCK)
+    assert not on(held_surface.release_within_block_explains_it, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -766,15 +804,17 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     fdi, surface = within_block(ORDERS)
     held = surface["release"]
     if joined:
-        held["return_low"][1, STUCK], held["return_high"][1, STUCK] = 0.25, 0.251
+        held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK] = 0.25, 0.251
     on(held_surface.propagate_returns, fdi, surface, STUCK)
     low, high = (on(held_surface.mean_return_position, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == pytest.approx((low, high))
-    assert not held_surface.has_release(surface, held_surface.EARLIER_RELEASE, STUCK)
-    fdi["types"]["config"]["frames_per_block"], before = 1, held["return_high"][1, STUCK].copy()
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
+        (low, high)
+    )
+    assert not held_surface.is_release_possible(surface, held_surface.EARLIER_RELEASE, STUCK)
+    fdi["types"]["config"]["frames_per_block"], before = 1, held["return_position_high"][1, STUCK].copy()
     held_surface.clear_releases(surface, held_surface.LATER_RELEASE, STUCK)
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    assert not held_surface.has_release(surface, held_surface.LATER_RELEASE, STUCK), (
+    assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK), (
         "in one frame nothing is let go within"
     )
     assert before == pytest.approx(high)
@@ -786,7 +826,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     fdi, surface = released(low=0.2, high=0.3, command=-0.2)
     fdi["types"]["config"]["frames_per_block"], surface["commands"]["command_history"][1, :4] = 4, ORDERS
     held, start = surface["release"], 0.2 if side == "low" else 0.3
-    surface["judged_observation"]["effectiveness_variation"], path = UNEVEN, way(start, ORDERS)
+    surface["judged_observation"]["weighted_mean_error_per_position_range"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
     assert on(held_surface.mean_return_position, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
@@ -799,8 +839,8 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     )
     assert on(held_surface.narrow_return_interval, fdi, surface, held_surface.LATER_RELEASE, STUCK) == inside
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
-        assert held["return_low"][1, STUCK] <= held["return_high"][1, STUCK]
-        kept = held["return_low" if side == "low" else "return_high"][1, STUCK]
+        assert held["return_position_low"][1, STUCK] <= held["return_position_high"][1, STUCK]
+        kept = held["return_position_low" if side == "low" else "return_position_high"][1, STUCK]
         assert kept == pytest.approx(start)
 
 
@@ -809,8 +849,8 @@ def test_a_jam_let_go_without_an_earlier_release_is_the_earlier_one_then():
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.15, 0.22
     on(held_surface.add_stuck_release, fdi, surface, STUCK)
     held = surface["release"]
-    assert (held["return_low"][0, STUCK], held["return_high"][0, STUCK]) == (0.1, 0.3)
-    assert (held["return_low"][1, STUCK], held["return_high"][1, STUCK]) == (0.15, 0.22)
+    assert (held["return_position_low"][0, STUCK], held["return_position_high"][0, STUCK]) == (0.1, 0.3)
+    assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == (0.15, 0.22)
     assert (held["held_position_min"][STUCK], held["held_position_max"][STUCK]) == (0.15, 0.22)
 
 
@@ -823,7 +863,10 @@ def test_a_jam_that_looks_healthy_is_what_it_was_before():
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.25, 0.26
     restore_sets(surface)
     assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.1, 0.4)
-    surface["release"]["return_low"][0, STUCK], surface["release"]["return_high"][0, STUCK] = 0.1, 0.2
+    (
+        surface["release"]["return_position_low"][0, STUCK],
+        surface["release"]["return_position_high"][0, STUCK],
+    ) = 0.1, 0.2
     restore_sets(surface)
     assert (surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK]) == (0.0, 0.2)
 

@@ -23,7 +23,9 @@ def names_of_types():
         for name, value in vars(import_module(f"{table.__name__}.{module}")).items()
         if isinstance(value, types.FaultType)
     }
-    words = {word for row in registry.TYPES for word in (row.name, row.description, row.record_name) if word}
+    words = {
+        word for row in registry.TYPES for word in (row.name, row.description, row.memory_record_name) if word
+    }
     return (rows | words | set(MODULES)) - {"float"}  # which is Python's as well
 
 

@@ -52,7 +52,7 @@ def new_case(**left):
     fdi = new_fdi()
     (
         fdi["types"]["config"]["slowest_half_cycle_frames"],
-        fdi["types"]["config"]["is_single_instant"],
+        fdi["types"]["config"]["frame_shows_single_instant"],
         fdi["config"]["diagnoses_all_types"],
         fdi["types"]["config"]["n_substeps"],
     ) = PATIENCE, 1, 1, 1
@@ -67,7 +67,7 @@ def new_case(**left):
         (0,) * 4 + (1,) * 4,
     )
     (
-        fdi["types"]["surface"]["status"]["is_candidate"],
+        fdi["types"]["surface"]["status"]["may_be_sole_fault"],
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"],
         fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"],
     ) = 1, 99, 99
@@ -96,12 +96,12 @@ def new_case(**left):
 
 
 def locate(fdi, s, innovation, bound, effect):
-    """`observe_position` for surface s, with its estimator and its axis."""
+    """`infer_position` for surface s, with its estimator and its axis."""
     fie = fdi["isolation"]["estimator"][fdi["layout"]["position_estimator"][s]]
     axis = fdi["layout"]["dominant_axis"][s]
     config, surface = fdi["types"]["config"], fdi["types"]["surface"][s]
     types.shift_observations(surface)
-    types.observe_position(config, surface, fie, axis, innovation, bound, effect)
+    types.infer_position(config, surface, fie, axis, innovation, bound, effect)
 
 
 def one(*kinds, **fields):
@@ -158,11 +158,11 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 )
 def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown_type):
     _, surface = one(*kinds)
-    same_name = verdict.FIRST_TYPE_OF_NAME[sole_shown_type] if sole_shown_type >= 0 else -1
+    same_name = verdict.FIRST_TYPE_WITH_SAME_NAME[sole_shown_type] if sole_shown_type >= 0 else -1
     assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
     assert verdict.sole_remaining_constant_type(surface) == one_type
     found = verdict.sole_shown_type(surface)
-    assert (verdict.FIRST_TYPE_OF_NAME[found] if found >= 0 else -1) == same_name
+    assert (verdict.FIRST_TYPE_WITH_SAME_NAME[found] if found >= 0 else -1) == same_name
 
 
 def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
@@ -194,7 +194,7 @@ def test_the_sole_surface_that_is_possible():
     only = new_case(aileron=COURSES, elevator=COURSES, flap=COURSES, rudder=(STUCK,))
     assert on(verdict.sole_possible_surface, only, True) == RUDDER
     assert on(verdict.sole_possible_surface, only, False) == SEVERAL_SURFACES
-    only["types"]["surface"]["status"]["is_candidate"] = 0, 0, 0, 1
+    only["types"]["surface"]["status"]["may_be_sole_fault"] = 0, 0, 0, 1
     assert on(verdict.sole_possible_surface, only, False) == FLAP
     assert on(verdict.sole_possible_surface, only, True) == NO_SURFACE
 
@@ -204,9 +204,9 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest_frames, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
-    assert bool(on(verdict.can_hide_at_rest, fdi, surface)) == slow
-    assert not on(verdict.can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames))
-    assert not on(verdict.can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames))
+    assert bool(on(verdict.type_can_hide_at_rest, fdi, surface)) == slow
+    assert not on(verdict.type_can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames))
+    assert not on(verdict.type_can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames))
 
 
 def looked_like_by(kind):
@@ -228,9 +228,11 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
     assert not verdict.can_be_another_type(one(STUCK)[1], STUCK, True)
     for direction, stop in ((UP, 1), (DOWN, 0)):  # what has run to the stop has not come there by and by
         _, surface = one(direction, GROWING_BIAS)
-        surface["growing_bias"]["has_run_to_stop"][stop] = 1
+        surface["growing_bias"]["has_run_towards_stop"][stop] = 1
         assert not verdict.can_be_another_type(surface, direction, True)
-        surface["growing_bias"]["has_run_to_stop"][:] = 1 - surface["growing_bias"]["has_run_to_stop"]
+        surface["growing_bias"]["has_run_towards_stop"][:] = (
+            1 - surface["growing_bias"]["has_run_towards_stop"]
+        )
         assert verdict.can_be_another_type(surface, direction, True)
     assert not verdict.can_be_another_type(one(STUCK, SLOW)[1], STUCK, False)  # it follows the command
     assert verdict.can_be_another_type(one(STUCK, GROWING_BIAS)[1], STUCK, False)
@@ -266,7 +268,7 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
     fdi, surface = one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence)
     surface["oscillatory"]["n_half_cycles"] = half_cycles
     assert on(verdict.fault_type_on_surface, fdi, surface) == found
-    fdi["types"]["config"]["has_surface_errors"] = 1
+    fdi["types"]["config"]["has_declared_surface_errors"] = 1
     assert on(verdict.fault_type_on_surface, fdi, surface) == in_coarse_sets
 
 
@@ -306,7 +308,7 @@ def test_the_surface_at_fault():
 
 
 @pytest.mark.parametrize(
-    ("flap", "evidence", "has_surface_errors", "estimator_excluded"),
+    ("flap", "evidence", "has_declared_surface_errors", "estimator_excluded"),
     [
         ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
         ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
@@ -316,21 +318,21 @@ def test_the_surface_at_fault():
     ],
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(
-    flap, evidence, has_surface_errors, estimator_excluded
+    flap, evidence, has_declared_surface_errors, estimator_excluded
 ):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     (
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR],
-        fdi["types"]["config"]["has_surface_errors"],
+        fdi["types"]["config"]["has_declared_surface_errors"],
     ) = (
         evidence,
-        has_surface_errors,
+        has_declared_surface_errors,
     )
     fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"][FLAP] = evidence
     assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
         assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
-    fdi["types"]["surface"]["status"]["is_candidate"][FLAP] = 0
+    fdi["types"]["surface"]["status"]["may_be_sole_fault"][FLAP] = 0
     assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
@@ -411,19 +413,24 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     assert surface["accommodation"]["mode"] == -1
     surface["last_observation"]["position_low"] = 0.1
     take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
-    assert (surface["accommodation"]["n_frames_absent"], fdi["verdict"]["accommodated_surface"]) == (
+    assert (
+        surface["accommodation"]["n_frames_since_fault_showed"],
+        fdi["verdict"]["accommodated_surface"],
+    ) == (
         0,
         RUDDER,
     )
-    assert on(verdict.is_fault_present, fdi, surface, SCALE_COMMAND, True)
+    assert on(verdict.update_fault_presence, fdi, surface, SCALE_COMMAND, True)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
-    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_frames_absent=0)
+    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_frames_since_fault_showed=0)
     fdi["types"]["config"]["dt"] = dt
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
-    there = [bool(on(verdict.is_fault_present, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))]
+    there = [
+        bool(on(verdict.update_fault_presence, fdi, surface, GIVE_UP, True)) for _ in range(round(0.3 / dt))
+    ]
     assert there.index(False) + 1 == round(0.2 / dt)
     assert not any(there[there.index(False) :])
 
@@ -487,12 +494,15 @@ def test_orders_are_kept_for_the_frames_before():
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["regressor"], surface["last_observation"]["effectiveness_variation"] = (0.5, 0.0, -2.0), 0.07
+    effect["regressor"], surface["last_observation"]["weighted_mean_error_per_position_range"] = (
+        (0.5, 0.0, -2.0),
+        0.07,
+    )
     surface["commands"]["min_effectiveness"], surface["commands"]["max_effectiveness"] = -2.1, -1.8
     locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
     assert (
-        surface["last_observation"]["effectiveness_variation"],
-        surface["judged_observation"]["effectiveness_variation"],
+        surface["last_observation"]["weighted_mean_error_per_position_range"],
+        surface["judged_observation"]["weighted_mean_error_per_position_range"],
     ) == pytest.approx((0.25 * 0.3 / 2.0, 0.07))
 
 
@@ -554,9 +564,9 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     whole, is_anomalous, judged
 ):
     fdi = new_case()
-    fdi["types"]["config"]["is_single_instant"], fdi["types"]["frame_index"] = whole, 7
+    fdi["types"]["config"]["frame_shows_single_instant"], fdi["types"]["frame_index"] = whole, 7
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface_types(surface)
+    registry.restart_fault_types_of_surface(surface)
     surface["evidence"]["n_anomalous_frames"], surface["accommodation"]["mode"] = 5, -1
     (
         surface["earlier_observation"]["is_anomalous"],
@@ -567,9 +577,10 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
     on(registry.judge_previous_frame, fdi)
     assert surface["evidence"]["n_anomalous_frames"] == (6 if judged else 5)
     assert surface["evidence"]["first_anomalous_frame"] == (6 if judged else -1)
-    assert (surface["evidence"]["first_position_low"], surface["evidence"]["first_position_high"]) == (
-        (0.1, 0.2) if judged else (0.0, 0.0)
-    )
+    assert (
+        surface["evidence"]["first_anomalous_position_low"],
+        surface["evidence"]["first_anomalous_position_high"],
+    ) == ((0.1, 0.2) if judged else (0.0, 0.0))
     assert fdi["types"]["frame_index"] == 8
     assert surface["oscillatory"]["sign_since_frame"] == (6 if judged else 7)
 
@@ -577,7 +588,7 @@ def test_a_frame_next_to_a_healthy_one_is_judged_only_if_faults_begin_between_fr
 def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface_types(surface)
+    registry.restart_fault_types_of_surface(surface)
     counted = []
     for hides in ((0, 0), (0, 0), (0, 1), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0)):
         (
@@ -615,7 +626,7 @@ def test_where_a_stop_is_follows_the_surface_by_a_frame():
 def test_a_frame_that_puts_a_surface_nowhere_judges_nothing():
     fdi = new_case()
     surface = fdi["types"]["surface"][RUDDER]
-    registry.restart_surface_types(surface)
+    registry.restart_fault_types_of_surface(surface)
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = 0.2, 0.1
     on(registry.narrow_feasible_sets, fdi, surface, 6)
     assert surface["evidence"]["first_anomalous_frame"] == -1
@@ -641,11 +652,11 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert n_rest_frames(low=0.0, high=0.14)[1]["evidence"]["n_rest_frames"] == 0
     assert not n_rest_frames(frames=PATIENCE)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     assert n_rest_frames(frames=PATIENCE + 1)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert not n_rest_frames(frames=PATIENCE + 1, has_surface_errors=1)[1]["feasible_sets"]["excluded"][
-        OSCILLATORY
-    ]
+    assert not n_rest_frames(frames=PATIENCE + 1, has_declared_surface_errors=1)[1]["feasible_sets"][
+        "excluded"
+    ][OSCILLATORY]
     fdi, surface = n_rest_frames()
-    fdi["types"]["surface"]["status"]["is_candidate"] = 1, 1, 0, 1
+    fdi["types"]["surface"]["status"]["may_be_sole_fault"] = 1, 1, 0, 1
     on(registry.count_rest_as_evidence, fdi, RUDDER)
     assert fdi["types"]["surface"]["evidence"]["n_anomalous_frames"].tolist() == [
         1,
@@ -737,7 +748,7 @@ def test_who_is_named_in_roll_and_yaw():
     assert lateral(other_left=False) == [True, False, False]
     assert lateral(False, False) == [True, True, False]
     assert lateral(False, False, alarmed=0) == [False, False, False]
-    assert lateral(False, False, lateral_outside_class=1) == [False, False, True]
+    assert lateral(False, False, lateral_fault_outside_class=1) == [False, False, True]
 
 
 def test_where_nothing_explains_both_the_fault_is_outside_the_class():
@@ -811,18 +822,18 @@ def test_a_surface_off_its_command_is_within_its_travel():
 def test_whereabouts_cover_every_constant_type_left():
     fdi, surface = one(STUCK, FLOAT, SLOW)
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
-    assert on(pairs.possible_deflection_interval, fdi, surface) == (0.0, 0.2)
+    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (0.0, 0.2)
     leave(surface, BIAS)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, 0.0
-    assert on(pairs.possible_deflection_interval, fdi, surface) == (-0.4, 0.0)
+    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (-0.4, 0.0)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = 0.1, np.inf
-    assert on(pairs.possible_deflection_interval, fdi, surface) == (0.1, 0.5)
+    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (0.1, 0.5)
 
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
     fdi = new_case(elevator=(STUCK,))
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
-    fdi["types"]["pair"]["first_fault_surface"], elevator["status"]["is_candidate"] = ELEVATOR, 0
+    fdi["types"]["pair"]["first_pitch_fault_surface"], elevator["status"]["may_be_sole_fault"] = ELEVATOR, 0
     (
         elevator["feasible_sets"]["low"][STUCK],
         elevator["feasible_sets"]["high"][STUCK],
@@ -867,7 +878,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
 def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
     fdi = new_case()
     (
-        fdi["types"]["pair"]["first_fault_surface"],
+        fdi["types"]["pair"]["first_pitch_fault_surface"],
         fdi["bound"]["frame_innovation_bound"],
         fdi["bank"]["output"]["innovation"],
     ) = (
@@ -887,18 +898,18 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
 def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     fdi = new_case(elevator=(STUCK,))
     elevator = fdi["types"]["surface"][ELEVATOR]
-    fdi["types"]["pair"]["first_fault_surface"] = NO_SURFACE
+    fdi["types"]["pair"]["first_pitch_fault_surface"] = NO_SURFACE
     elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK] = 0.1, 0.14
-    on(pairs.store_first_fault_sets, fdi, ELEVATOR)
-    known = elevator["first_fault_sets"]
-    assert fdi["types"]["pair"]["first_fault_surface"] == ELEVATOR
+    on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
+    known = elevator["first_pitch_fault_sets"]
+    assert fdi["types"]["pair"]["first_pitch_fault_surface"] == ELEVATOR
     assert (known["low"][STUCK], known["high"][STUCK]) == (0.1, 0.14)
     assert known["excluded"].tolist() == [kind != STUCK for kind in range(N_TYPES)]
     elevator["feasible_sets"]["excluded"][STUCK], elevator["feasible_sets"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
-        on(pairs.store_first_fault_sets, fdi, ELEVATOR)
+        on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
         assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.1, k + 1)
-    on(pairs.store_first_fault_sets, fdi, ELEVATOR)
+    on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
     assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.12, 0)
 
 
@@ -906,23 +917,23 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     fdi = new_case(elevator=(), flap=(BIAS,))
     elevator, flap = fdi["types"]["surface"][ELEVATOR], fdi["types"]["surface"][FLAP]
     (
-        fdi["types"]["pair"]["first_fault_surface"],
-        elevator["first_fault_sets"]["low"],
-        elevator["first_fault_sets"]["high"],
+        fdi["types"]["pair"]["first_pitch_fault_surface"],
+        elevator["first_pitch_fault_sets"]["low"],
+        elevator["first_pitch_fault_sets"]["high"],
     ) = (
         ELEVATOR,
         0.1,
         0.14,
     )
-    elevator["first_fault_sets"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
+    elevator["first_pitch_fault_sets"]["excluded"] = [kind != STUCK for kind in range(N_TYPES)]
     for frame in ("last_observation", "judged_observation", "earlier_observation"):
         fdi["types"]["surface"][frame]["is_anomalous"] = 1
-    assert on(pairs.has_second_pitch_fault, fdi)
+    assert on(pairs.detect_second_pitch_fault, fdi)
     assert verdict.sole_remaining_constant_type(elevator) == STUCK
     assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible_sets"]["excluded"].any()
     for surface in (elevator, flap):
-        assert (surface["status"]["is_candidate"], surface["status"]["decision_basis"]) == (
+        assert (surface["status"]["may_be_sole_fault"], surface["status"]["decision_basis"]) == (
             0,
             DEDUCED_FAULTY,
         )
@@ -935,13 +946,13 @@ def test_a_second_begins_with_what_was_known_of_the_first():
             0,
             0,
         )
-    assert fdi["types"]["surface"]["status"]["is_candidate"][[AILERON, RUDDER]].tolist() == [1, 1]
-    assert not on(pairs.has_second_pitch_fault, _first(new_case(elevator=(STUCK,)), ELEVATOR))
-    assert not on(pairs.has_second_pitch_fault, _first(new_case(elevator=()), NO_SURFACE))
+    assert fdi["types"]["surface"]["status"]["may_be_sole_fault"][[AILERON, RUDDER]].tolist() == [1, 1]
+    assert not on(pairs.detect_second_pitch_fault, _first(new_case(elevator=(STUCK,)), ELEVATOR))
+    assert not on(pairs.detect_second_pitch_fault, _first(new_case(elevator=()), NO_SURFACE))
 
 
 def _first(fdi, surface):
-    fdi["types"]["pair"]["first_fault_surface"] = surface
+    fdi["types"]["pair"]["first_pitch_fault_surface"] = surface
     return fdi
 
 
@@ -957,7 +968,7 @@ def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patie
     assert (
         bool(
             on(
-                pairs.has_enough_evidence,
+                pairs.alternative_types_would_have_shown,
                 *one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence),
             )
         )
@@ -980,7 +991,7 @@ def decided(alarmed=(1, 0), **left):
     fdi = new_case(**left)
     (
         fdi["types"]["pair"]["enabled"],
-        fdi["types"]["pair"]["first_fault_surface"],
+        fdi["types"]["pair"]["first_pitch_fault_surface"],
         fdi["types"]["pair"]["group_has_alarm"],
     ) = (
         1,
@@ -1015,7 +1026,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
         SCALE_COMMAND,
     )
     assert fdi["types"]["surface"]["accommodation"]["mode"].tolist() == [-1, SCALE_COMMAND, -1, -1]
-    assert fdi["types"]["pair"]["first_fault_surface"] == ELEVATOR
+    assert fdi["types"]["pair"]["first_pitch_fault_surface"] == ELEVATOR
 
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
@@ -1129,7 +1140,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     (
         fdi["types"]["surface"]["last_observation"]["position_low"],
         fdi["types"]["surface"]["last_observation"]["position_high"],
-        fdi["types"]["surface"]["accommodation"]["n_frames_absent"],
+        fdi["types"]["surface"]["accommodation"]["n_frames_since_fault_showed"],
     ) = (
         0.3,
         0.4,
@@ -1165,15 +1176,18 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
             surface["last_observation"]["position_low"],
             surface["last_observation"]["position_high"],
         ) == pytest.approx((least[k], greatest[k]))
-    assert not fdi["types"]["pair"]["lateral_outside_class"]
+    assert not fdi["types"]["pair"]["lateral_fault_outside_class"]
     fdi["bank"]["output"]["innovation"][YAW] = 9.0
     on(pairs.locate_roll_and_yaw_surfaces, fdi)
-    assert fdi["types"]["pair"]["lateral_outside_class"]
+    assert fdi["types"]["pair"]["lateral_fault_outside_class"]
 
 
 def test_a_second_pitch_fault_is_named_once_it_shows():
     fdi = decided(elevator=(BIAS,), flap=(STUCK,), aileron=None, rudder=None)
-    fdi["types"]["pair"]["first_fault_surface"], fdi["types"]["surface"]["status"]["is_candidate"] = (
+    (
+        fdi["types"]["pair"]["first_pitch_fault_surface"],
+        fdi["types"]["surface"]["status"]["may_be_sole_fault"],
+    ) = (
         ELEVATOR,
         (1, 0, 1, 0),
     )

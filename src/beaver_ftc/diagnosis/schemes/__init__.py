@@ -38,7 +38,7 @@ def diagnosis_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> 
         fdae=filters.FDAE_RECORD,
         verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n),
-        types=registry.types_dtype(n), statistical=statistical.statistical_dtype(size),
+        types=registry.fault_types_dtype(n), statistical=statistical.statistical_dtype(size),
         sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
         engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
@@ -62,8 +62,8 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     monitors.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         published.configure_published(fdi, scenario, travel)
-    registry.configure_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
-    fdi["types"]["config"]["has_surface_errors"] = fdi["bound"]["has_surface_errors"]
+    registry.configure_fault_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
+    fdi["types"]["config"]["has_declared_surface_errors"] = fdi["bound"]["has_declared_surface_errors"]
     conclusions.reset_conclusion(fdi["verdict"])
 
 

@@ -282,7 +282,7 @@ def begin_loss_isolation(fdi):
 @apart
 def begin_fault_type_isolation(fdi):
     """Start the feasible sets of all types (IsolationVariant)."""
-    registry.restart_types(fdi.types)
+    registry.restart_fault_types(fdi.types)
 
 
 @apart

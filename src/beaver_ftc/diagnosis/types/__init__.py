@@ -33,8 +33,8 @@ registry.py reads the rows into arrays and records; in each frame it finds where
 every type. verdict.py and pairs.py conclude; they name no type.
 
 type_index: the number of a type, the same in every array over types. config: TYPES_CONFIG of registry.py;
-surface: a record of its `surface_dtype`. k: number of the judged frame, which is the frame before the elapsed
-one.
+surface: a record of its `surface_types_dtype`. k: number of the judged frame, which is the frame before the
+elapsed one.
 """
 
 from collections.abc import Callable
@@ -102,8 +102,8 @@ class FaultType:
                             the parameters (low, high) that there are; unlimited if left out
     feasible_set_after_frame(surface, type_index)
                             the set (low, high) to go on with after a frame; the one there is if left out
-    memory_dtype, record_name
-                            a record of its own, found at `surface.<record_name>`
+    memory_dtype, memory_record_name
+                            a record of its own, found at `surface.<memory_record_name>`
     reset_memory(surface, type_index)
                             its memory is reset: nothing is known yet
     on_every_frame(config, surface, type_index)             called for every frame, before it is judged
@@ -111,7 +111,7 @@ class FaultType:
     on_possible_release(config, surface, type_index, k)
                             a repair may have released the surface as the frame began
     propagate_release(config, surface, type_index)    advance such a release by a frame (held_surface.py)
-    possible_deflection(config, surface, type_index, k)
+    possible_deflection_range(config, surface, type_index, k)
                             least and greatest deflection under it by the elapsed frame, rad; of a constant
                             type
 
@@ -170,13 +170,13 @@ class FaultType:
     parameter_range: Kernel | None = None
     feasible_set_after_frame: Kernel | None = None
     memory_dtype: np.dtype | None = None
-    record_name: str = ""
+    memory_record_name: str = ""
     reset_memory: Kernel | None = None
     on_every_frame: Kernel | None = None
     on_skipped_frame: Kernel | None = None
     on_possible_release: Kernel | None = None
     propagate_release: Kernel | None = None
-    possible_deflection: Kernel = reachable_range
+    possible_deflection_range: Kernel = reachable_range
     has_shown: Kernel | None = None
     shows_within_half_cycles: int = 0
     evidence_at_rest: int = REST_IS_UNINFORMATIVE
@@ -258,25 +258,26 @@ def exclude_type(surface, type_index):
 
 
 @kernel
-def restore_first_fault_sets(surface):
+def restore_first_pitch_fault_sets(surface):
     """Return to the sets that were kept when the surface was named (pairs.py)."""
     surface.feasible_sets.low[:], surface.feasible_sets.high[:] = (
-        surface.first_fault_sets.low,
-        surface.first_fault_sets.high,
+        surface.first_pitch_fault_sets.low,
+        surface.first_pitch_fault_sets.high,
     )
-    surface.feasible_sets.excluded[:] = surface.first_fault_sets.excluded
+    surface.feasible_sets.excluded[:] = surface.first_pitch_fault_sets.excluded
 
 
 # healthy_position: where a healthy surface was; position_low, position_high: where this one can have been;
-# is_anomalous: whether more than the declared uncertainty was at work; effectiveness_variation: a quarter of
-# its change, in means; stop_can_hide_deflection: whether the lower and the upper stop can cut a deflection
-# off unseen.
+# is_anomalous: whether more than the declared uncertainty was at work;
+# weighted_mean_error_per_position_range: (G_max - G_min) / (4 |mean G|), by so much of the range of its
+# positions a mean weighted by G may be off; stop_can_hide_deflection: whether
+# the lower and the upper stop can cut a deflection off unseen.
 OBSERVATION_RECORD = record(
     healthy_position=float,
     position_low=float,
     position_high=float,
     is_anomalous=int,
-    effectiveness_variation=float,
+    weighted_mean_error_per_position_range=float,
     stop_can_hide_deflection=(int, 2),
 )
 
@@ -305,20 +306,20 @@ def copy_observation(target, source):
         target.position_low,
         target.position_high,
         target.is_anomalous,
-        target.effectiveness_variation,
+        target.weighted_mean_error_per_position_range,
     ) = (
         source.healthy_position,
         source.position_low,
         source.position_high,
         source.is_anomalous,
-        source.effectiveness_variation,
+        source.weighted_mean_error_per_position_range,
     )
     target.stop_can_hide_deflection[:] = source.stop_can_hide_deflection
 
 
 @kernel
-def observe_position(config, surface, fie, axis, innovation, bound, hypothesis_effect):
-    """Find where a surface can have been: what agrees with the innovation (3,) within its bound (3,).
+def infer_position(config, surface, fie, axis, innovation, innovation_bound, hypothesis_effect):
+    """Find where a surface can have been: what agrees with the innovation (3,) within innovation_bound (3,).
 
     fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
     of the same frame or block, dtype EFFECT_RECORD.
@@ -327,7 +328,7 @@ def observe_position(config, surface, fie, axis, innovation, bound, hypothesis_e
     observation.healthy_position = (
         -hypothesis_effect.base_acceleration[axis] / hypothesis_effect.regressor[axis]
     )
-    observation.effectiveness_variation = (
+    observation.weighted_mean_error_per_position_range = (
         0.25
         * (commands.max_effectiveness - commands.min_effectiveness)
         / abs(hypothesis_effect.regressor[axis])
@@ -336,14 +337,18 @@ def observe_position(config, surface, fie, axis, innovation, bound, hypothesis_e
     for i in range(3):
         if config.frames_per_block > 1 and i != axis and hypothesis_effect.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
-        low, high = isolation.consistent_parameters_on_axis(innovation, bound, fie, hypothesis_effect, i)
+        low, high = isolation.consistent_parameters_on_axis(
+            innovation, innovation_bound, fie, hypothesis_effect, i
+        )
         observation.position_low, observation.position_high = (
             max(observation.position_low, low),
             min(observation.position_high, high),
         )
     mark_stops_that_can_hide_deflection(
         surface,
-        2.0 * (bound[axis] + hypothesis_effect.error_bound[axis]) / abs(hypothesis_effect.regressor[axis]),
+        2.0
+        * (innovation_bound[axis] + hypothesis_effect.error_bound[axis])
+        / abs(hypothesis_effect.regressor[axis]),
     )
 
 

@@ -10,7 +10,7 @@ named when the other alone cannot explain the flight; both are when neither can 
 fault. Once that was named, with its constant, a second fault that refutes it is found on the other surface,
 whose deflection follows from what is known of the first, taken to last. Anything else stays open.
 
-A surface's group and the other surface in it are looked up in the layout. types: of `types_dtype`;
+A surface's group and the other surface in it are looked up in the layout. types: of `fault_types_dtype`;
 conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 """
 
@@ -25,14 +25,18 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     clear_anomalies,
     observed_deflection_error,
-    restore_first_fault_sets,
+    restore_first_pitch_fault_sets,
     set_explained_position,
     set_is_anomalous,
     set_observed_deflection_error,
     verdict,
 )
 from beaver_ftc.diagnosis.types import registry as frames
-from beaver_ftc.diagnosis.types.registry import ACCOMMODATION_MODES, N_CONSTANT_TYPES, possible_deflection
+from beaver_ftc.diagnosis.types.registry import (
+    ACCOMMODATION_MODES,
+    N_CONSTANT_PARAMETER_TYPES,
+    possible_deflection_range,
+)
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
     any_constant_type_remains,
@@ -52,9 +56,9 @@ def record_group_alarms(pair, bank):
 
 
 @kernel
-def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, frame_bound):
+def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovation_bound):
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
-    innovation (3,), |eta| <= frame_bound (3,) rad/s2."""
+    innovation (3,), |eta| <= innovation_bound (3,) rad/s2."""
     aileron, rudder = layout.main[ROLL], layout.main[YAW]
     aileron_effect, rudder_effect = (
         estimators[layout.position_estimator[aileron]].effect,
@@ -67,8 +71,10 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, frame_bo
         rudder_effect.regressor[YAW],
     )
     roll_innovation, yaw_innovation = innovation[ROLL], innovation[YAW]
-    roll_tolerance = frame_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
-    yaw_tolerance = frame_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
+    roll_tolerance = (
+        innovation_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
+    )
+    yaw_tolerance = innovation_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
     determinant = aileron_roll * rudder_yaw - aileron_yaw * rudder_roll
     abs_determinant = abs(determinant)
     error, tolerance = (
@@ -81,48 +87,50 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, frame_bo
         (yaw_tolerance * abs(aileron_roll) + roll_tolerance * abs(aileron_yaw)) / abs_determinant,
     )
     if not (set_observed_deflection_error(types.surface[rudder], error, tolerance) and aileron_fits):
-        types.pair.lateral_outside_class = 1
+        types.pair.lateral_fault_outside_class = 1
 
 
 @kernel
-def possible_deflection_interval(config, surface, k):
+def possible_deflection_range_of_constant_types(config, surface, k):
     """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
     of a constant that are left."""
     min_deflection, max_deflection = np.inf, -np.inf
-    for type_index in range(N_CONSTANT_TYPES):
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
-            lower_end, upper_end = possible_deflection(config, surface, type_index, k)
+            lower_end, upper_end = possible_deflection_range(config, surface, type_index, k)
             min_deflection, max_deflection = min(min_deflection, lower_end), max(max_deflection, upper_end)
     lower_end, upper_end = surface.actuator.reachable_low, surface.actuator.reachable_high
     return min(max(min_deflection, lower_end), upper_end), min(max(max_deflection, lower_end), upper_end)
 
 
 @kernel
-def locate_pitch_surfaces(types, layout, estimators, innovation, frame_bound):
+def locate_pitch_surfaces(types, layout, estimators, innovation, innovation_bound):
     """Whether pitch shows a fault; after the begin of a second fault, where the second surface was."""
-    first = types.pair.first_fault_surface
-    if first != NO_SURFACE and not types.surface[first].status.is_candidate:
-        locate_second_pitch_surface(types, layout, estimators, innovation, frame_bound)
+    first = types.pair.first_pitch_fault_surface
+    if first != NO_SURFACE and not types.surface[first].status.may_be_sole_fault:
+        locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound)
         return
     for s, surface in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            set_is_anomalous(surface, abs(innovation[PITCH]) > frame_bound[PITCH])
+            set_is_anomalous(surface, abs(innovation[PITCH]) > innovation_bound[PITCH])
 
 
 @kernel
-def locate_second_pitch_surface(types, layout, estimators, innovation, frame_bound):
+def locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound):
     """Find the position of the second surface, given the sets of the first."""
-    first = types.pair.first_fault_surface
+    first = types.pair.first_pitch_fault_surface
     second = layout.partner[first]
     first_effect = estimators[layout.position_estimator[first]].effect
     second_effect = estimators[layout.position_estimator[second]].effect
     surface = types.surface[first]
-    min_deflection, max_deflection = possible_deflection_interval(types.config, surface, types.frame_index)
+    min_deflection, max_deflection = possible_deflection_range_of_constant_types(
+        types.config, surface, types.frame_index
+    )
     set_explained_position(surface, min_deflection, max_deflection)
     second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
     first_acceleration = first_regressor * observed_deflection_error(surface)
     tolerance = abs(first_regressor) * 0.5 * (max_deflection - min_deflection)
-    tolerance += frame_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
+    tolerance += innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
     if not set_observed_deflection_error(
         types.surface[second],
         (innovation[PITCH] - first_acceleration) / second_regressor,
@@ -132,12 +140,13 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, frame_bou
 
 
 @kernel
-def observe_and_judge_pairs(types, layout, estimators, bank, frame_bound):
-    """Observe the elapsed frame, plane by plane, and judge the one before; frame_bound (3,): bound on it."""
+def observe_and_judge_pairs(types, layout, estimators, bank, innovation_bound):
+    """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
+    it."""
     record_group_alarms(types.pair, bank)
-    frames.infer_surface_positions(types, layout, estimators, bank.output.innovation, frame_bound)
-    locate_roll_and_yaw_surfaces(types, layout, estimators, bank.output.innovation, frame_bound)
-    locate_pitch_surfaces(types, layout, estimators, bank.output.innovation, frame_bound)
+    frames.infer_surface_positions(types, layout, estimators, bank.output.innovation, innovation_bound)
+    locate_roll_and_yaw_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
+    locate_pitch_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
     frames.judge_previous_frame(types)
 
 
@@ -161,7 +170,7 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     roll_can_be_at_fault, yaw_can_be_at_fault = can_be_at_fault(roll_surface), can_be_at_fault(yaw_surface)
     both_at_fault = not roll_can_be_at_fault and not yaw_can_be_at_fault
     class_is_refuted = (
-        pair.lateral_outside_class == 1
+        pair.lateral_fault_outside_class == 1
         or not verdict.any_type_remains(roll_surface)
         or not verdict.any_type_remains(yaw_surface)
     )
@@ -186,63 +195,70 @@ def decide_roll_and_yaw_isolation(types, layout, t):
 
 
 @kernel
-def store_first_fault_sets(types, s):
+def store_first_pitch_fault_sets(types, s):
     """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
     pair, surface, has_new_exclusion = types.pair, types.surface[s], False
-    stored_sets = surface.first_fault_sets
-    for type_index in range(N_CONSTANT_TYPES):
+    stored_sets = surface.first_pitch_fault_sets
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         has_new_exclusion = (
             has_new_exclusion
             or surface.feasible_sets.excluded[type_index] != stored_sets.excluded[type_index]
         )
     pair.n_frames_since_exclusion = pair.n_frames_since_exclusion + 1 if has_new_exclusion else 0
     if (
-        pair.first_fault_surface != s
+        pair.first_pitch_fault_surface != s
         or pair.n_frames_since_exclusion >= types.config.slowest_half_cycle_frames
     ):
-        pair.first_fault_surface, pair.n_frames_since_exclusion = s, 0
+        pair.first_pitch_fault_surface, pair.n_frames_since_exclusion = s, 0
         stored_sets.low[:], stored_sets.high[:] = surface.feasible_sets.low, surface.feasible_sets.high
         stored_sets.excluded[:] = 1
-        stored_sets.excluded[:N_CONSTANT_TYPES] = surface.feasible_sets.excluded[:N_CONSTANT_TYPES]
+        stored_sets.excluded[:N_CONSTANT_PARAMETER_TYPES] = surface.feasible_sets.excluded[
+            :N_CONSTANT_PARAMETER_TYPES
+        ]
 
 
 @kernel
-def begin_second_fault(types, layout):
+def begin_second_pitch_fault(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
     first, second = (
-        types.surface[types.pair.first_fault_surface],
-        types.surface[layout.partner[types.pair.first_fault_surface]],
+        types.surface[types.pair.first_pitch_fault_surface],
+        types.surface[layout.partner[types.pair.first_pitch_fault_surface]],
     )
-    restore_first_fault_sets(first)
-    frames.restart_surface_types(second)
+    restore_first_pitch_fault_sets(first)
+    frames.restart_fault_types_of_surface(second)
     for surface in (first, second):
-        surface.status.is_candidate, surface.status.decision_basis = 0, verdict.DEDUCED_FAULTY
+        surface.status.may_be_sole_fault, surface.status.decision_basis = 0, verdict.DEDUCED_FAULTY
         clear_anomalies(surface)
 
 
 @kernel
-def has_enough_evidence(config, surface):
+def alternative_types_would_have_shown(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
     may_be_growing_bias = verdict.can_be_another_type(
         surface, verdict.sole_remaining_constant_type(surface), False
     )
-    undecided = may_be_growing_bias or verdict.can_hide_at_rest(config, surface)
+    undecided = may_be_growing_bias or verdict.type_can_hide_at_rest(config, surface)
     has_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return has_half_cycle and verdict.types_would_have_shown(config, surface) and not undecided
 
 
 @kernel
-def has_second_pitch_fault(types, layout):
+def detect_second_pitch_fault(types, layout):
     """Whether a second pitch fault has shown in addition to the known one."""
-    if types.pair.first_fault_surface == NO_SURFACE or layout.partner[types.pair.first_fault_surface] < 0:
+    if (
+        types.pair.first_pitch_fault_surface == NO_SURFACE
+        or layout.partner[types.pair.first_pitch_fault_surface] < 0
+    ):
         return False
-    surface = types.surface[types.pair.first_fault_surface]
-    if surface.status.is_candidate and not (can_be_at_fault(surface) and any_constant_type_remains(surface)):
-        begin_second_fault(types, layout)
-    return not surface.status.is_candidate
+    surface = types.surface[types.pair.first_pitch_fault_surface]
+    if surface.status.may_be_sole_fault and not (
+        can_be_at_fault(surface) and any_constant_type_remains(surface)
+    ):
+        begin_second_pitch_fault(types, layout)
+    return not surface.status.may_be_sole_fault
 
 
 @kernel
@@ -262,10 +278,10 @@ def pitch_fault_type(config, surface):
 @kernel
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if has_second_pitch_fault(types, layout):
+    if detect_second_pitch_fault(types, layout):
         first, second_index = (
-            types.surface[types.pair.first_fault_surface],
-            layout.partner[types.pair.first_fault_surface],
+            types.surface[types.pair.first_pitch_fault_surface],
+            layout.partner[types.pair.first_pitch_fault_surface],
         )
         second = types.surface[second_index]
         set_isolation_status(first, 1, first.status.fault_type, t)
@@ -276,7 +292,7 @@ def decide_pitch_isolation(types, layout, t):
         )
         set_isolation_status(second, shows_fault, verdict.fault_type_on_surface(types.config, second), t)
         return
-    second_index = sole_pitch_surface_at_fault(types, layout)
+    second_index = find_sole_pitch_surface_at_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
         if layout.group[surface_index] == PITCH_GROUP:
             set_isolation_status(
@@ -288,13 +304,13 @@ def decide_pitch_isolation(types, layout, t):
 
 
 @kernel
-def sole_pitch_surface_at_fault(types, layout):
+def find_sole_pitch_surface_at_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = verdict.surface_at_fault(types, layout) if types.pair.group_has_alarm[PITCH_GROUP] else NO_SURFACE
     if s < 0 or not any_constant_type_remains(types.surface[s]):
         return NO_SURFACE
-    if has_enough_evidence(types.config, types.surface[s]):
-        store_first_fault_sets(types, s)
+    if alternative_types_would_have_shown(types.config, types.surface[s]):
+        store_first_pitch_fault_sets(types, s)
     return s
 
 
@@ -303,7 +319,7 @@ def decide_pair_isolation(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
     `conclusion.record_isolation_finding`: `isolated` is the one named first, the law acts on all. conclusion:
     that of the frame before."""
-    lateral_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
+    lateral_fault_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
     decide_pitch_isolation(types, layout, t)
     first_isolated = NO_SURFACE
     for s, surface in enumerate(types.surface):
@@ -311,21 +327,21 @@ def decide_pair_isolation(types, conclusion, layout, t):
         if status.is_isolated and (first_isolated < 0 or status.isolated_at_s < first_status.isolated_at_s):
             first_isolated = s
     isolated, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
-        types, conclusion, layout, first_isolated, lateral_outside_class, t
+        types, conclusion, layout, first_isolated, lateral_fault_outside_class, t
     )
     accommodated_surface, accommodation_mode = choose_pair_accommodation(types, layout)
     return isolated, isolated_at_s, fault_type, type_decided_at_s, accommodated_surface, accommodation_mode
 
 
 @kernel
-def first_fault_finding(types, conclusion, layout, s, lateral_outside_class, t):
+def first_fault_finding(types, conclusion, layout, s, lateral_fault_outside_class, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
         status = types.surface[s].status
         isolated = verdict.estimator_of_fault(layout, s, status.fault_type)
         return isolated, status.isolated_at_s, status.fault_type, status.type_decided_at_s
-    isolated = state.UNANTICIPATED if lateral_outside_class else state.NOT_ISOLATED
+    isolated = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
     isolated_at_s = t if isolated != conclusion.isolated_estimator else conclusion.isolated_at_s
     return isolated, isolated_at_s, -1, conclusion.type_decided_at_s
 
@@ -364,7 +380,7 @@ def choose_pair_accommodation(types, layout):
         if is_accommodated(types, layout, s):
             is_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
             mode = verdict.choose_accommodation_mode(surface) if is_at_fault else SUBTRACT_OFFSET
-            if verdict.is_fault_present(types.config, surface, mode, is_at_fault):
+            if verdict.update_fault_presence(types.config, surface, mode, is_at_fault):
                 verdict.set_accommodation_mode(surface, mode)
                 is_replaced_elevator = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
                 if accommodated_surface == NO_SURFACE or is_replaced_elevator:

@@ -17,7 +17,7 @@ mean of a constant position, offset or effectiveness is exact; that of a varying
 extremes. To the types a block is like a frame that consists of several JSBSim frames: a block next to a
 healthy one is skipped.
 
-types: of `types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
+types: of `fault_types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
 """
 
 import pkgutil
@@ -40,8 +40,8 @@ from beaver_ftc.diagnosis.types import (
     FaultType,
     Kernel,
     exclude_type,
+    infer_position,
     intersect_feasible_set,
-    observe_position,
     reset_feasible_sets,
     reset_observation,
     set_feasible_set,
@@ -55,7 +55,9 @@ from beaver_ftc.scenario.schema import Scenario
 BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
 )
-DEFAULT_ACTUATOR_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
+DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S = (
+    pi / 3.0
+)  # of an actuator with no declared rate limit: the aircraft's default
 
 
 def _load_ordered_types() -> tuple[FaultType, ...]:
@@ -67,10 +69,12 @@ def _load_ordered_types() -> tuple[FaultType, ...]:
 
 TYPES = _load_ordered_types()
 N_TYPES = len(TYPES)
-N_CONSTANT_TYPES = sum(row.has_constant_parameter for row in TYPES)
+N_CONSTANT_PARAMETER_TYPES = sum(row.has_constant_parameter for row in TYPES)
 TYPE_NAMES: tuple[str, ...] = tuple(row.name for row in TYPES)
 TYPE_DESCRIPTIONS: tuple[str, ...] = tuple(row.description or row.name for row in TYPES)
-FIRST_TYPE_OF_NAME = tuple(TYPE_NAMES.index(name) for name in TYPE_NAMES)  # the first type of the same name
+FIRST_TYPE_WITH_SAME_NAME = tuple(
+    TYPE_NAMES.index(name) for name in TYPE_NAMES
+)  # the first type of the same name
 
 
 def _type_column(name: str) -> np.ndarray:
@@ -187,22 +191,24 @@ def _kernel_calling_one_type(part_name: str, arguments: str, default: Any) -> Ke
     )
 
 
-_FRAME_ARGUMENTS = "config, surface, type_index, k"
+_FRAME_KERNEL_ARGUMENTS = "config, surface, type_index, k"
 reset_memory_each = _kernel_calling_each_type("reset_memory", "surface, type_index")
 set_parameter_range_each = _kernel_calling_each_type("parameter_range", "surface", set_feasible_set)
 on_every_frame_each = _kernel_calling_each_type("on_every_frame", "config, surface, type_index")
-on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_ARGUMENTS)
+on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_KERNEL_ARGUMENTS)
 intersect_consistent_interval_each = _kernel_calling_each_type(
-    "consistent_interval", _FRAME_ARGUMENTS, intersect_feasible_set
+    "consistent_interval", _FRAME_KERNEL_ARGUMENTS, intersect_feasible_set
 )
-on_possible_release_each = _kernel_calling_each_type("on_possible_release", _FRAME_ARGUMENTS)
+on_possible_release_each = _kernel_calling_each_type("on_possible_release", _FRAME_KERNEL_ARGUMENTS)
 set_feasible_set_after_frame_each = _kernel_calling_each_type(
     "feasible_set_after_frame", "surface, type_index", set_feasible_set
 )
 propagate_release_each = _kernel_calling_each_type("propagate_release", "config, surface, type_index")
 has_shown = _kernel_calling_one_type("has_shown", "surface", True)
 motion_rules_out = _kernel_calling_one_type("motion_rules_out", "surface, stop_direction", False)
-possible_deflection = _kernel_calling_one_type("possible_deflection", _FRAME_ARGUMENTS, EMPTY_SET)
+possible_deflection_range = _kernel_calling_one_type(
+    "possible_deflection_range", _FRAME_KERNEL_ARGUMENTS, EMPTY_SET
+)
 deflection_error_under_type = _kernel_calling_one_type("deflection_error", "surface, type_index", np.nan)
 
 MAX_FRAMES_PER_BLOCK = 256  # frames of a block
@@ -222,7 +228,7 @@ COMMANDS_RECORD = record(
 # to zero.
 ACTUATOR_RECORD = record(
     travel_low=float, travel_high=float, reachable_low=float, reachable_high=float, min_runaway_rate=float,
-    lag_share_per_substep=float, max_motion_per_substep=float, min_motion_per_substep=float,
+    lag_share_per_substep=float, max_motion_per_substep=float, min_rate_limited_motion_per_substep=float,
 )  # fmt: skip
 
 # The set of each type's parameter: types/__init__.py.
@@ -235,14 +241,14 @@ EVIDENCE_RECORD = record(
     n_rest_frames=int,
     n_frames_since_stop_could_hide=int,
     first_anomalous_frame=int,
-    first_position_low=float,
-    first_position_high=float,
+    first_anomalous_position_low=float,
+    first_anomalous_position_high=float,
 )
 
 # Whether the surface may be the one at fault by itself, and what decides whether it can be (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
 STATUS_RECORD = record(
-    is_candidate=int,
+    may_be_sole_fault=int,
     decision_basis=int,
     is_isolated=int,
     isolated_at_s=float,
@@ -251,24 +257,25 @@ STATUS_RECORD = record(
 )
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
-ACCOMMODATION_RECORD = record(mode=int, n_frames_absent=int)
+ACCOMMODATION_RECORD = record(mode=int, n_frames_since_fault_showed=int)
 
 # Where a surface can be that a type has held and released, rad: table/held_surface.py.
 RELEASE_RECORD = record(
-    return_low=(2, N_TYPES), return_high=(2, N_TYPES), has_released=(int, N_TYPES),
+    return_position_low=(2, N_TYPES), return_position_high=(2, N_TYPES), has_released=(int, N_TYPES),
     held_position_min=N_TYPES, held_position_max=N_TYPES,  # where it is held by then
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
-FIRST_FAULT_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
+FIRST_PITCH_FAULT_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
 # of the surfaces' own terms are; frames of a block and its duration; dt s.
 TYPES_CONFIG_RECORD = record(
-    is_single_instant=int, n_substeps=int, returns_via_actuator=int, slowest_half_cycle_frames=int,
+    frame_shows_single_instant=int, n_substeps=int, released_surface_returns_via_actuator=int,
+    slowest_half_cycle_frames=int,
     abrupt=int,
-    has_surface_errors=int, frames_per_block=int, block_duration_s=float,
+    has_declared_surface_errors=int, frames_per_block=int, block_duration_s=float,
     dt=float,
 )  # fmt: skip
 
@@ -276,8 +283,8 @@ TYPES_CONFIG_RECORD = record(
 FAULT_PAIR_RECORD = record(
     enabled=int,
     group_has_alarm=(int, 2),
-    lateral_outside_class=int,
-    first_fault_surface=int,
+    lateral_fault_outside_class=int,
+    first_pitch_fault_surface=int,
     n_frames_since_exclusion=int,
 )
 
@@ -288,32 +295,32 @@ FRAME_BLOCK_RECORD = record(
 
 
 @lru_cache
-def surface_dtype() -> np.dtype:
+def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
     what is concluded. refuted: its estimator is excluded (verdict.py)."""
-    own = {row.record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
+    own = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
         evidence=EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD, **own,
         estimator_excluded=int, status=STATUS_RECORD, accommodation=ACCOMMODATION_RECORD,
-        first_fault_sets=FIRST_FAULT_SETS_RECORD,
+        first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
     )  # fmt: skip
 
 
 @sized
-def types_dtype(n: int) -> np.dtype:
+def fault_types_dtype(n: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
     return record(
         config=TYPES_CONFIG_RECORD,
         frame_index=int,
         pair=FAULT_PAIR_RECORD,
         block=FRAME_BLOCK_RECORD,
-        surface=(surface_dtype(), n),
+        surface=(surface_types_dtype(), n),
     )
 
 
-def configure_types(
+def configure_fault_types(
     types: np.void, layout: np.void, prediction_actuators: np.void, scenario: Scenario, travel: np.ndarray
 ) -> None:
     """Fill the configuration of the types and the actuator of each surface; travel (2, n) rad: the stops."""
@@ -321,20 +328,20 @@ def configure_types(
     types_config["frames_per_block"] = frames_per_block = (
         ceil(BLOCK_DURATION_S / dt) if Declared.of(scenario).sensors.declared.gyros_vary else 1
     )
-    types_config["is_single_instant"], types_config["block_duration_s"] = (
+    types_config["frame_shows_single_instant"], types_config["block_duration_s"] = (
         scenario.substeps == 1 and frames_per_block == 1,
         frames_per_block * dt,
     )
     types_config["slowest_half_cycle_frames"] = ceil(
         pi / config.slowest_oscillation_rad_s / (frames_per_block * dt)
     )
-    types_config["n_substeps"], types_config["returns_via_actuator"], types_config["dt"] = (
+    types_config["n_substeps"], types_config["released_surface_returns_via_actuator"], types_config["dt"] = (
         scenario.substeps,
         prediction_actuators["real"],
         dt,
     )
     types_config["abrupt"] = config.fault_profile == "abrupt"
-    types["pair"]["first_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
+    types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
     surfaces, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (surface_name, surface, low, high) in enumerate(
         zip(surfaces, types["surface"], *travel, strict=True)
@@ -346,23 +353,23 @@ def configure_types(
             prediction_actuators["approach"][s],
             prediction_actuators["step"][s],
         )
-        actuator["min_runaway_rate"] = 0.5 * (radians(rate_deg_s) or DEFAULT_ACTUATOR_RATE_RAD_S)
-        actuator["min_motion_per_substep"] = min(
+        actuator["min_runaway_rate"] = 0.5 * (radians(rate_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S)
+        actuator["min_rate_limited_motion_per_substep"] = min(
             radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
         )
-        surface["status"]["is_candidate"] = not config.pairs or layout["group"][s] == PITCH_GROUP
+        surface["status"]["may_be_sole_fault"] = not config.pairs or layout["group"][s] == PITCH_GROUP
         surface["accommodation"]["mode"] = surface["status"]["fault_type"] = -1
 
 
 @kernel
-def restart_types(types):
+def restart_fault_types(types):
     """Nothing is known of any surface yet."""
     for surface in types.surface:
-        restart_surface_types(surface)
+        restart_fault_types_of_surface(surface)
 
 
 @kernel
-def restart_surface_types(surface):
+def restart_fault_types_of_surface(surface):
     """Nothing is known of this surface yet."""
     reset_feasible_sets(surface)
     set_parameter_range_each(surface)
@@ -413,18 +420,18 @@ def record_commands(types, commanded_rad, frame_means):
 
 
 @kernel
-def infer_surface_positions(types, layout, estimators, innovation, bound):
+def infer_surface_positions(types, layout, estimators, innovation, innovation_bound):
     """Find where each surface was in the elapsed frame, or block, if it alone is at fault.
 
-    bound (3,): on its innovation (3,) without a fault, rad/s2.
+    innovation_bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    is_anomalous = not isolation.is_healthy(innovation, bound)
+    is_anomalous = not isolation.is_healthy(innovation, innovation_bound)
     for s, surface in enumerate(types.surface):
         shift_observations(surface)
         set_is_anomalous(surface, is_anomalous)
         fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
         effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.effect
-        observe_position(types.config, surface, fie, axis, innovation, bound, effect)
+        infer_position(types.config, surface, fie, axis, innovation, innovation_bound, effect)
 
 
 @kernel
@@ -442,7 +449,11 @@ def narrow_feasible_sets(config, surface, k):
     if observation.position_low > observation.position_high:
         return
     if evidence.first_anomalous_frame < 0:
-        evidence.first_anomalous_frame, evidence.first_position_low, evidence.first_position_high = (
+        (
+            evidence.first_anomalous_frame,
+            evidence.first_anomalous_position_low,
+            evidence.first_anomalous_position_high,
+        ) = (
             k,
             observation.position_low,
             observation.position_high,
@@ -456,7 +467,7 @@ def judge_previous_frame(types):
     config, k = types.config, types.frame_index - 1
     for s, surface in enumerate(types.surface):
         on_every_frame_each(config, surface)
-        if config.returns_via_actuator and types.frame_index > 0:
+        if config.released_surface_returns_via_actuator and types.frame_index > 0:
             on_possible_release_each(config, surface, k)
         if (
             config.abrupt
@@ -465,14 +476,14 @@ def judge_previous_frame(types):
         ):
             count_rest_as_evidence(types, s)
         elif surface.judged_observation.is_anomalous and (
-            config.is_single_instant
+            config.frame_shows_single_instant
             or (surface.earlier_observation.is_anomalous and surface.last_observation.is_anomalous)
         ):
             count_anomalous_frame(surface)
             narrow_feasible_sets(config, surface, k)
         else:
             on_skipped_frame_each(config, surface, k)
-        if config.returns_via_actuator and types.frame_index > 0:
+        if config.released_surface_returns_via_actuator and types.frame_index > 0:
             set_feasible_set_after_frame_each(surface)
             propagate_release_each(config, surface)
         if (
@@ -547,13 +558,13 @@ def count_rest_as_evidence(types, surface_index):
         return
     for other_index, other_surface in enumerate(types.surface):
         if other_index == surface_index or (
-            surface.status.is_candidate and other_surface.status.is_candidate
+            surface.status.may_be_sole_fault and other_surface.status.may_be_sole_fault
         ):
             count_anomalous_frame(other_surface)
     surface.evidence.n_rest_frames += 1
     if (
         surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
-        and not types.config.has_surface_errors
+        and not types.config.has_declared_surface_errors
     ):
         for type_index in range(N_TYPES):
             if EVIDENCE_AT_REST[type_index] == REST_EXCLUDES_TYPE:

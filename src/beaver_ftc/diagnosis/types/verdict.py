@@ -1,8 +1,8 @@
 """From the types left to a verdict: surface, type, and what the law does; and the findings in words.
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
-of one surface assume that it is at fault; `can_be_at_fault` says whether it can be. types: of `types_dtype`;
-conclusion: of `conclusion_dtype`; estimators: those of the isolation.
+of one surface assume that it is at fault; `can_be_at_fault` says whether it can be. types: of
+`fault_types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 
 `fault_findings` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and in
 which unit, the type's row says (`FaultType.estimate`).
@@ -31,12 +31,12 @@ from beaver_ftc.diagnosis.types.registry import (
     DEFLECTION_ERROR_ORDER,
     ERROR_DEPENDS_ON_COMMAND,
     EVIDENCE_AT_REST,
-    FIRST_TYPE_OF_NAME,
+    FIRST_TYPE_WITH_SAME_NAME,
     HALF_CYCLES_BEFORE_ISOLATING_OTHERS,
     LIMIT_TYPE_INDEX,
     MODE_SERVES_TYPE,
     MUST_SHOW_ITSELF,
-    N_CONSTANT_TYPES,
+    N_CONSTANT_PARAMETER_TYPES,
     N_TYPES,
     SHOWS_WITHIN_HALF_CYCLES,
     STOP_DIRECTIONS,
@@ -49,7 +49,7 @@ NO_SURFACE, SEVERAL_SURFACES = -1, -2
 TYPE_UNDECIDED, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 DECIDED_BY_ESTIMATOR, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
-ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
+FAULT_ABSENCE_LIMIT_S = 0.2  # a fault that has not shown for so long is taken for gone
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -77,7 +77,7 @@ def type_remains(surface, type_index):
 @kernel
 def any_constant_type_remains(surface):
     """Whether a type with a constant parameter is left."""
-    return not np.all(surface.feasible_sets.excluded[:N_CONSTANT_TYPES])
+    return not np.all(surface.feasible_sets.excluded[:N_CONSTANT_PARAMETER_TYPES])
 
 
 @kernel
@@ -114,7 +114,10 @@ def sole_remaining_type(surface, n_types):
     remaining_type = TYPE_UNDECIDED
     for type_index in range(n_types):
         if type_remains(surface, type_index):
-            if remaining_type >= 0 and FIRST_TYPE_OF_NAME[type_index] != FIRST_TYPE_OF_NAME[remaining_type]:
+            if (
+                remaining_type >= 0
+                and FIRST_TYPE_WITH_SAME_NAME[type_index] != FIRST_TYPE_WITH_SAME_NAME[remaining_type]
+            ):
                 return TYPE_UNDECIDED
             remaining_type = type_index if remaining_type < 0 else remaining_type
     return remaining_type
@@ -123,7 +126,7 @@ def sole_remaining_type(surface, n_types):
 @kernel
 def sole_remaining_constant_type(surface):
     """The one type of constant parameter left, or TYPE_UNDECIDED."""
-    return sole_remaining_type(surface, N_CONSTANT_TYPES)
+    return sole_remaining_type(surface, N_CONSTANT_PARAMETER_TYPES)
 
 
 @kernel
@@ -134,7 +137,7 @@ def sole_shown_type(surface):
 
 
 @kernel
-def can_hide_at_rest(config, surface):
+def type_can_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
@@ -153,9 +156,9 @@ def can_hide_at_rest(config, surface):
 def can_be_confused_with(surface, type_index, apparent_type):
     """Whether a fault of type `type_index` may look like one of `apparent_type`, or of another type left of
     that name and of constant parameter."""
-    for other_type in range(N_CONSTANT_TYPES):
+    for other_type in range(N_CONSTANT_PARAMETER_TYPES):
         can_look_alike = (
-            FIRST_TYPE_OF_NAME[other_type] == FIRST_TYPE_OF_NAME[apparent_type]
+            FIRST_TYPE_WITH_SAME_NAME[other_type] == FIRST_TYPE_WITH_SAME_NAME[apparent_type]
             and CAN_LOOK_LIKE[type_index, other_type]
             and type_remains(surface, other_type)
         )
@@ -169,7 +172,7 @@ def can_be_another_type(surface, apparent_type, includes_command_dependent_types
     """Whether what looks like the constant `apparent_type` may be another type that is left; unless
     `includes_command_dependent_types`, one that does not follow the command."""
     if apparent_type >= 0:
-        for type_index in range(N_CONSTANT_TYPES, N_TYPES):
+        for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
             is_alternative = type_remains(surface, type_index) and (
                 includes_command_dependent_types or not ERROR_DEPENDS_ON_COMMAND[type_index]
             )
@@ -185,7 +188,7 @@ def sole_possible_surface(surfaces, needs_constant_type):
     sole_index = NO_SURFACE
     for s, surface in enumerate(surfaces):
         if (
-            surface.status.is_candidate
+            surface.status.may_be_sole_fault
             and can_be_at_fault(surface)
             and (any_constant_type_remains(surface) or not needs_constant_type)
         ):
@@ -226,8 +229,8 @@ def other_surfaces_refuted(types, chosen_surface):
     """
     config, required_half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != chosen_surface and surface.status.is_candidate and can_be_at_fault(surface):
-            if config.has_surface_errors and any_type_remains(surface):
+        if s != chosen_surface and surface.status.may_be_sole_fault and can_be_at_fault(surface):
+            if config.has_declared_surface_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
                 return False
@@ -248,11 +251,11 @@ def other_surfaces_refuted(types, chosen_surface):
 def fault_type_on_surface(config, surface):
     """The type of the fault on a surface, taken to be at fault; TYPE_UNDECIDED while more than one fits or
     one may yet show itself."""
-    if surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames or can_hide_at_rest(
+    if surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames or type_can_hide_at_rest(
         config, surface
     ):
         return TYPE_UNDECIDED
-    if config.has_surface_errors:
+    if config.has_declared_surface_errors:
         return sole_shown_type(surface)
     types_have_had_time = types_would_have_shown(config, surface)
     if any_constant_type_remains(surface):
@@ -277,7 +280,7 @@ def varying_fault_type_on_surface(surface, types_have_had_time):
         )
     if remaining_type < 0 or not types_have_had_time:
         return TYPE_UNDECIDED
-    for type_index in range(N_CONSTANT_TYPES, N_TYPES):
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
         if type_remains(surface, type_index) and CAN_LOOK_LIKE[type_index, remaining_type]:
             return TYPE_UNDECIDED
     return remaining_type
@@ -288,7 +291,7 @@ def sole_remaining_varying_type(surface, must_show_itself):
     """The one type of a parameter that varies which is left, of those that must show themselves or of those
     that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
     remaining_type = NO_TYPE
-    for type_index in range(N_CONSTANT_TYPES, N_TYPES):
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
         if type_remains(surface, type_index) and MUST_SHOW_ITSELF[type_index] == must_show_itself:
             remaining_type = type_index if remaining_type == NO_TYPE else TYPE_UNDECIDED
             if remaining_type == TYPE_UNDECIDED:
@@ -358,7 +361,7 @@ def choose_accommodation_mode(surface):
 def serves_all_constant_types(surface, mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
     is_own_mode = False
-    for type_index in range(N_CONSTANT_TYPES):
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
             is_own_mode = is_own_mode or ACCOMMODATION_MODES[type_index] == mode
             serves_limit_type = (
@@ -374,7 +377,7 @@ def serves_all_constant_types(surface, mode):
 @kernel
 def serves_any_varying_type(surface, mode):
     """Whether a mode is that of some type left whose parameter varies."""
-    for type_index in range(N_CONSTANT_TYPES, N_TYPES):
+    for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
         if type_remains(surface, type_index) and ACCOMMODATION_MODES[type_index] == mode:
             return True
     return False
@@ -420,22 +423,24 @@ def choose_accommodated_surface(types, isolated_estimator, layout, estimators):
         return NO_SURFACE, -1
     surface = types.surface[surface_index]
     mode = choose_accommodation_mode(surface)
-    if is_fault_present(types.config, surface, mode, True):
+    if update_fault_presence(types.config, surface, mode, True):
         set_accommodation_mode(surface, mode)
         return surface_index, mode
     return NO_SURFACE, mode
 
 
 @kernel
-def is_fault_present(config, surface, mode, is_at_fault):
+def update_fault_presence(config, surface, mode, is_at_fault):
     """Whether the fault of a surface shows, or did a moment ago."""
     observation, accommodation = surface.last_observation, surface.accommodation
     deflection = deflection_error(surface, is_at_fault) + observation.healthy_position
     explains_frame = (
         observation.position_low <= deflection <= observation.position_high or mode == SCALE_COMMAND
     )
-    accommodation.n_frames_absent = 0 if explains_frame else accommodation.n_frames_absent + 1
-    return accommodation.n_frames_absent * config.dt < ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
+    accommodation.n_frames_since_fault_showed = (
+        0 if explains_frame else accommodation.n_frames_since_fault_showed + 1
+    )
+    return accommodation.n_frames_since_fault_showed * config.dt < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
 
 
 @kernel
@@ -460,7 +465,7 @@ def remaining_effectiveness(types, layout, estimators, s):
     """
     surface = types.surface[s]
     if types.pair.enabled and can_be_at_fault(surface):
-        for type_index in range(N_CONSTANT_TYPES):
+        for type_index in range(N_CONSTANT_PARAMETER_TYPES):
             if ACCOMMODATION_MODES[type_index] == SCALE_COMMAND and type_remains(surface, type_index):
                 return feasible_set_midpoint(surface, type_index)
     return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
@@ -558,18 +563,18 @@ def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Se
         if fault_type >= 0
         else tuple(_remaining_type_names(fdi, s)),
         "estimate": estimate_fault_size(fdi, s, fault_type),
-        "estimate_interval": _attribute_of_type(fault_type, "estimate_interval", fdi, s, fault_type),
-        "frequency_rad_s": _attribute_of_type(fault_type, "frequency_rad_s", fdi, s, fault_type),
+        "estimate_interval": _call_type_attribute(fault_type, "estimate_interval", fdi, s, fault_type),
+        "frequency_rad_s": _call_type_attribute(fault_type, "frequency_rad_s", fdi, s, fault_type),
     }
 
 
 def estimate_fault_size(fdi: np.void, s: int, type_index: int) -> float | None:
     """Estimate the size of a fault of this type on surface s; None if it has none."""
-    estimate: float | None = _attribute_of_type(type_index, "estimate", fdi, s, type_index)
+    estimate: float | None = _call_type_attribute(type_index, "estimate", fdi, s, type_index)
     return estimate
 
 
-def _attribute_of_type(type_index: int, attribute: str, *arguments: Any) -> Any:
+def _call_type_attribute(type_index: int, attribute: str, *arguments: Any) -> Any:
     """Return an attribute of a type's row; None while the type is open."""
     return getattr(registry.TYPES[type_index], attribute)(*arguments) if type_index >= 0 else None
 
@@ -593,8 +598,10 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         for type_index, is_excluded in enumerate(surface["feasible_sets"]["excluded"])
         if _can_be_at_fault(fdi, s) and not is_excluded
     ]
-    constant_types = [type_index for type_index in type_indices if type_index < registry.N_CONSTANT_TYPES]
-    if constant_types and not fdi["types"]["config"]["has_surface_errors"]:
+    constant_types = [
+        type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
+    ]
+    if constant_types and not fdi["types"]["config"]["has_declared_surface_errors"]:
         evidence, slowest_half_cycle_frames = (
             surface["evidence"],
             fdi["types"]["config"]["slowest_half_cycle_frames"],
@@ -615,7 +622,7 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
     ):
         # if the other surface is off as well, each constant may be one of another type
         type_indices += sorted(
-            range(registry.N_CONSTANT_TYPES),
+            range(registry.N_CONSTANT_PARAMETER_TYPES),
             key=lambda type_index: registry.ACCOMMODATION_MODES[type_index] == SCALE_COMMAND,
         )
     return list(dict.fromkeys(registry.TYPE_NAMES[type_index] for type_index in type_indices))

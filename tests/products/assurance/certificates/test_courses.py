@@ -33,12 +33,16 @@ def seen(low, high, wrong=None, ordered=0.1, command=0.0):
 
 
 ACTUATOR = Actuator(
-    -1.0, 1.0, min_runaway_rate_rad_s=2.0, min_motion_per_substep_rad=0.025, lag_share_per_substep=0.5
+    -1.0,
+    1.0,
+    min_runaway_rate_rad_s=2.0,
+    min_rate_limited_motion_per_substep_rad=0.025,
+    lag_share_per_substep=0.5,
 )
 CONFIG = FaultTypesConfig(
-    is_single_instant=True,
+    frame_shows_single_instant=True,
     n_substeps=2,
-    returns_via_actuator=False,
+    released_surface_returns_via_actuator=False,
     slowest_half_cycle_frames=2,
     frames_per_block=1,
     block_duration_s=0.05,
@@ -261,7 +265,7 @@ def test_what_nothing_shows_excludes_nothing(rule):
 
 
 def test_of_several_instants_a_runaway_is_held_against_the_frame_before():
-    several = CONFIG._replace(is_single_instant=False)
+    several = CONFIG._replace(frame_shows_single_instant=False)
     assert [*courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.35]), ACTUATOR, several)] == []
     (found,) = courses._exclude_runaway(seen([0.2] * 3, [9.0, 9.0, 0.25]), ACTUATOR, several)
     np.testing.assert_allclose(found.pairs[-1], (0.3, 0.25))

@@ -39,7 +39,7 @@ from beaver_ftc.diagnosis.types import (
 
 
 @kernel
-def consistent_effectiveness(surface):
+def consistent_effectiveness_interval(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
     low, high = surface.judged_observation.position_low, surface.judged_observation.position_high
     return isolation.consistent_parameters(
@@ -56,11 +56,11 @@ def effectiveness_range(surface):
 @kernel
 def consistent_loss_interval(config, surface, type_index, k):
     """The effectiveness that explains this frame."""
-    return consistent_effectiveness(surface)
+    return consistent_effectiveness_interval(surface)
 
 
 @kernel
-def loss_deflection(config, surface, type_index, k):
+def loss_deflection_range(config, surface, type_index, k):
     """The command times what can be left."""
     low, high, healthy_position = (
         surface.feasible_sets.low[type_index],
@@ -75,7 +75,7 @@ def loss_deflection(config, surface, type_index, k):
 @kernel
 def consistent_varying_loss_interval(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
-    low, high = consistent_effectiveness(surface)
+    low, high = consistent_effectiveness_interval(surface)
     command_changed_sign = (
         config.frames_per_block > 1
         and surface.commands.min_healthy_position[1] < 0.0 < surface.commands.max_healthy_position[1]
@@ -83,46 +83,49 @@ def consistent_varying_loss_interval(config, surface, type_index, k):
     return EMPTY_SET if low > high and not command_changed_sign else UNLIMITED_SET
 
 
-def loss_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
+def loss_theta_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
     """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
     return (
         parameter_estimate(fdi, s, type_index) - 1.0
         if fdi["types"]["pair"]["enabled"]
-        else loss_estimated_by_isolation(fdi, s, type_index)
+        else loss_theta_from_isolation_estimator(fdi, s, type_index)
     )
 
 
-def loss_estimated_by_isolation(fdi: np.void, s: int, type_index: int) -> float:
+def loss_theta_from_isolation_estimator(fdi: np.void, s: int, type_index: int) -> float:
     """theta as the estimator of a loss has it."""
     estimator = fdi["isolation"]["estimator"][int(fdi["layout"]["loss_estimator"][s])]
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
-def loss_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
+def loss_theta_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
     """Return the interval of theta, or None."""
     effectiveness_low, effectiveness_high = feasible_set(fdi, s, type_index)
     return effectiveness_low - 1.0, effectiveness_high - 1.0
 
 
-LOSS_RELATION = DeflectionRelation(gain=1.0, theta_is_share=True, theta_range=lambda low, high: (-1.0, 0.0))
+LOSS_DEFLECTION_RELATION = DeflectionRelation(
+    gain=1.0, theta_is_share=True, theta_range=lambda low, high: (-1.0, 0.0)
+)
 LOSS = FaultType(
     name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
     parameter_range=effectiveness_range, consistent_interval=consistent_loss_interval,
-    possible_deflection=loss_deflection,
-    accommodation_mode=SCALE_COMMAND, limit_type_name="float", deflection_relation=LOSS_RELATION,
-    estimate=loss_estimate,
-    estimate_interval=loss_interval,
+    possible_deflection_range=loss_deflection_range,
+    accommodation_mode=SCALE_COMMAND, limit_type_name="float", deflection_relation=LOSS_DEFLECTION_RELATION,
+    estimate=loss_theta_estimate,
+    estimate_interval=loss_theta_interval,
 )  # fmt: skip
 VARYING_LOSS = FaultType(
     name="loss_of_effectiveness", description="loss_of_effectiveness that varies",
     has_constant_parameter=False, sort_rank=1,
     consistent_interval=consistent_varying_loss_interval, half_cycles_before_isolating_others=2,
-    accommodation_mode=SCALE_COMMAND, deflection_relation=LOSS_RELATION,
-    estimate=loss_estimated_by_isolation,
+    accommodation_mode=SCALE_COMMAND, deflection_relation=LOSS_DEFLECTION_RELATION,
+    estimate=loss_theta_from_isolation_estimator,
 )  # fmt: skip
 
 
-MIN_RUNAWAY_RATE_RATIO = 1.8  # times the least rate of a runaway, half of the rate limit at which it runs
+# times the least rate of a runaway, half of the rate limit at which it runs
+MAX_BIAS_GROWTH_PER_MIN_RUNAWAY_RATE = 1.8
 
 
 @kernel
@@ -162,7 +165,7 @@ def bias_deflection_error(surface, type_index):
 
 
 @kernel
-def bias_deflection(config, surface, type_index, k):
+def bias_deflection_range(config, surface, type_index, k):
     """The command and the offset, cut off by the stops."""
     low = mean_deflection_with_offset(
         surface, surface.feasible_sets.low[type_index], surface.commands.min_healthy_position[0]
@@ -199,26 +202,26 @@ def reset_growing_bias_memory(surface, type_index):
     """It has not grown yet."""
     memory = surface.growing_bias
     memory.min_growth_up = memory.min_growth_down = 0.0
-    memory.has_run_to_stop[:] = 0
-    clear_offset_interval(memory)
+    memory.has_run_towards_stop[:] = 0
+    reset_offset_interval(memory)
 
 
 @kernel
-def clear_offset_interval(memory):
+def reset_offset_interval(memory):
     """Its offset is not known."""
     memory.offset_low, memory.offset_high = -np.inf, np.inf
 
 
 @kernel
-def max_growth_per_frame(config, surface):
+def max_bias_growth_per_frame(config, surface):
     """Return the largest motion between judged frames of an offset slower than a runaway, rad."""
-    return MIN_RUNAWAY_RATE_RATIO * surface.actuator.min_runaway_rate * config.block_duration_s
+    return MAX_BIAS_GROWTH_PER_MIN_RUNAWAY_RATE * surface.actuator.min_runaway_rate * config.block_duration_s
 
 
 @kernel
 def widen_offset_interval(config, surface, type_index):
     """Widen the interval of the offset by what one that is slower than a runaway moves in a frame."""
-    max_growth = max_growth_per_frame(config, surface)
+    max_growth = max_bias_growth_per_frame(config, surface)
     surface.growing_bias.offset_low -= max_growth
     surface.growing_bias.offset_high += max_growth
 
@@ -226,7 +229,7 @@ def widen_offset_interval(config, surface, type_index):
 @kernel
 def forget_bias_offset_interval(config, surface, type_index, k):
     """The fault may have gone, and begin again with any offset."""
-    clear_offset_interval(surface.growing_bias)
+    reset_offset_interval(surface.growing_bias)
 
 
 @kernel
@@ -235,10 +238,10 @@ def detect_run_to_stop(config, surface, min_offset, max_offset):
     several instants may be that of the last of them."""
     memory = surface.growing_bias
     if max_offset < memory.offset_low:
-        memory.has_run_to_stop[0] = 1
+        memory.has_run_towards_stop[0] = 1
     if min_offset > memory.offset_high:
-        memory.has_run_to_stop[1] = 1
-    max_growth = 0.0 if config.is_single_instant else max_growth_per_frame(config, surface)
+        memory.has_run_towards_stop[1] = 1
+    max_growth = 0.0 if config.frame_shows_single_instant else max_bias_growth_per_frame(config, surface)
     memory.offset_low, memory.offset_high = (
         max(memory.offset_low, min_offset - max_growth),
         min(memory.offset_high, max_offset + max_growth),
@@ -246,7 +249,7 @@ def detect_run_to_stop(config, surface, min_offset, max_offset):
 
 
 @kernel
-def growing_bias_consistent_set(config, surface, type_index, k):
+def consistent_growing_bias_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     min_offset, max_offset = consistent_offset_interval(surface)
     if min_offset <= max_offset:
@@ -270,11 +273,11 @@ def growing_bias_consistent_set(config, surface, type_index, k):
 
 
 @kernel
-def has_run_to_stop(surface, direction):
+def has_run_towards_stop(surface, direction):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
     if direction == 0:
         return False
-    return surface.growing_bias.has_run_to_stop[1 if direction > 0 else 0] == 1
+    return surface.growing_bias.has_run_towards_stop[1 if direction > 0 else 0] == 1
 
 
 def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
@@ -284,7 +287,7 @@ def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
-    consistent_interval=consistent_bias_interval, possible_deflection=bias_deflection,
+    consistent_interval=consistent_bias_interval, possible_deflection_range=bias_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_rank=2,
     deflection_relation=DeflectionRelation(
         1.0, theta_is_share=False, theta_range=lambda low, high: (low - high, high - low)
@@ -295,23 +298,24 @@ BIAS = FaultType(
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
     reset_memory=reset_growing_bias_memory, on_every_frame=widen_offset_interval,
-    consistent_interval=growing_bias_consistent_set,
+    consistent_interval=consistent_growing_bias_interval,
     on_skipped_frame=forget_bias_offset_interval,
-    record_name="growing_bias",
+    memory_record_name="growing_bias",
     memory_dtype=record(
         min_growth_up=float, min_growth_down=float,  # how far it has certainly grown, rad
         # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
-        offset_low=float, offset_high=float, has_run_to_stop=(int, 2),
+        offset_low=float, offset_high=float, has_run_towards_stop=(int, 2),
     ),
     # an offset that grows ends as good as constant, with any commands
     error_depends_on_command=False,
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
-    can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"), motion_rules_out=has_run_to_stop,
+    can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"),
+    motion_rules_out=has_run_towards_stop,
     accommodation_mode=SUBTRACT_OFFSET, excluding_comparison="growing offset", estimate=last_offset_rad,
 )  # fmt: skip
 
 
-MIN_HALF_CYCLES_TO_SHOW = 3
+MIN_OSCILLATION_HALF_CYCLES = 3
 
 
 @kernel
@@ -344,7 +348,7 @@ def consistent_oscillation_interval(config, surface, type_index, k):
     )
     error_sign = 1 if error_low > 0.0 else (-1 if error_high < 0.0 else 0)
     if error_sign == 0 or (
-        not config.is_single_instant
+        not config.frame_shows_single_instant
         and surface.judged_observation.stop_can_hide_deflection[0 if error_sign > 0 else 1]
     ):
         memory.sign_since_frame = k + 1
@@ -377,7 +381,7 @@ def skip_oscillation_frame(config, surface, type_index, k):
 @kernel
 def oscillation_has_shown(surface):
     """Whether it has swung for two half-cycles and more."""
-    return surface.oscillatory.n_half_cycles >= MIN_HALF_CYCLES_TO_SHOW
+    return surface.oscillatory.n_half_cycles >= MIN_OSCILLATION_HALF_CYCLES
 
 
 def oscillation_amplitude_rad(fdi: np.void, s: int, type_index: int) -> float | None:
@@ -406,7 +410,7 @@ OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
     reset_memory=reset_oscillation_memory, on_every_frame=add_squared_deflection_error,
     consistent_interval=consistent_oscillation_interval,
-    on_skipped_frame=skip_oscillation_frame, record_name="oscillatory",
+    on_skipped_frame=skip_oscillation_frame, memory_record_name="oscillatory",
     memory_dtype=record(
         error_sign=int, sign_since_frame=int,
         n_half_cycles=int, first_half_cycle_end_frame=int, last_half_cycle_end_frame=int,
@@ -438,7 +442,7 @@ def consistent_rate_limit_interval(config, surface, type_index, k):
         surface.judged_observation.position_high,
         surface.rate_limit,
     )
-    side, moves_away = side_of_all_commands(config, surface), False
+    side, moves_away = surface_side_of_commands(config, surface), False
     if side == 0 or side != memory.side_of_command or k != memory.last_known_frame + 1:
         memory.position_low, memory.position_high = low, high
     else:
@@ -453,8 +457,12 @@ def consistent_rate_limit_interval(config, surface, type_index, k):
 def narrow_position_by_min_rate(config, surface, memory, side):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    min_motion = config.n_substeps * config.frames_per_block * surface.actuator.min_motion_per_substep
-    lag_distance = surface.actuator.min_motion_per_substep / surface.actuator.lag_share_per_substep
+    min_motion = (
+        config.n_substeps * config.frames_per_block * surface.actuator.min_rate_limited_motion_per_substep
+    )
+    lag_distance = (
+        surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.lag_share_per_substep
+    )
     min_command, max_command = command_range(config, surface)
     if side > 0:
         memory.position_high = min(
@@ -470,14 +478,14 @@ def narrow_position_by_min_rate(config, surface, memory, side):
 def command_range(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     commands = surface.commands
-    newest_age = 2 if config.is_single_instant else 1
+    newest_age = 2 if config.frame_shows_single_instant else 1
     return min(commands.min_command[2], commands.min_command[newest_age]), max(
         commands.max_command[2], commands.max_command[newest_age]
     )
 
 
 @kernel
-def side_of_all_commands(config, surface):
+def surface_side_of_commands(config, surface):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
     min_command, max_command = command_range(config, surface)
     return (
@@ -490,7 +498,7 @@ def side_of_all_commands(config, surface):
 RATE_LIMIT = FaultType(
     name="rate_limit", has_constant_parameter=False, sort_rank=3,
     reset_memory=reset_rate_limit_memory, consistent_interval=consistent_rate_limit_interval,
-    record_name="rate_limit",
+    memory_record_name="rate_limit",
     memory_dtype=record(
         # where it can be while it stands on one side of its command, rad
         position_low=float, position_high=float,

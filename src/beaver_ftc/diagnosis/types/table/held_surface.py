@@ -52,17 +52,17 @@ RETURN_TOLERANCE_RAD = 1e-14
 def clear_releases(surface, release_slot, type_index):
     """No release of this type is possible: the empty interval."""
     (
-        surface.release.return_low[release_slot, type_index],
-        surface.release.return_high[release_slot, type_index],
+        surface.release.return_position_low[release_slot, type_index],
+        surface.release.return_position_high[release_slot, type_index],
     ) = np.inf, -np.inf
 
 
 @kernel
-def has_release(surface, release_slot, type_index):
+def is_release_possible(surface, release_slot, type_index):
     """Whether a release of this type is possible."""
     return (
-        surface.release.return_low[release_slot, type_index]
-        <= surface.release.return_high[release_slot, type_index]
+        surface.release.return_position_low[release_slot, type_index]
+        <= surface.release.return_position_high[release_slot, type_index]
     )
 
 
@@ -70,8 +70,8 @@ def has_release(surface, release_slot, type_index):
 def reset_releases(surface, type_index):
     """Allow a release before the alarm, from anywhere in the travel."""
     clear_releases(surface, EARLIER_RELEASE, type_index)
-    surface.release.return_low[LATER_RELEASE, type_index] = surface.actuator.travel_low
-    surface.release.return_high[LATER_RELEASE, type_index] = surface.actuator.travel_high
+    surface.release.return_position_low[LATER_RELEASE, type_index] = surface.actuator.travel_low
+    surface.release.return_position_high[LATER_RELEASE, type_index] = surface.actuator.travel_high
     clear_held_interval(surface, type_index)
 
 
@@ -118,12 +118,12 @@ def mean_return_position(config, surface, start_position, release_side=0):
     return (
         position_sum / n_positions,
         position,
-        surface.judged_observation.effectiveness_variation * (max_position - min_position),
+        surface.judged_observation.weighted_mean_error_per_position_range * (max_position - min_position),
     )
 
 
 @kernel
-def block_release_explains(config, surface, type_index):
+def release_within_block_explains_it(config, surface, type_index):
     """Whether a release at an instant of the judged block explains the block."""
     held_position_min, held_position_max = (
         surface.release.held_position_min[type_index],
@@ -140,13 +140,13 @@ def block_release_explains(config, surface, type_index):
 
 
 @kernel
-def return_explains(config, surface, type_index):
+def return_explains_frame(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
-    is_explained = block_release_explains(config, surface, type_index)
+    is_explained = release_within_block_explains_it(config, surface, type_index)
     if not is_explained:
         clear_held_interval(surface, type_index)
     for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-        if has_release(surface, release_slot, type_index):
+        if is_release_possible(surface, release_slot, type_index):
             if narrow_return_interval(config, surface, release_slot, type_index):
                 is_explained = True
             else:
@@ -162,10 +162,10 @@ def narrow_return_interval(config, surface, release_slot, type_index):
     """
     release = surface.release
     mean_from_low, _, low_tolerance = mean_return_position(
-        config, surface, release.return_low[release_slot, type_index]
+        config, surface, release.return_position_low[release_slot, type_index]
     )
     mean_from_high, _, high_tolerance = mean_return_position(
-        config, surface, release.return_high[release_slot, type_index]
+        config, surface, release.return_position_high[release_slot, type_index]
     )
     tolerance, healthy_position = (
         max(low_tolerance, high_tolerance),
@@ -184,13 +184,13 @@ def narrow_return_interval(config, surface, release_slot, type_index):
         or mean_from_high + tolerance < surface.judged_observation.position_low
     ):
         return False
-    narrowed_low = release.return_low[release_slot, type_index] + max(
+    narrowed_low = release.return_position_low[release_slot, type_index] + max(
         surface.judged_observation.position_low - mean_from_low - tolerance, 0.0
     )
-    narrowed_high = release.return_high[release_slot, type_index] - max(
+    narrowed_high = release.return_position_high[release_slot, type_index] - max(
         mean_from_high - tolerance - surface.judged_observation.position_high, 0.0
     )
-    set_release_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
+    set_return_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
     return True
 
 
@@ -198,17 +198,23 @@ def narrow_return_interval(config, surface, release_slot, type_index):
 def promote_later_releases(surface, type_index):
     """Take the later releases for the earlier ones, when no earlier one is possible any more."""
     release = surface.release
-    release.return_low[EARLIER_RELEASE, type_index], release.return_high[EARLIER_RELEASE, type_index] = (
-        release.return_low[LATER_RELEASE, type_index],
-        release.return_high[LATER_RELEASE, type_index],
+    (
+        release.return_position_low[EARLIER_RELEASE, type_index],
+        release.return_position_high[EARLIER_RELEASE, type_index],
+    ) = (
+        release.return_position_low[LATER_RELEASE, type_index],
+        release.return_position_high[LATER_RELEASE, type_index],
     )
     clear_releases(surface, LATER_RELEASE, type_index)
 
 
 @kernel
-def set_release_interval(release, release_slot, type_index, low, high):
+def set_return_interval(release, release_slot, type_index, low, high):
     """Replace the interval of a return by [low, high]; rounding may have swapped ends that meet."""
-    release.return_low[release_slot, type_index], release.return_high[release_slot, type_index] = (
+    (
+        release.return_position_low[release_slot, type_index],
+        release.return_position_high[release_slot, type_index],
+    ) = (
         min(low, high),
         max(low, high),
     )
@@ -219,7 +225,9 @@ def hold_status_in_frame(config, surface, type_index, held_position_min, held_po
     """Whether a type holds the surface between these positions (rad) in the judged frame: STATUS_HELD; or has
     released it, and the actuator may be bringing it back: STATUS_RETURNING; or neither explains it:
     STATUS_REFUTED."""
-    is_return_possible = config.returns_via_actuator and return_explains(config, surface, type_index)
+    is_return_possible = config.released_surface_returns_via_actuator and return_explains_frame(
+        config, surface, type_index
+    )
     has_released = surface.release.has_released
     if (
         held_position_min <= surface.judged_observation.position_high
@@ -252,7 +260,7 @@ def position_at_frame_start(config, surface, k):
 
     With several JSBSim frames in one of ours the release may have been within it: the frame before is used.
     """
-    if config.is_single_instant:
+    if config.frame_shows_single_instant:
         return surface.judged_observation.position_low, surface.judged_observation.position_high, k
     return surface.earlier_observation.position_low, surface.earlier_observation.position_high, k - 1
 
@@ -264,11 +272,11 @@ def add_release(surface, type_index, low, high):
     clear_held_interval(surface, type_index)
     if low <= high and not release.has_released[type_index]:
         release.held_position_min[type_index], release.held_position_max[type_index] = low, high
-        release.return_low[LATER_RELEASE, type_index] = min(
-            release.return_low[LATER_RELEASE, type_index], low
+        release.return_position_low[LATER_RELEASE, type_index] = min(
+            release.return_position_low[LATER_RELEASE, type_index], low
         )
-        release.return_high[LATER_RELEASE, type_index] = max(
-            release.return_high[LATER_RELEASE, type_index], high
+        release.return_position_high[LATER_RELEASE, type_index] = max(
+            release.return_position_high[LATER_RELEASE, type_index], high
         )
 
 
@@ -279,21 +287,25 @@ def propagate_returns(config, surface, type_index):
     if not surface.judged_observation.is_anomalous:
         release.has_released[type_index] = 0
     for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-        if has_release(surface, release_slot, type_index):
-            _, low, _ = mean_return_position(config, surface, release.return_low[release_slot, type_index])
-            _, high, _ = mean_return_position(config, surface, release.return_high[release_slot, type_index])
-            set_release_interval(release, release_slot, type_index, low, high)
+        if is_release_possible(surface, release_slot, type_index):
+            _, low, _ = mean_return_position(
+                config, surface, release.return_position_low[release_slot, type_index]
+            )
+            _, high, _ = mean_return_position(
+                config, surface, release.return_position_high[release_slot, type_index]
+            )
+            set_return_interval(release, release_slot, type_index, low, high)
     if (
         config.frames_per_block > 1
         and release.held_position_min[type_index] <= release.held_position_max[type_index]
     ):
         _, low, _ = mean_return_position(config, surface, release.held_position_min[type_index], -1)
         _, high, _ = mean_return_position(config, surface, release.held_position_max[type_index], 1)
-        release.return_low[LATER_RELEASE, type_index] = min(
-            release.return_low[LATER_RELEASE, type_index], low
+        release.return_position_low[LATER_RELEASE, type_index] = min(
+            release.return_position_low[LATER_RELEASE, type_index], low
         )
-        release.return_high[LATER_RELEASE, type_index] = max(
-            release.return_high[LATER_RELEASE, type_index], high
+        release.return_position_high[LATER_RELEASE, type_index] = max(
+            release.return_position_high[LATER_RELEASE, type_index], high
         )
 
 
@@ -344,7 +356,7 @@ def add_stuck_release(config, surface, type_index, k):
 def promote_sets_before_release(surface, type_index):
     """When no earlier release is possible any more, the later ones are the earlier ones."""
     memory = surface.stuck
-    if not has_release(surface, EARLIER_RELEASE, type_index):
+    if not is_release_possible(surface, EARLIER_RELEASE, type_index):
         (
             memory.feasible_low_before_release[EARLIER_RELEASE],
             memory.feasible_high_before_release[EARLIER_RELEASE],
@@ -368,7 +380,7 @@ def stuck_set_after_frame(surface, type_index):
     the earliest release still possible."""
     if not surface.judged_observation.is_anomalous:
         for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
-            if has_release(surface, release_slot, type_index):
+            if is_release_possible(surface, release_slot, type_index):
                 return surface.stuck.feasible_low_before_release[
                     release_slot
                 ], surface.stuck.feasible_high_before_release[release_slot]
@@ -376,7 +388,7 @@ def stuck_set_after_frame(surface, type_index):
 
 
 @kernel
-def stuck_deflection(config, surface, type_index, k):
+def stuck_deflection_range(config, surface, type_index, k):
     """Return the interval of the jammed position, rad."""
     return surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
 
@@ -397,7 +409,7 @@ def add_float_release(config, surface, type_index, k):
 
 
 @kernel
-def float_deflection(config, surface, type_index, k):
+def float_deflection_range(config, surface, type_index, k):
     """At neutral."""
     neutral = limit_to_travel(surface, 0.0)
     return neutral, neutral
@@ -431,9 +443,10 @@ STUCK = FaultType(
     parameter_range=travel_range, reset_memory=reset_stuck_memory,
     consistent_interval=consistent_stuck_interval, feasible_set_after_frame=stuck_set_after_frame,
     # rad; EARLIER and LATER
-    record_name="stuck", memory_dtype=record(feasible_low_before_release=2, feasible_high_before_release=2),
+    memory_record_name="stuck", memory_dtype=record(feasible_low_before_release=2,
+    feasible_high_before_release=2),
     on_possible_release=add_stuck_release, propagate_release=propagate_returns,
-    possible_deflection=stuck_deflection,
+    possible_deflection_range=stuck_deflection_range,
     evidence_at_rest=REST_POSITION_IS_PARAMETER,
     accommodation_mode=GIVE_UP, deflection_error=stuck_deflection_error, deflection_error_rank=3,
     deflection_relation=DeflectionRelation(
@@ -445,7 +458,7 @@ FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
     reset_memory=reset_releases, consistent_interval=consistent_float_interval,
     on_possible_release=add_float_release, propagate_release=propagate_returns,
-    possible_deflection=float_deflection,
+    possible_deflection_range=float_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
     deflection_error=float_deflection_error,
     deflection_error_rank=1,
@@ -472,7 +485,7 @@ def min_runaway_up_deflection(config, surface, k):
         return surface.actuator.travel_low
     return min(
         surface.actuator.travel_high,
-        surface.evidence.first_position_low + min_runaway_travel(config, surface, k),
+        surface.evidence.first_anomalous_position_low + min_runaway_travel(config, surface, k),
     )
 
 
@@ -483,7 +496,7 @@ def max_runaway_down_deflection(config, surface, k):
         return surface.actuator.travel_high
     return max(
         surface.actuator.travel_low,
-        surface.evidence.first_position_high - min_runaway_travel(config, surface, k),
+        surface.evidence.first_anomalous_position_high - min_runaway_travel(config, surface, k),
     )
 
 
@@ -516,7 +529,7 @@ def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
     low, high, shown_frame = position_at_frame_start(config, surface, k)
     low = max(low, min_runaway_up_deflection(config, surface, shown_frame))
-    if not config.is_single_instant and low <= high:
+    if not config.frame_shows_single_instant and low <= high:
         high = surface.actuator.travel_high
     add_release(surface, type_index, low, high)
 
@@ -526,19 +539,19 @@ def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
     low, high, shown_frame = position_at_frame_start(config, surface, k)
     high = min(high, max_runaway_down_deflection(config, surface, shown_frame))
-    if not config.is_single_instant and low <= high:
+    if not config.frame_shows_single_instant and low <= high:
         low = surface.actuator.travel_low
     add_release(surface, type_index, low, high)
 
 
 @kernel
-def hardover_up_deflection(config, surface, type_index, k):
+def hardover_up_deflection_range(config, surface, type_index, k):
     """Between its least way and the stop."""
     return min_runaway_up_deflection(config, surface, k), surface.actuator.travel_high
 
 
 @kernel
-def hardover_down_deflection(config, surface, type_index, k):
+def hardover_down_deflection_range(config, surface, type_index, k):
     """The same downwards."""
     return surface.actuator.travel_low, max_runaway_down_deflection(config, surface, k)
 
@@ -557,14 +570,16 @@ HARDOVER_UP = FaultType(
     name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
     reset_memory=reset_releases, consistent_interval=consistent_hardover_up_interval,
     on_possible_release=add_hardover_up_release,
-    propagate_release=propagate_returns, possible_deflection=hardover_up_deflection, stop_direction=1,
+    propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
+    stop_direction=1,
     accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=upper_stop_deflection_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
     reset_memory=reset_releases, consistent_interval=consistent_hardover_down_interval,
     on_possible_release=add_hardover_down_release,
-    propagate_release=propagate_returns, possible_deflection=hardover_down_deflection, stop_direction=-1,
+    propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
+    stop_direction=-1,
     accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=lower_stop_deflection_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

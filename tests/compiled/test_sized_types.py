@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from beaver_ftc import compiled
 from beaver_ftc.compiled import direct, kernel, plain, record, sized, target
 from beaver_ftc.compiled.records import Room, shape_of
-from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, Capacity, StatisticalRecordSize
+from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, BlockCapacity, StatisticalRecordSize
 from beaver_ftc.loop.assembly import frame_dtype
 
 of_known = pytest.mark.skipif(
@@ -229,7 +229,7 @@ def test_records_that_change_in_size_stand_in_a_row():
 def test_flights_of_all_sizes_have_one_type():
     """Surfaces, terms of the model, boxes of its error map, delays: none makes another."""
     kind_of = target.kind_of
-    large = StatisticalRecordSize(Capacity(105, 62), Capacity(108, 21), 47, 20)
+    large = StatisticalRecordSize(BlockCapacity(105, 62), BlockCapacity(108, 21), 47, 20)
     sizes = [
         (n, size, line) for n in (3, 4, 17, 20) for size in (USUAL_RECORD_SIZE, large) for line in (512, 9000)
     ]

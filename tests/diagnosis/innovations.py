@@ -19,8 +19,8 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     MAX_HYPOTHESES,
     N_ONSET_SLOTS,
     N_ONSET_TESTS_PER_GROUP,
-    SUPPORTING_SIGN_BY_KIND,
-    Capacity,
+    SUPPORTING_CORRELATION_SIGN_BY_KIND,
+    BlockCapacity,
     block_dtype,
 )
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
@@ -46,7 +46,7 @@ def misread(y, place, error, density_power_error_kw=0.0):
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
-    block = np.zeros(1, block_dtype(Capacity(105, MAX_HYPOTHESES))).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(BlockCapacity(105, MAX_HYPOTHESES))).view(np.recarray)[0]
     block["n_axes"], block["axis"][:n], block["drift_decay_factor"] = n, range(n), keep
     block["drift_intensity"][:n, :n] = drift
     block["gyro_noise_variance"][:n], block["model_noise_variance"][:n] = np.square(noise), np.square(jitter)
@@ -62,16 +62,18 @@ def with_hypotheses(block, *kinds, tolerance=()):
     for h, kind in enumerate(kinds):
         block["hypothesis"][h]["kind"] = kind
         group, lane = divmod(h * N_ONSET_SLOTS, N_ONSET_TESTS_PER_GROUP)
-        block["onset_tests"]["supporting_sign"][group, lane : lane + N_ONSET_SLOTS] = SUPPORTING_SIGN_BY_KIND[
-            kind
-        ]
+        block["onset_tests"]["supporting_correlation_sign"][group, lane : lane + N_ONSET_SLOTS] = (
+            SUPPORTING_CORRELATION_SIGN_BY_KIND[kind]
+        )
     return block
 
 
 def onset_tests_of(block, name):
     """What the onset tests keep under a name, a copy, (..., tests)."""
     return np.concatenate(
-        list(block["regressor_overlap"] if name == "regressor_overlap" else block["onset_tests"][name]),
+        list(
+            block["regressor_correlation"] if name == "regressor_correlation" else block["onset_tests"][name]
+        ),
         axis=-1,
     )
 

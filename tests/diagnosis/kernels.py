@@ -125,7 +125,7 @@ def of_stages(fdi, kernel):
         "innovation": fdi["bank"]["output"]["innovation"],
         **dict.fromkeys(("detected", "is_fault_detected"), fdi["verdict"]["detected"]),
         "innovation_bound": fdi["bound"]["frame_innovation_bound"],
-        **dict.fromkeys(("noise", "gyro_change_bound"), fdi["bound"]["gyro_change_bound"]), "dt":
+        **dict.fromkeys(("noise", "gyro_error_change_bound"), fdi["bound"]["gyro_error_change_bound"]), "dt":
         fdi["config"]["dt"], "statistical_alarm": fdi["statistical"]["alarm"],
         **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
     }  # fmt: skip

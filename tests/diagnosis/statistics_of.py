@@ -39,8 +39,8 @@ class Statistical:
         statistical.write_scores_to_log_row(tests, blocks, views, record["forces"], record["gust"], row)
 
     @staticmethod
-    def filter_residual_mean(record, surprise, dt):
-        statistical.filter_residual_mean(record["block"], record["gust"], surprise, dt)
+    def filter_innovation_after_known_faults(record, surprise, dt):
+        statistical.filter_innovation_after_known_faults(record["block"], record["gust"], surprise, dt)
 
     @staticmethod
     def unknown_acceleration(record, out):
@@ -102,8 +102,8 @@ class Across:
         return parity.set_view_direction(view, record["forces"], record["gust"], fdi["bound"], G)
 
     @staticmethod
-    def uses_gust_estimate(record, view):
-        return parity.uses_gust_estimate(view, record["gust"])
+    def subtracts_gust_estimate(record, view):
+        return parity.subtracts_gust_estimate(view, record["gust"])
 
     @staticmethod
     def blur(view, record, V):

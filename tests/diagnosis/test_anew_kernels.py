@@ -62,7 +62,7 @@ def test_the_drift_of_the_detectors_blocks(moving):
         record["noise"]["uncertainty_bound"] = record["block"]["drift_intensity"] = record["block"][
             "model_noise_variance"
         ] = before
-        fdi["bound"]["constant_bound"] = 0.02
+        fdi["bound"]["constant_error_bound"] = 0.02
         Statistical.drifts(record, fdi, design(), X, Y)
         found.append(
             [

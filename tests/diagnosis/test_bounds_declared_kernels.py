@@ -6,7 +6,11 @@ import pytest
 from beaver_ftc.aircraft import load
 from beaver_ftc.design import SCALE_FT, Dryden
 from beaver_ftc.design.model import design_record
-from beaver_ftc.diagnosis.bounds import air_rotation_effect, declared_errors_for_plugin, model_error_std
+from beaver_ftc.diagnosis.bounds import (
+    acceleration_per_air_rotation,
+    declared_errors_for_plugin,
+    model_error_std,
+)
 from beaver_ftc.scenario.airframe import Actuators
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -130,4 +134,4 @@ def test_rotating_air_shows_by_a_central_difference():
         def f(self, x, y):
             return A @ x + x**2 + 1e6 * x**3
 
-    assert air_rotation_effect(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)
+    assert acceleration_per_air_rotation(Cubic(), Y) == pytest.approx(-A - np.eye(3) * 1e6 * 1e-8, abs=1e-9)

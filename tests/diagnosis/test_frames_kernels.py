@@ -43,8 +43,8 @@ def test_until_an_alarm_all_is_sums_of_what_the_model_does_not_explain(kind):
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["isolation"]["estimator"]["xhat"].any()
     assert (
-        (fdi["bank"]["output"]["max_threshold_ratio_so_far"][:n] > 0.0)
-        & (fdi["bank"]["output"]["max_threshold_ratio_so_far"][:n] < 1.0)
+        (fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:n] > 0.0)
+        & (fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:n] < 1.0)
     ).all()
 
 

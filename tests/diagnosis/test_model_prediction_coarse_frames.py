@@ -7,7 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.detection.filters import fault_acceleration_range, fault_parity_range
+from beaver_ftc.diagnosis.detection.filters import (
+    fault_acceleration_range,
+    fault_acceleration_range_along_parity,
+)
 from beaver_ftc.diagnosis.model_prediction import add_instant_to_sums, begin_frame_sums, fill_frame_means
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
@@ -35,7 +38,7 @@ def over(frames):
 @kernel
 def limits(frames, surface):
     fie = frames[0].fdi.isolation.estimator[surface]
-    return fault_acceleration_range(fie, 0), fault_parity_range(fie)
+    return fault_acceleration_range(fie, 0), fault_acceleration_range_along_parity(fie)
 
 
 def record(substeps):

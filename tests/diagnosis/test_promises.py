@@ -66,7 +66,7 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
     assert not plant.fdi["verdict"]["detected"]
     assert not any(plant.excluded(s) for s in range(3))
     assert (
-        max(plant.fdi["bank"]["output"]["max_threshold_ratio_so_far"]) <= 1.0
+        max(plant.fdi["bank"]["output"]["max_residual_over_threshold_so_far"]) <= 1.0
     )  # of every filter, however near the uncertainty drives it
 
 
@@ -133,7 +133,9 @@ def test_an_uncertainty_that_hides_the_fault_delays_detection_to_the_guaranteed_
 
 def test_bounds_are_attained_so_no_smaller_ones_would_do():
     plant = DesignPlant(seed=1, pole_bank_per_s=[2.0, 50.0, 1e6]).fly(400, lambda p, bound, phi: bound)
-    assert plant.fdi["bank"]["output"]["max_threshold_ratio_so_far"][:4] == pytest.approx(1.0, abs=1e-6)
+    assert plant.fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:4] == pytest.approx(
+        1.0, abs=1e-6
+    )
 
 
 def test_filters_and_bounds_are_the_convolutions_they_stand_for():

@@ -155,8 +155,8 @@ def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
     low, high = filters.residual_interval(-0.9, 0.2, 0.5, -0.3, 0.2, -0.4, 0.05)
     assert low == pytest.approx(-0.9 * 0.5 + 0.2 * -0.3 + 0.08 - 0.05)
     assert high == pytest.approx(0.2 * 0.5 + -0.9 * -0.3 + 0.08 + 0.05)
-    assert filters.norm_bound_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
-    assert filters.norm_bound_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
+    assert filters.published_threshold_interval(-1.0, 0.0, -0.2, -0.3, 0.05) == pytest.approx((-0.19, 0.19))
+    assert filters.published_threshold_interval(-1.0, 0.0, 0.2, -0.8, 0.05) == pytest.approx((-0.21, 0.21))
 
 
 def test_the_published_bound_and_the_turning_earth():
@@ -225,16 +225,18 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.map_level_for_positions(new_map(), np.array(u)) == level
-    assert bounds.map_level_for_positions(new_map(several_surfaces_anywhere=1), np.array(u)) == 2
+    assert bounds.map_travel_level_for_positions(new_map(), np.array(u)) == level
+    assert (
+        bounds.map_travel_level_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u)) == 2
+    )
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert bounds.map_level_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert bounds.map_level_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
     assert (
-        bounds.map_level_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
+        bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
     )  # at rest at an end it uses none
 
 
@@ -277,7 +279,10 @@ def test_the_unknown_is_larger_than_what_terms_give_far_from_where_they_were_fit
 def new_detector(**fields):
     fdi = new_fdi()
     record = fdi["statistical"]
-    record["test_config"]["frame_share_per_instant"], record["noise"]["relative_walk_intensity"] = 0.25, 2.0
+    (
+        record["test_config"]["frame_share_per_instant"],
+        record["noise"]["drift_intensity_over_squared_bound"],
+    ) = 0.25, 2.0
     record["noise"]["input_noise_variance"], record["noise"]["deflection_error_effect_bound"] = (
         (0.1, 0.2, 0.3),
         (0.01, 0.02, 0.03),
@@ -309,7 +314,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
         record["gust"]["config"]["rolling_gust_correlation_length"],
         record["gust"]["config"]["wing_span"],
     ) = moving, 20.0, 5.0 * np.pi
-    fdi["bound"]["constant_bound"], fdi["bound"]["inertia_coupling"] = (0.02, 0.0, 0.04), 0.1
+    fdi["bound"]["constant_error_bound"], fdi["bound"]["inertia_coupling"] = (0.02, 0.0, 0.04), 0.1
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
     bounds.add_published_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)
@@ -502,7 +507,7 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
         0.3,
     )
     block["n_axes"], block["axis"] = 2, (0, 2)
-    statistical.add_turn_to_drift_covariance(record, block)
+    statistical.add_gust_axes_turn_to_drift_covariance(record, block)
     assert block["P_dd"] == pytest.approx(
         0.3 + 1.7 * record["output"]["axes_turn_variance"][np.ix_((0, 2), (0, 2))]
     )

@@ -30,7 +30,8 @@ GOES_ON = {
         *(f"control.power.{name}" for name in ENGINE),
     },
     "scheme": {
-        "fdi.bank.output.max_threshold_ratio_so_far", "fdi.statistical.alarm.max_score_over_alarm_level"},
+        "fdi.bank.output.max_residual_over_threshold_so_far",
+        "fdi.statistical.alarm.max_score_over_alarm_level"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")

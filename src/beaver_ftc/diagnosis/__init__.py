@@ -24,9 +24,9 @@ if TYPE_CHECKING:
         DiagnosisReadout,
         FaultTypesConfig,
         SensorMonitor,
+        StatisticalBlock,
+        StatisticalHypothesis,
     )
-    from beaver_ftc.diagnosis.readout import FilterBlock as StatisticalBlock
-    from beaver_ftc.diagnosis.readout import Hypothesis as StatisticalHypothesis
     from beaver_ftc.diagnosis.state import LOSS, UNANTICIPATED, scheme_number
     from beaver_ftc.diagnosis.types import DeflectionRelation
     from beaver_ftc.diagnosis.types.registry import TYPE_DESCRIPTIONS, TYPE_NAMES, type_index_of

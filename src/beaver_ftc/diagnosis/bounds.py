@@ -18,9 +18,9 @@ A derived aircraft declares a map of its model's error. The map has a few boxes 
 other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
 within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
 acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `additional_map_error`, belongs to the hypothesis that it is
-off its command (isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside
-all boxes nothing has been measured, so nothing is concluded.
+be anywhere: the additional error of its share, `additional_error_by_travel_level`, belongs to the hypothesis
+that it is off its command (isolation.py). If two surfaces may be off, the bound itself takes the whole
+travel. Outside all boxes nothing has been measured, so nothing is concluded.
 
 Variances: for plug-ins, and for the filters and tests of the statistical detector.
 """
@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 _FIRST_AIR_DATA_SIGNAL_INDEX = (
     3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 )
-_MIN_AIRSPEED_SHARE = 0.1
+_MIN_TRUE_AIRSPEED_SHARE = 0.1
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
@@ -79,7 +79,7 @@ ROUNDING_RAD_S2 = 1e-11
 UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 # The same for filters with a covariance, whose noise is 1e-4: above the acceleration of any aircraft.
 UNMAPPED_ERROR_IN_FILTERS_RAD_S2 = 100.0
-_ROUNDING_SHARE = 1e-9
+_MAP_EDGE_ROUNDING_SHARE = 1e-9
 N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
@@ -114,12 +114,13 @@ def declared_errors_dtype(n: int) -> np.dtype:
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
-    anywhere: one surface may be anywhere in its travel; several_surfaces_anywhere: more than one may.
+    anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere: more than one may.
     is_outside_all_boxes: whether the state is outside all boxes; box, time_row: where it is in the map.
     surface_positions_before: deflections in the frame before, rad; error_now: error here, rad/s2.
     engine_asymmetry_bound: bound on the yawing moment of healthy engines, by box."""
     return record(
-        n_boxes=int, n_levels=int, n_time_rows=int, one_surface_anywhere=int, several_surfaces_anywhere=int,
+        n_boxes=int, n_levels=int, n_time_rows=int, one_surface_may_be_anywhere=int,
+        several_surfaces_may_be_anywhere=int,
         is_outside_all_boxes=int, box=int, time_row=int,
         time_s=float, until_s=MAX_AGES, box_low=(boxes, N_MAP_COORDINATES), box_high=(boxes,
         N_MAP_COORDINATES),
@@ -133,32 +134,36 @@ def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
 @sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
-    gyro_change_bound: on the change of a gyro's error, rad/s. frame_bound: on the innovation of one frame,
-    rad/s2. effectiveness_error_per_rad, surface_error_at_command: errors of the own terms of n surfaces, per
-    rad of deflection and at the command, means over the frame. additional_map_error: by how much the map's
-    error with a surface at each share of its travel exceeds that in eta_bar."""
+    gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_bound: on the innovation of one
+    frame, rad/s2. effectiveness_error_per_rad, surface_error_at_command: errors of the own terms of n
+    surfaces, per rad of deflection and at the command, means over the frame.
+    additional_error_by_travel_level: by how much the map's error with a surface at each share of its travel
+    exceeds that in eta_bar."""
     return record(
-        inertia_coupling=3, constant_bound=3, earth_rate_rad_s=float,
+        inertia_coupling=3, constant_error_bound=3, earth_rate_rad_s=float,
         declared_errors=declared_errors_dtype(n),
-        model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_change_bound=3,
-        gyro_change_bound_before=3,
+        model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
+        gyro_error_change_bound_before=3,
         frame_innovation_bound=3,
         has_declared_surface_errors=int, effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
-        additional_map_error=(MAX_LEVELS, 3),
+        additional_error_by_travel_level=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
 def fill_error_map(
-    error_map: np.void, aircraft: Aircraft, one_surface_anywhere: bool, several_surfaces_anywhere: bool
+    error_map: np.void,
+    aircraft: Aircraft,
+    one_surface_may_be_anywhere: bool,
+    several_surfaces_may_be_anywhere: bool,
 ) -> None:
-    """Write an aircraft's map, if it has one; one_surface_anywhere: one surface may be, in its travel;
-    several_surfaces_anywhere: more."""
+    """Write an aircraft's map, if it has one; one_surface_may_be_anywhere: one surface may be, in its travel;
+    several_surfaces_may_be_anywhere: more."""
     declared_map = aircraft.file.model_error_map
     if declared_map is None:
         return
     n_levels, n_time_rows = len(declared_map.travel_share), len(declared_map.until_s)
-    error_map["one_surface_anywhere"] = one_surface_anywhere
-    error_map["several_surfaces_anywhere"] = several_surfaces_anywhere
+    error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
+    error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
     error_map["n_boxes"] = len(declared_map.boxes)
     error_map["n_levels"], error_map["n_time_rows"] = n_levels, n_time_rows
     error_map["until_s"][:n_time_rows] = declared_map.until_s
@@ -181,19 +186,23 @@ def fill_error_map(
 
 
 @kernel
-def reading_error_bound(declared_errors, i, reading):
-    """Bound the error of the reading of signal i, in its unit."""
-    return (declared_errors.signal_error_offset[i] + declared_errors.signal_error_slope[i] * abs(reading)) / (
-        1.0 - declared_errors.signal_error_slope[i]
-    )
+def reading_error_bound(declared_errors, signal_index, reading):
+    """Bound the error of the reading of a signal, in its unit."""
+    return (
+        declared_errors.signal_error_offset[signal_index]
+        + declared_errors.signal_error_slope[signal_index] * abs(reading)
+    ) / (1.0 - declared_errors.signal_error_slope[signal_index])
 
 
 @kernel
-def changing_gyro_error_bound(declared_errors, i, reading):
-    """Bound the changing error of gyro i, rad/s: noise, resolution, slope times the true rate."""
-    changing_offset = declared_errors.signal_error_offset[i] - declared_errors.constant_gyro_error_bound[i]
-    return changing_offset + declared_errors.signal_error_slope[i] * (
-        abs(reading) + reading_error_bound(declared_errors, i, reading)
+def changing_gyro_error_bound(declared_errors, axis, reading):
+    """Bound the changing error of the gyro of an axis, rad/s: noise, resolution, slope times the true
+    rate."""
+    changing_offset = (
+        declared_errors.signal_error_offset[axis] - declared_errors.constant_gyro_error_bound[axis]
+    )
+    return changing_offset + declared_errors.signal_error_slope[axis] * (
+        abs(reading) + reading_error_bound(declared_errors, axis, reading)
     )
 
 
@@ -245,12 +254,12 @@ def fill_signal_magnitudes(declared_errors, x, y, u):
         declared_errors.max_magnitude_u[s] = abs(u[s]) + declared_errors.deflection_error_bound
     V = y[AIRSPEED]
     declared_errors.magnitude_bound_y[AIRSPEED] = max(
-        2.0 * V - declared_errors.magnitude_bound_y[AIRSPEED], _MIN_AIRSPEED_SHARE * V
+        2.0 * V - declared_errors.magnitude_bound_y[AIRSPEED], _MIN_TRUE_AIRSPEED_SHARE * V
     )
 
 
 @kernel
-def fill_moment_magnitudes(declared_errors, design):
+def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
     """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
     measured_pressure, max_pressure = (
         declared_errors.magnitude_y[QDYN],
@@ -284,16 +293,16 @@ def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_mag
 
 
 @kernel
-def moment_product_error_bound(declared_errors, i, coefficient, tolerance):
-    """Error of an inertia coefficient times moment i."""
-    moment_magnitude = declared_errors.moment_magnitude[i]
+def inertia_times_moment_error_bound(declared_errors, axis, coefficient, tolerance):
+    """Error of an inertia coefficient times the moment about an axis."""
+    moment_magnitude = declared_errors.moment_magnitude[axis]
     return product_error_bound(
-        coefficient, tolerance, moment_magnitude, moment_magnitude + declared_errors.moment_error_bound[i]
+        coefficient, tolerance, moment_magnitude, moment_magnitude + declared_errors.moment_error_bound[axis]
     )
 
 
 @kernel
-def rate_product_error_bound(declared_errors, i, j, coefficient, tolerance):
+def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, tolerance):
     """Error of an inertia coefficient times rates i and j."""
     magnitude, max_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
@@ -302,18 +311,19 @@ def rate_product_error_bound(declared_errors, i, j, coefficient, tolerance):
 
 
 @kernel
-def surface_moment_per_rad(declared_errors, design, i, s):
-    """Return the part of surface s in moment i per rad: its magnitude, and with all errors; N m."""
+def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
+    """Return the part of surface s in the moment about an axis per rad: its magnitude, and with all errors; N
+    m."""
     measured_coefficient, max_coefficient = 0.0, 0.0
     table = design.moments
-    for k in range(table.free_to[i], table.surface_to[i]):
+    for k in range(table.free_to[axis], table.surface_to[axis]):
         if table.surface[k] == s:
             coefficient = abs(table.value[k])
             measured_coefficient += coefficient * declared_errors.monomial_magnitude[table.monomial[k]]
             max_coefficient += (
                 coefficient + declared_errors.coefficient_tolerance[k]
             ) * declared_errors.max_monomial_magnitude[table.monomial[k]]
-    area_times_length = design.S * (design.c if i == 1 else design.b)
+    area_times_length = design.S * (design.c if axis == 1 else design.b)
     return area_times_length * declared_errors.magnitude_y[
         QDYN
     ] * measured_coefficient, area_times_length * declared_errors.magnitude_bound_y[QDYN] * max_coefficient
@@ -326,9 +336,9 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
     The bound is affine in |u_s|; this is its slope. `add_declared_error_bound` comes first.
     """
     inertia_tolerance, per_rad = declared_errors.inertia_tolerance, declared_errors.acceleration_error_per_rad
-    roll, max_roll = surface_moment_per_rad(declared_errors, design, 0, s)
-    pitch, max_pitch = surface_moment_per_rad(declared_errors, design, 1, s)
-    yaw, max_yaw = surface_moment_per_rad(declared_errors, design, 2, s)
+    roll, max_roll = surface_moment_magnitudes_per_rad(declared_errors, design, 0, s)
+    pitch, max_pitch = surface_moment_magnitudes_per_rad(declared_errors, design, 1, s)
+    yaw, max_yaw = surface_moment_magnitudes_per_rad(declared_errors, design, 2, s)
     per_rad[0, s] = product_error_bound(design.Pl, inertia_tolerance[2], roll, max_roll)
     per_rad[0, s] += product_error_bound(design.Pn, inertia_tolerance[3], yaw, max_yaw)
     per_rad[1, s] = product_error_bound(design.Qm, inertia_tolerance[7], pitch, max_pitch)
@@ -354,68 +364,71 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
         declared_errors.signal_magnitude,
     )
     monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
-    fill_moment_magnitudes(declared_errors, design)
+    fill_moment_magnitudes_and_error_bounds(declared_errors, design)
     inertia_tolerance = declared_errors.inertia_tolerance
-    eta_bar[0] += moment_product_error_bound(
+    eta_bar[0] += inertia_times_moment_error_bound(
         declared_errors, 0, design.Pl, inertia_tolerance[2]
-    ) + moment_product_error_bound(declared_errors, 2, design.Pn, inertia_tolerance[3])
-    eta_bar[0] += rate_product_error_bound(
+    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Pn, inertia_tolerance[3])
+    eta_bar[0] += inertia_times_rates_error_bound(
         declared_errors, 0, 1, design.Ppq, inertia_tolerance[0]
-    ) + rate_product_error_bound(declared_errors, 1, 2, design.Pqr, inertia_tolerance[1])
-    eta_bar[1] += moment_product_error_bound(
+    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Pqr, inertia_tolerance[1])
+    eta_bar[1] += inertia_times_moment_error_bound(
         declared_errors, 1, design.Qm, inertia_tolerance[7]
-    ) + rate_product_error_bound(declared_errors, 0, 2, design.Qpr, inertia_tolerance[5])
-    eta_bar[1] += rate_product_error_bound(
+    ) + inertia_times_rates_error_bound(declared_errors, 0, 2, design.Qpr, inertia_tolerance[5])
+    eta_bar[1] += inertia_times_rates_error_bound(
         declared_errors, 0, 0, design.Qpp, inertia_tolerance[4]
-    ) + rate_product_error_bound(declared_errors, 2, 2, design.Qrr, inertia_tolerance[6])
-    eta_bar[2] += moment_product_error_bound(
+    ) + inertia_times_rates_error_bound(declared_errors, 2, 2, design.Qrr, inertia_tolerance[6])
+    eta_bar[2] += inertia_times_moment_error_bound(
         declared_errors, 0, design.Rl, inertia_tolerance[10]
-    ) + moment_product_error_bound(declared_errors, 2, design.Rn, inertia_tolerance[11])
-    eta_bar[2] += rate_product_error_bound(
+    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Rn, inertia_tolerance[11])
+    eta_bar[2] += inertia_times_rates_error_bound(
         declared_errors, 0, 1, design.Rpq, inertia_tolerance[8]
-    ) + rate_product_error_bound(declared_errors, 1, 2, design.Rqr, inertia_tolerance[9])
+    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Rqr, inertia_tolerance[9])
 
 
 @kernel
-def is_inside_box(error_map, k):
-    """Whether `place` is in box k."""
+def is_inside_box(error_map, box_index):
+    """Whether the state is in this box of the map."""
     is_inside = True
     for i in range(error_map.coordinates.size):
-        rounding_margin = _ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
+        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
         is_inside = (
             is_inside
-            and error_map.box_low[k, i] - rounding_margin
+            and error_map.box_low[box_index, i] - rounding_margin
             <= error_map.coordinates[i]
-            <= error_map.box_high[k, i] + rounding_margin
+            <= error_map.box_high[box_index, i] + rounding_margin
         )
     return is_inside
 
 
 @kernel
-def is_coordinate_outside_all_boxes(error_map, i):
-    """Whether quantity i of `place` is outside what any box spans."""
+def is_coordinate_outside_all_boxes(error_map, coordinate_index):
+    """Whether this coordinate of the state is outside what any box spans."""
     low, high = np.inf, -np.inf
     for k in range(error_map.n_boxes):
-        low, high = min(low, error_map.box_low[k, i]), max(high, error_map.box_high[k, i])
-    rounding_margin = _ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
-    return not low - rounding_margin <= error_map.coordinates[i] <= high + rounding_margin
+        low, high = (
+            min(low, error_map.box_low[k, coordinate_index]),
+            max(high, error_map.box_high[k, coordinate_index]),
+        )
+    rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[coordinate_index]))
+    return not low - rounding_margin <= error_map.coordinates[coordinate_index] <= high + rounding_margin
 
 
 @kernel
-def map_level_for_positions(error_map, u):
+def map_travel_level_for_positions(error_map, u):
     """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
-    if error_map.several_surfaces_anywhere:
+    if error_map.several_surfaces_may_be_anywhere:
         return error_map.n_levels - 1
     travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
             travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
             travel_share = max(travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return map_level_for_travel_share(error_map, travel_share)
+    return map_travel_level_for_share(error_map, travel_share)
 
 
 @kernel
-def map_level_for_travel_share(error_map, travel_share):
+def map_travel_level_for_share(error_map, travel_share):
     """The first level of the map for so large a share of the travel."""
     last_level = error_map.n_levels - 1
     for j in range(last_level):
@@ -457,7 +470,7 @@ def look_up_map_error(error_map, x, y, u):
     coordinates = error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    level, time_row = map_level_for_positions(error_map, u), error_map_time_row(error_map)
+    level, time_row = map_travel_level_for_positions(error_map, u), error_map_time_row(error_map)
     for k in range(error_map.n_boxes if time_row >= 0 else 0):
         if is_inside_box(error_map, k):
             error_map.is_outside_all_boxes, error_map.error_now[:] = 0, error_map.error[time_row, k, level]
@@ -470,11 +483,13 @@ def look_up_map_error(error_map, x, y, u):
 
 
 @kernel
-def additional_map_error(error_map, j, i):
-    """By how much the error of axis i at this instant is larger with a surface at level j, rad/s2."""
+def additional_error_at_travel_level(error_map, level, axis):
+    """By how much the error of an axis at this instant is larger with a surface at this level, rad/s2."""
     if error_map.is_outside_all_boxes:
         return 0.0
-    return max(error_map.error[error_map.time_row, error_map.box, j, i] - error_map.error_now[i], 0.0)
+    return max(
+        error_map.error[error_map.time_row, error_map.box, level, axis] - error_map.error_now[axis], 0.0
+    )
 
 
 @kernel
@@ -486,7 +501,7 @@ def add_map_error(error_map, x, y, u, eta_bar):
 
 
 @kernel
-def add_published_bound(x, design, inertia_coupling, constant_bound, earth_rate_rad_s, eta_bar):
+def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth_rate_rad_s, eta_bar):
     """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
@@ -498,17 +513,17 @@ def add_published_bound(x, design, inertia_coupling, constant_bound, earth_rate_
     roll, pitch, yaw = max_rate_coupling(design)
     eta_bar[0] += (
         inertia_coupling[0] * abs(design.Pqr * q * r)
-        + constant_bound[0]
+        + constant_error_bound[0]
         + earth_rotation_bound(earth_rate_rad_s, rates, roll)
     )
     eta_bar[1] += (
         inertia_coupling[1] * abs(design.Qpr * p * r)
-        + constant_bound[1]
+        + constant_error_bound[1]
         + earth_rotation_bound(earth_rate_rad_s, rates, pitch)
     )
     eta_bar[2] += (
         inertia_coupling[2] * abs(design.Rpq * p * q)
-        + constant_bound[2]
+        + constant_error_bound[2]
         + earth_rotation_bound(earth_rate_rad_s, rates, yaw)
     )
 
@@ -572,7 +587,7 @@ def fill_uncertainty_bound_now(bound, design, measured, u):
         max_rates,
         design,
         bound.inertia_coupling,
-        bound.constant_bound,
+        bound.constant_error_bound,
         bound.earth_rate_rad_s,
         bound.eta_bar_now,
     )
@@ -609,13 +624,13 @@ def configure_uncertainty_bound(
     same; design: the designer's record."""
     config, aircraft = scenario.fdi, declared.aircraft
     bound["inertia_coupling"], bound["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
-    bound["constant_bound"] = declared.constant_rad_s2
+    bound["constant_error_bound"] = declared.constant_rad_s2
     diagnoses_all_types = config.fault_class == "all"
     fill_error_map(
         bound["model_error_map"], aircraft, diagnoses_all_types, diagnoses_all_types and config.pairs
     )
     if aircraft.file.model_error_map is None:
-        bound["constant_bound"] += aircraft.model_error_rad_s2
+        bound["constant_error_bound"] += aircraft.model_error_rad_s2
     declared_errors = bound["declared_errors"]
     fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
     fill_declared_engine_errors(declared_errors, scenario, declared)
@@ -673,22 +688,22 @@ def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> 
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
     of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
     """
-    gyro_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
+    gyro_error_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
     return (
         tuple(
-            _detection_pole_per_s(delay_s, gyro_change_bound, constant_rad_s2)
+            _detection_pole_per_s(delay_s, gyro_error_change_bound, constant_rad_s2)
             for delay_s in POLE_DESIGN_DELAYS_S
         )
-        if gyro_change_bound > 0
+        if gyro_error_change_bound > 0
         else ()
     )
 
 
-def _detection_pole_per_s(delay_s: float, gyro_change_bound: float, eta_bar: float) -> float:
-    phi = eta_bar + 8.0 * gyro_change_bound / delay_s
+def _detection_pole_per_s(delay_s: float, gyro_error_change_bound: float, eta_bar: float) -> float:
+    phi = eta_bar + 8.0 * gyro_error_change_bound / delay_s
     for _ in range(50):
-        pole = max(log(phi * delay_s / gyro_change_bound) / delay_s, 0.1 / delay_s)
-        phi = (gyro_change_bound * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
+        pole = max(log(phi * delay_s / gyro_error_change_bound) / delay_s, 0.1 / delay_s)
+        phi = (gyro_error_change_bound * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
     return pole
 
 
@@ -715,7 +730,7 @@ def declared_errors_for_plugin(
         slope=errors.each("slope"),
         gust_rad_s=gust_rad_s,
         gust_time_s=gust_time_s,
-        gust_effect=air_rotation_effect(DesignFunctions(design.copy()), y),
+        gust_effect=acceleration_per_air_rotation(DesignFunctions(design.copy()), y),
         coefficients=coefficients,
         inertia=declared.inertia,
         deflection_rad=deflection_rad,
@@ -725,7 +740,7 @@ def declared_errors_for_plugin(
     )
 
 
-def air_rotation_effect(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
+def acceleration_per_air_rotation(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
     step = 1e-4
     columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
@@ -744,20 +759,24 @@ def model_error_std(
 
     air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficients: absolute errors.
     """
-    nominal_acceleration = _acceleration(design, y, u)
+    nominal_acceleration = _design_acceleration_at_zero_rates(design, y, u)
     air_data_errors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
-    deviations = [_acceleration(design, y + error, u) - nominal_acceleration for error in air_data_errors]
+    deviations = [
+        _design_acceleration_at_zero_rates(design, y + error, u) - nominal_acceleration
+        for error in air_data_errors
+    ]
     deviations += [
-        _acceleration(design, y, u + deflection_rad * e) - nominal_acceleration for e in np.eye(u.size)
+        _design_acceleration_at_zero_rates(design, y, u + deflection_rad * e) - nominal_acceleration
+        for e in np.eye(u.size)
     ]
     for term_index in np.flatnonzero(coefficients):
         changed_design = design.copy()
         changed_design["moments"]["value"][0][term_index] += coefficients[term_index]
-        deviations.append(_acceleration(changed_design, y, u) - nominal_acceleration)
+        deviations.append(_design_acceleration_at_zero_rates(changed_design, y, u) - nominal_acceleration)
     return np.sqrt(np.square(deviations).sum(axis=0))
 
 
-def _acceleration(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _design_acceleration_at_zero_rates(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     model = DesignFunctions(design)
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
@@ -784,7 +803,7 @@ def gust_estimate_noise_std_for(
     return np.sqrt((damping[:, 1] * pitch_gust_noise) ** 2 + (damping[:, 2] * yaw_gust_noise) ** 2)
 
 
-def axis_of_term(term: Term) -> int:
+def moment_axis_of_term(term: Term) -> int:
     """The axis of a moment's term."""
     return MOMENTS.index(term.coefficient)
 
@@ -812,13 +831,15 @@ def moment_term_tolerances(
         normalised_rate_error = errors[name].steady * length / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                tolerance[k] += normalised_rate_error * slopes[axis_of_term(term), signal_index]
+                tolerance[k] += normalised_rate_error * slopes[moment_axis_of_term(term), signal_index]
     return tolerance
 
 
 def _relative_reading_error(errors: SensorErrors, term: Term) -> float:
     """Relative error of what a term multiplies, by the slopes of gyros, vanes, airspeed and pressure."""
-    own_gyro = AXES[axis_of_term(term)]  # a gyro's slope is counted once for all terms of its own_gyro axis
+    own_gyro = AXES[
+        moment_axis_of_term(term)
+    ]  # a gyro's slope is counted once for all terms of its own_gyro axis
     relative_error = errors[own_gyro].slope + errors["qdyn"].slope
     for signal, power in term.of:
         if signal in _AXIS_OF_RATE_SIGNAL:

@@ -70,7 +70,7 @@ def record_isolated_estimator(conclusion, isolated_estimator, t):
 
 
 @kernel
-def record_isolation_finding(conclusion, finding):
+def record_fault_type_finding(conclusion, finding):
     """Replace fault, type and lead by the finding of the fault types.
 
     finding: (isolated, isolated_at_s, type, type_at_s, accommodated_surface, accommodation_mode).
@@ -130,9 +130,8 @@ def is_cause_unknown(conclusion):
     )
 
 
-MIN_INFORMATION_TO_APPLY_IMMEDIATELY = (
-    400.0  # one over the variance of an effectiveness known to 0.05, which need not be eased in
-)
+# one over the variance of an effectiveness known to 0.05, which need not be eased in
+MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY = 400.0
 
 
 @sized
@@ -180,7 +179,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             is_precise = (
                 uses_statistics
                 and statistical.estimate_loss(statistical_detector.block, s)[1]
-                > MIN_INFORMATION_TO_APPLY_IMMEDIATELY
+                > MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY
             )
             theta = estimated_theta_of_isolated_loss(
                 config, conclusion, layout, estimators, statistical_detector, s
@@ -241,7 +240,7 @@ def assess_unknown_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration
         )
     elif conclusion.detected and not lags:
-        filters.fill_fdae_unknown_acceleration(fdae, bound.gyro_change_bound, unknown_acceleration)
+        filters.fill_fdae_unknown_acceleration(fdae, bound.gyro_error_change_bound, unknown_acceleration)
     is_undecided = (
         diagnoses_all_types and conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED
     )

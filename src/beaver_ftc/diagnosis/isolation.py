@@ -40,14 +40,14 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import map_level_for_travel_share, max_travel_share_used
+from beaver_ftc.diagnosis.bounds import map_travel_level_for_share, max_travel_share_used
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_gyro_error_bound,
     advance_reachable_residuals,
     advance_residual_bound,
     are_residuals_reachable,
-    norm_bound_interval,
+    published_threshold_interval,
     residual_interval,
 )
 from beaver_ftc.diagnosis.state import (
@@ -137,7 +137,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         bound.model_error_map,
         (fie.theta_min, fie.theta_max),
     )
-    map_level = error_map_level_at_position(error_map, fie, position_range, n_substeps)
+    map_level = map_travel_level_at_position(error_map, fie, position_range, n_substeps)
     measured_effect = innovation[axis] - effect.base_acceleration[axis]
     deflection_at_first_substep = 2.0 * previous_max_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
@@ -146,7 +146,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
             - bound.surface_error_at_command[axis, s],
             0.0,
         )
-        surface_error += bound.additional_map_error[map_level, axis]
+        surface_error += bound.additional_error_by_travel_level[map_level, axis]
         low, high = consistent_parameters(
             measured_effect,
             bound.frame_innovation_bound[axis] + error_bound + surface_error,
@@ -157,9 +157,9 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         if low > high:
             break
         max_deflection, position_range = min(max_deflection, max(abs(low), abs(high))), (low, high)
-        map_level = error_map_level_at_position(error_map, fie, position_range, n_substeps)
+        map_level = map_travel_level_at_position(error_map, fie, position_range, n_substeps)
     fie.max_possible_deflection = max_deflection
-    if error_map.one_surface_anywhere:
+    if error_map.one_surface_may_be_anywhere:
         fie.max_possible_travel_share = max_travel_share_used(
             error_map, s, position_range, fie.max_possible_travel_share, n_substeps
         )
@@ -169,19 +169,19 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
             - bound.surface_error_at_command[i, s],
             0.0,
         )
-        effect.error_bound[i] += bound.additional_map_error[map_level, i]
+        effect.error_bound[i] += bound.additional_error_by_travel_level[map_level, i]
 
 
 @kernel
-def error_map_level_at_position(error_map, fie, position_range, n_substeps):
+def map_travel_level_at_position(error_map, fie, position_range, n_substeps):
     """The level of the error map that covers a surface at a mean position within `position_range`, (low,
     high) rad.
 
     It is 0 without a map.
     """
-    if not error_map.one_surface_anywhere:
+    if not error_map.one_surface_may_be_anywhere:
         return 0
-    return map_level_for_travel_share(
+    return map_travel_level_for_share(
         error_map,
         max_travel_share_used(
             error_map, fie.surface, position_range, fie.max_possible_travel_share, n_substeps
@@ -398,7 +398,7 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
     fill_hypothesis(fie.hypothesis_kind, fie.surface, G, Gu, effect.base_acceleration, effect.regressor)
     set_effect_error_bound(effect, effect_error_bound, fie.surface)
     if (
-        bound.has_declared_surface_errors or bound.model_error_map.one_surface_anywhere
+        bound.has_declared_surface_errors or bound.model_error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
         widen_tolerance_by_surface_errors(fie, bound, bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
@@ -414,13 +414,13 @@ def update_hypotheses(isolation, bank, bound, config, detected, G, Gu, effect_er
 
 
 @kernel
-def start_estimators(isolation, gyro_change_bound, x):
+def start_estimators(isolation, gyro_error_change_bound, x):
     """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
 
-    gyro_change_bound (3,) rad/s: on the change of the gyros' errors.
+    gyro_error_change_bound (3,) rad/s: on the change of the gyros' errors.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, gyro_change_bound
+        fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, gyro_error_change_bound
         fie.theta_variance[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
         reset_parameter_sets(fie, isolation.config.projection_disabled)
 
@@ -451,7 +451,7 @@ def update_residual(fie, threshold_kind, x):
         elif threshold_kind == CONSTANT_THRESHOLD:
             threshold_interval = -uncertainty_bound, uncertainty_bound
         else:
-            threshold_interval = norm_bound_interval(
+            threshold_interval = published_threshold_interval(
                 theta_min, theta_max, filtered_regressor, theta, uncertainty_bound
             )
         fie.lower_threshold[i], fie.upper_threshold[i] = threshold_interval
@@ -610,10 +610,10 @@ def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
             fie.filtered_eta_bar[i], bound.eta_bar[i] + fie.effect.error_bound[i], decay, dt
         )
         fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
-            fie.filtered_gyro_error_bound[i], bound.gyro_change_bound_before[i], decay
+            fie.filtered_gyro_error_bound[i], bound.gyro_error_change_bound_before[i], decay
         )
         fie.filtered_uncertainty_bound[i] = (
-            fie.filtered_eta_bar[i] + fie.filtered_gyro_error_bound[i] + bound.gyro_change_bound[i]
+            fie.filtered_eta_bar[i] + fie.filtered_gyro_error_bound[i] + bound.gyro_error_change_bound[i]
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
 from beaver_ftc.diagnosis.bounds import (
-    additional_map_error,
+    additional_error_at_travel_level,
     changing_gyro_error_bound,
     fill_uncertainty_bound_now,
 )
@@ -104,11 +104,12 @@ def add_instant_to_sums(prediction, bound, layout, diagnoses_all_types):
                 sums.surface_error_at_command[i, s] += bound.declared_errors.acceleration_error_per_rad[
                     i, s
                 ] * abs(u[s])
-    if bound.model_error_map.one_surface_anywhere:
+    if bound.model_error_map.one_surface_may_be_anywhere:
         for j in range(bound.model_error_map.n_levels):
             for i in range(3):
-                bound.additional_map_error[j, i] += prediction.frame_share_per_instant * additional_map_error(
-                    bound.model_error_map, j, i
+                bound.additional_error_by_travel_level[j, i] += (
+                    prediction.frame_share_per_instant
+                    * additional_error_at_travel_level(bound.model_error_map, j, i)
                 )
     if diagnoses_all_types:
         for s, axis in enumerate(layout.dominant_axis):
@@ -173,7 +174,9 @@ def evaluate_bound_and_frame_means(prediction, bound, measured, k, dt):
     bound.eta_bar[:] = bound.eta_bar_now
     if bound.declared_errors.has_declared_errors:
         for i in range(3):
-            bound.gyro_change_bound[i] = changing_gyro_error_bound(bound.declared_errors, i, measured.x[i])
+            bound.gyro_error_change_bound[i] = changing_gyro_error_bound(
+                bound.declared_errors, i, measured.x[i]
+            )
     if k > 0:
         fill_frame_means(prediction, bound)
 
@@ -182,7 +185,7 @@ def evaluate_bound_and_frame_means(prediction, bound, measured, k, dt):
 def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
     prediction.x_before[:] = measured.x
-    bound.gyro_change_bound_before[:] = bound.gyro_change_bound
+    bound.gyro_error_change_bound_before[:] = bound.gyro_error_change_bound
     sums = prediction.sums
     sums.f[:], sums.eta_bar[:] = 0.0, 0.0
     sums.G[:], sums.Gu[:] = 0.0, 0.0
@@ -190,7 +193,7 @@ def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
     if bound.has_declared_surface_errors:
         sums.effectiveness_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
-    bound.additional_map_error[:] = 0.0
+    bound.additional_error_by_travel_level[:] = 0.0
     add_instant_to_sums(prediction, bound, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu
 

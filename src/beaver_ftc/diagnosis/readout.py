@@ -80,16 +80,16 @@ class SurfaceFaultTypes(NamedTuple):
 class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
-    eta_bar_rad_s2: bound on the model's error over the frame; gyro_change_bound_rad_s: bound on the change
-    of a rate's reading by errors of its gyro. inertia_coupling_share; constant_bound_rad_s2;
+    eta_bar_rad_s2: bound on the model's error over the frame; gyro_error_change_bound_rad_s: bound on the
+    change of a rate's reading by errors of its gyro. inertia_coupling_share; constant_error_bound_rad_s2;
     earth_rate_rad_s. Of gyros: error gyro_error_offset + gyro_error_per_rate |rate|, of the offset what does
     not change, gyro_constant_error; zero where none is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
-    gyro_change_bound_rad_s: np.ndarray
+    gyro_error_change_bound_rad_s: np.ndarray
     inertia_coupling_share: np.ndarray
-    constant_bound_rad_s2: np.ndarray
+    constant_error_bound_rad_s2: np.ndarray
     earth_rate_rad_s: float
     gyro_error_offset_rad_s: np.ndarray
     gyro_constant_error_rad_s: np.ndarray
@@ -113,7 +113,7 @@ class MappedModelError(NamedTuple):
     error_bound_rad_s2: np.ndarray
 
 
-class Hypothesis(NamedTuple):
+class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
     kind: of `likelihood`; surface, axis: which. raises_alarm: whether it may raise the alarm. score: largest
@@ -132,12 +132,12 @@ class OnsetTests(NamedTuple):
     either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
 
     score: np.ndarray
-    supporting_sign: np.ndarray
-    correlation_in_calm_air: np.ndarray
-    coarse_gust_part: np.ndarray
+    supporting_correlation_sign: np.ndarray
+    correlation_by_calm_air: np.ndarray
+    correlation_by_coarse_gust: np.ndarray
 
 
-class FilterBlock(NamedTuple):
+class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
     axis_indices: of its states. correlation_length: of the drift, m; 0 for none. drift_intensity_scale:
@@ -149,7 +149,7 @@ class FilterBlock(NamedTuple):
     correlation_length: float
     drift_intensity_scale: float
     regressor_tolerance: np.ndarray
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[StatisticalHypothesis, ...]
     onset_tests: OnsetTests
 
 
@@ -276,9 +276,10 @@ class DiagnosisReadout:
             for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
         )
         return DeclaredBounds(
-            eta_bar_rad_s2=bound["eta_bar"].copy(), gyro_change_bound_rad_s=bound["gyro_change_bound"].copy(),
+            eta_bar_rad_s2=bound["eta_bar"].copy(),
+            gyro_error_change_bound_rad_s=bound["gyro_error_change_bound"].copy(),
             inertia_coupling_share=bound["inertia_coupling"].copy(),
-            constant_bound_rad_s2=bound["constant_bound"].copy(),
+            constant_error_bound_rad_s2=bound["constant_error_bound"].copy(),
             earth_rate_rad_s=float(bound["earth_rate_rad_s"]), gyro_error_offset_rad_s=gyro_error_offset,
             gyro_constant_error_rad_s=gyro_constant_error, gyro_error_per_rate=gyro_error_per_rate,
         )  # fmt: skip
@@ -308,7 +309,7 @@ class DiagnosisReadout:
         return float(self._fdi["statistical"]["test_config"]["alarm_level"])
 
     @cached_property
-    def filter_blocks(self) -> tuple[FilterBlock, ...]:
+    def filter_blocks(self) -> tuple[StatisticalBlock, ...]:
         """The filters of the statistical detector."""
         return tuple(map(_read_block, self._fdi["statistical"]["block"]))
 
@@ -348,7 +349,7 @@ def arrays_of_every_frame(
     """
     estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     views = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_change_bound"],
+        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
         "offset": estimators["effect"]["base_acceleration"], "slope": estimators["effect"]["regressor"],
         "spread": estimators["effect"]["error_bound"], "excluded": estimators["excluded"],
         "types": surfaces["feasible_sets"]["excluded"],
@@ -424,23 +425,25 @@ def _read_surface(surface: np.void) -> SurfaceFaultTypes:
     return SurfaceFaultTypes(actuator, surface["feasible_sets"]["excluded"].astype(bool))
 
 
-def _read_block(block: np.void) -> FilterBlock:
+def _read_block(block: np.void) -> StatisticalBlock:
     hypotheses = tuple(map(_read_hypothesis, block["hypothesis"][: block["n_hypotheses"]]))
     n_hypotheses = len(hypotheses)
     onset_tests = (
         block["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
         for name in OnsetTests._fields
     )
-    return FilterBlock(
+    return StatisticalBlock(
         tuple(block["axis"][: block["n_axes"]].tolist()),
         float(block["correlation_length"]), float(block["drift_intensity_scale"]),
         block["regressor_tolerance"][: block["n_regressors"]].copy(), hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip
 
 
-def _read_hypothesis(hypothesis: np.void) -> Hypothesis:
+def _read_hypothesis(hypothesis: np.void) -> StatisticalHypothesis:
     kind_surface_axis = int(hypothesis["kind"]), int(hypothesis["surface"]), int(hypothesis["axis"])
-    return Hypothesis(*kind_surface_axis, bool(hypothesis["raises_alarm"]), float(hypothesis["score"]))
+    return StatisticalHypothesis(
+        *kind_surface_axis, bool(hypothesis["raises_alarm"]), float(hypothesis["score"])
+    )
 
 
 def read_sensor_monitor(monitor: np.void) -> SensorMonitor:

@@ -520,7 +520,7 @@ def account(frame):
     if truth.faulted:
         account_authority(sums.authority, control.axes)
     else:
-        filters.update_max_threshold_ratios(frame.fdi.bank)
+        filters.update_max_residual_over_threshold(frame.fdi.bank)
         statistical.update_max_score(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)

@@ -462,7 +462,7 @@ def landing_of(
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     closest = tuple(
         float(share)
-        for share in fdi["bank"]["output"]["max_threshold_ratio_so_far"][
+        for share in fdi["bank"]["output"]["max_residual_over_threshold_so_far"][
             : max(int(fdi["bank"]["config"]["n_filters"]), 1)
         ]
     )

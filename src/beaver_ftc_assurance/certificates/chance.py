@@ -202,9 +202,9 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
             block.drift_intensity_scale * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
         )
     onset_tests = block.onset_tests
-    sense, explained = onset_tests.supporting_sign[h, slot], {
-        "calm_air_prediction": onset_tests.correlation_in_calm_air,
-        "coarse_gust_response": onset_tests.coarse_gust_part,
+    sense, explained = onset_tests.supporting_correlation_sign[h, slot], {
+        "calm_air_prediction": onset_tests.correlation_by_calm_air,
+        "coarse_gust_response": onset_tests.correlation_by_coarse_gust,
     }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss

@@ -9,7 +9,7 @@ from statistics_of import Across
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.likelihood import MIN_UNCERTAINTY_BOUND_RAD_S2, STEP_FAULT
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_RECORD_SIZE, configure_views
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_RECORD_SIZE, configure_parity_views
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
 from beaver_ftc.diagnosis.state import LOSS, POSITION
 
@@ -40,7 +40,10 @@ def fdi(rng):
     """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    statistical["test_config"]["evidence_decay_factor"], statistical["noise"]["relative_walk_intensity"] = (
+    (
+        statistical["test_config"]["evidence_decay_factor"],
+        statistical["noise"]["drift_intensity_over_squared_bound"],
+    ) = (
         0.9,
         2.0,
     )
@@ -53,7 +56,7 @@ def fdi(rng):
         block["gyro_noise_variance"][:n] = rng.uniform(1e-8, 1e-7, n)
         block["regressor"] = rng.normal(size=block["regressor"].shape)
         block["regressor_tolerance"][:regressors] = rng.uniform(0.1, 0.2, regressors)
-    configure_views(statistical, load())
+    configure_parity_views(statistical, load())
     parity.configure_tone_tests(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["gust"]
     (
@@ -117,7 +120,7 @@ def declared_along(statistical, m):
         walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["gust_drift_intensity"]) @ turned.T
     moves = float(air["output"]["is_turbulent"])
     size = max(bound, MIN_UNCERTAINTY_BOUND_RAD_S2)
-    drift = statistical["noise"]["relative_walk_intensity"] * size**2 + moves * V * m @ walk @ m
+    drift = statistical["noise"]["drift_intensity_over_squared_bound"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["input_noise_variance"])) ** 2
     return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["axes_turn_variance"] @ m
 
@@ -254,7 +257,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
     for view in statistical["views"][:2]:
-        onset_tests, overlap = view["block"]["onset_tests"], view["block"]["regressor_overlap"]
+        onset_tests, overlap = view["block"]["onset_tests"], view["block"]["regressor_correlation"]
         for name in ("correlation", "information", "signature_filter_state"):
             onset_tests[name] = rng.uniform(1.0, 2.0, onset_tests[name].shape)
         overlap[:] = rng.uniform(1.0, 2.0, overlap.shape)
@@ -273,7 +276,13 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors
         likelihood.update_block(block, own["uncertainty_bound"], has_regressors, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
-        for name in ("correlation", "information", "regressor_overlap", "coefficient_error_part", "score"):
+        for name in (
+            "correlation",
+            "information",
+            "regressor_correlation",
+            "correlation_bound_by_coefficient_errors",
+            "score",
+        ):
             assert onset_tests_of(view["block"], name) == pytest.approx(
                 onset_tests_of(block, name), rel=1e-12
             ), name
@@ -317,7 +326,7 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
             0.5 + b,
             0.01 + b,
         )
-    configure_views(statistical, load())
+    configure_parity_views(statistical, load())
     for v, view in enumerate(statistical["views"][:5]):
         axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
         block, n = view["block"], int(axes["n_regressors"])
@@ -333,6 +342,6 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
         losses = {PITCH_AXIS: [ELEVATOR, FLAP], PAST_AILERON: [RUDDER], PAST_RUDDER: [AILERON]}
         assert tried["surface"].tolist() == [-1, *losses.get(v, [AILERON, RUDDER])]
         assert tried["kind"].tolist() == [STEP_FAULT] + [LOSS] * (len(tried) - 1)
-        sense = by_onset(block, "supporting_sign")
+        sense = by_onset(block, "supporting_correlation_sign")
         assert (sense[:, : len(tried)] == -1.0 * (tried["kind"] == LOSS)).all()
         assert (sense[:, len(tried) :] == 0.0).all()

@@ -17,8 +17,8 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
     noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_change_bound_before"] = eta[k], noise[k]
-        fdi["bound"]["gyro_change_bound"] = noise[k + 1]
+        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["gyro_error_change_bound"] = noise[k + 1]
         on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
@@ -59,17 +59,17 @@ def test_the_alarm_is_of_the_first_axis_on_which_a_filter_leaves_its_bound():
 def test_the_closest_approach_of_every_filter_is_kept():
     fdi = with_shares(*LEAVES)
     alarm = fdi["statistical"]["alarm"]
-    fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3], alarm["score_over_alarm_level"] = (
+    fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3], alarm["score_over_alarm_level"] = (
         (0.6, 0.0, 0.0),
         0.4,
     )
-    filters.update_max_threshold_ratios(fdi["bank"])
+    filters.update_max_residual_over_threshold(fdi["bank"])
     statistical.update_max_score(alarm)
-    assert fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
+    assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert alarm["max_score_over_alarm_level"] == 0.4
     silent = new_fdi()
-    filters.update_max_threshold_ratios(silent["bank"])
-    assert not silent["bank"]["output"]["max_threshold_ratio_so_far"].any()
+    filters.update_max_residual_over_threshold(silent["bank"])
+    assert not silent["bank"]["output"]["max_residual_over_threshold_so_far"].any()
     assert on(filters.max_residual_threshold_ratio, silent) == 0.0
 
 
@@ -156,8 +156,8 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     with np.errstate(divide="ignore"):
         assert on(filters.max_residual_threshold_ratio, fdi) == pytest.approx(1.5)
         assert [filters.filter_nearest_to_alarm(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.update_max_threshold_ratios(fdi["bank"])
-    assert fdi["bank"]["output"]["max_threshold_ratio_so_far"][:3] == pytest.approx([0.0, 1.5, 1.2])
+        filters.update_max_residual_over_threshold(fdi["bank"])
+    assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.0, 1.5, 1.2])
     assert on(filters.bank_alarm_axis, fdi) == 0
 
 

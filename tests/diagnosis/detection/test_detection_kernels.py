@@ -70,7 +70,7 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
-    fdi["bound"]["gyro_change_bound"] = 0.1, 0.2, 0.3
+    fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
     on(detection_filters.start_fdae, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["memory"]["threshold_gyro_error_part"] == pytest.approx([0.1, 0.2, 0.3])
@@ -131,8 +131,8 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_change_bound_before"] = eta[k], noise[k]
-        fdi["bound"]["gyro_change_bound"], record["output"]["residual"] = noise[k + 1], 99.0
+        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["gyro_error_change_bound"], record["output"]["residual"] = noise[k + 1], 99.0
         on(detection_filters.predict_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
@@ -149,7 +149,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record = fdi["fdae"]
     record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["threshold_gyro_error_part"], fdi["bound"]["gyro_change_bound"] = 0.1, 0.2
+    record["memory"]["threshold_gyro_error_part"], fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2
     on(detection_filters.fill_fdae_unknown_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
@@ -181,7 +181,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     record["sums"]["surface_error_at_command"], record["sums"]["effectiveness_error_per_rad"] = (
         (99.0, 99.0) if has_declared_surface_errors else (0.0, 0.0)
     )
-    fdi["bound"]["gyro_change_bound"] = 0.1, 0.2, 0.3
+    fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
     measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
     measured["x"] = 1.0, 2.0, 3.0
     seen = instants(count)
@@ -203,7 +203,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     Gu = np.array([G * u for _, G, u, _, _ in seen])
     mean = record["frame_means"]
     assert record["x_before"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["bound"]["gyro_change_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
+    assert fdi["bound"]["gyro_error_change_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
     assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
     assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
     assert mean["acceleration"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))

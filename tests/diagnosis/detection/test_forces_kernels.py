@@ -14,9 +14,14 @@ from beaver_ftc.diagnosis.detection.forces import (
     NORMAL_COMPONENT,
     SIDE_COMPONENT,
     configure_forces,
-    update_forces,
+    update_all_force_innovations,
 )
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, configure_tone_tests, configure_views
+from beaver_ftc.diagnosis.detection.parity import (
+    AXIS_VIEW,
+    VANE_VIEW,
+    configure_parity_views,
+    configure_tone_tests,
+)
 from beaver_ftc.diagnosis.state import NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
@@ -75,7 +80,7 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
     record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates"] = rate, 1
-    update_forces(record, fdi["statistical"]["gust"], seen, U, DT)
+    update_all_force_innovations(record, fdi["statistical"]["gust"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
     expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
@@ -99,7 +104,7 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
-    update_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
+    update_all_force_innovations(record, fdi["statistical"]["gust"], measured(), U, DT)
     force = record["component"][f]
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
@@ -144,7 +149,7 @@ def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
         for error in course:
             y = Y.copy()
             y[place] += error
-            update_forces(record, fdi["statistical"]["gust"], measured(y=y), U, DT)
+            update_all_force_innovations(record, fdi["statistical"]["gust"], measured(y=y), U, DT)
         left.append(
             (
                 record["component"][f]["innovation_at_inertial_flow_angle"],
@@ -160,7 +165,7 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
     fdi = felt()
     record = fdi["statistical"]["forces"]
     for _ in range(11):
-        update_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
+        update_all_force_innovations(record, fdi["statistical"]["gust"], measured(), U, DT)
     for f, place in ((SIDE_COMPONENT, 1), (NORMAL_COMPONENT, 0)):
         force = record["component"][f]
         assert force["inertial_flow_angle"] == pytest.approx(
@@ -182,9 +187,11 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
     for _ in range(1500):
         y = Y + np.array([*(std[0] * rng.normal(size=2)), std[1] * rng.normal(), std[2] * rng.normal(), 0.0])
-        update_forces(record, fdi["statistical"]["gust"], measured(X + std[3] * rng.normal(size=3), y), U, DT)
+        update_all_force_innovations(
+            record, fdi["statistical"]["gust"], measured(X + std[3] * rng.normal(size=3), y), U, DT
+        )
         drawn.append(record["component"]["innovation"].copy())
-    update_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
+    update_all_force_innovations(record, fdi["statistical"]["gust"], measured(), U, DT)
     assert np.sqrt(record["component"]["noise_variance"][:, 0]) == pytest.approx(
         np.std(drawn, axis=0), rel=0.06
     )
@@ -198,7 +205,9 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
     fdi = felt(Bounds(sensors={"qdyn": {"noise_std_pa": 4.0}}))
     record, innovation = fdi["statistical"]["forces"], []
     for more in (0.5, -0.5, 0.0):
-        update_forces(record, fdi["statistical"]["gust"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT)
+        update_all_force_innovations(
+            record, fdi["statistical"]["gust"], measured(y=Y + np.array([0, 0, 0, more, 0])), U, DT
+        )
         innovation.append(record["component"]["innovation"].copy())
     slopes = innovation[0] - innovation[1]
     assert record["component"]["noise_variance"] == pytest.approx(
@@ -213,7 +222,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
         fdi, y = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
         record, drawn = fdi["statistical"]["forces"], []
         for noise in rng.normal(0.0, (0.04, 0.07), (1500, 2)):
-            update_forces(
+            update_all_force_innovations(
                 record, fdi["statistical"]["gust"], measured(y=y, force=(0.5, *(noise - (0.0, 9.5)))), U, DT
             )
             drawn.append(record["component"]["innovation"].copy())
@@ -234,7 +243,7 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
     """As one more constant, 1 / c of the bias, and as a share of the whole."""
     sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
     record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
-    update_forces(record, felt()["statistical"]["gust"], measured(), U, DT)
+    update_all_force_innovations(record, felt()["statistical"]["gust"], measured(), U, DT)
     for f, bias, scale in ((SIDE_COMPONENT, 0.2, 0.0), (NORMAL_COMPONENT, 0.3, 0.01)):
         force, before = record["component"][f], none["component"][f]
         n = int(force["n_regressors"])
@@ -271,7 +280,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     statistical = viewed["statistical"]
     air, views = statistical["gust"], statistical["views"]
     air["output"]["is_turbulent"] = 1
-    configure_views(statistical, AIRCRAFT)
+    configure_parity_views(statistical, AIRCRAFT)
     views["direction"][ELEVATOR_VIEW], views["decaying_peak_score"][ELEVATOR_VIEW] = (
         (0.0, 0.3, 0.0, 0.0, -0.95),
         9.0,
@@ -283,7 +292,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
         views["decaying_peak_score"][UP_VIEW] = 50.0
         assert Across.alarm(statistical, views[ELEVATOR_VIEW]) == 9.0 * read
         views["decaying_peak_score"][UP_VIEW] = 0.0
-        assert Across.uses_gust_estimate(statistical, views[0]) == bool(read)
+        assert Across.subtracts_gust_estimate(statistical, views[0]) == bool(read)
         assert Across.part(viewed, views[0], np.ones(3), PITCH) == pytest.approx(1.0 - 0.2 * read)
         assert Across.shown(statistical, views[0]) == (0.0 if read else 7.0), "nothing is to be cleared"
         assert Across.shown(statistical, views[ELEVATOR_VIEW]) == 0.0
@@ -316,7 +325,9 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
     Across.turn(viewed, view, rng.normal(size=(3, 4)))
     Across.blur(view, statistical, 45.0)
     m = view["direction"]
-    by_both = np.abs(m[:3] @ air["output"]["rate_damping"]) + np.abs(m[3:] @ component["damping"])
+    by_both = np.abs(m[:3] @ air["output"]["rate_damping"]) + np.abs(
+        m[3:] @ component["innovation_per_air_rotation"]
+    )
     still = float(view["block"]["drift_intensity"][0, 0])
     air["memory"]["gust_drift_intensity"] = 0.0
     Across.blur(view, statistical, 45.0)
@@ -406,10 +417,10 @@ def viewed():
         statistical["test_config"]["isolation_llr_margin"],
         statistical["test_config"]["evidence_decay_factor"],
     ) = 6.0, 0.5 * 5.0**2, 0.99
-    configure_views(statistical, AIRCRAFT)
+    configure_parity_views(statistical, AIRCRAFT)
     configure_tone_tests(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     for _ in range(2):
-        update_forces(statistical["forces"], statistical["gust"], measured(), U, DT)
+        update_all_force_innovations(statistical["forces"], statistical["gust"], measured(), U, DT)
     fdi["layout"]["position_estimator"] = range(4)
     return fdi
 
@@ -418,8 +429,8 @@ def viewed():
 def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
     force = new_fdi()["statistical"]["forces"]["component"][0]
     force["predicted_scaled_force"] = 1.6
-    forces.fill_lag_error_bound(force, before, begun, 0.004)
-    assert force["lag_error_bound"] == pytest.approx(expected)
+    forces.fill_force_flow_lag_error_bound(force, before, begun, 0.004)
+    assert force["force_flow_lag_error_bound"] == pytest.approx(expected)
 
 
 def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
@@ -427,7 +438,7 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
     Across.blur(view, statistical, 45.0)
     before = float(view["uncertainty_bound"][0])
-    statistical["forces"]["component"]["lag_error_bound"][NORMAL_COMPONENT] = 0.5
+    statistical["forces"]["component"]["force_flow_lag_error_bound"][NORMAL_COMPONENT] = 0.5
     Across.blur(view, statistical, 45.0)
     assert view["uncertainty_bound"][0] == pytest.approx(before + 0.8 * 0.5)
 
@@ -437,10 +448,12 @@ def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     component = statistical["forces"]["component"]
     then, seen = component["predicted_scaled_force"].copy(), measured()
     seen["y"][1] += 0.01
-    update_forces(statistical["forces"], statistical["gust"], seen, U, DT)
+    update_all_force_innovations(statistical["forces"], statistical["gust"], seen, U, DT)
     changed = np.abs(component["predicted_scaled_force"] - then)
     assert changed[SIDE_COMPONENT] > 0.01
-    assert component["lag_error_bound"] == pytest.approx(forces.MAX_FORCE_FLOW_LAG_S * changed / DT)
+    assert component["force_flow_lag_error_bound"] == pytest.approx(
+        forces.MAX_FORCE_FLOW_LAG_S * changed / DT
+    )
 
 
 def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
@@ -489,7 +502,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     what errors of the vane's column let show is the most that its corners do."""
     statistical, rng = viewed["statistical"], np.random.default_rng(3)
     statistical["gust"]["output"]["is_turbulent"] = 1
-    configure_views(statistical, AIRCRAFT)
+    configure_parity_views(statistical, AIRCRAFT)
     view, moving = statistical["views"][BETA_VIEW], statistical["gust"]
     moving = moving["output"]
     moving["rate_damping"], moving["gust_axes_in_body"] = (
@@ -521,7 +534,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
 def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     statistical = viewed["statistical"]
     statistical["gust"]["output"]["is_turbulent"] = 1
-    configure_views(statistical, AIRCRAFT)
+    configure_parity_views(statistical, AIRCRAFT)
     view = statistical["views"][BETA_VIEW]
     view["direction"] = 0.6, 0.0, 0.8, 0.0, 0.0
     statistical["gust"]["output"]["rate_damping"] = 0.0
@@ -600,11 +613,11 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     fdi = felt()
     statistical, swinging = fdi["statistical"], measured()
     statistical["test_config"]["alarm_level"], statistical["test_config"]["evidence_decay_factor"] = 6.0, 0.99
-    configure_views(statistical, AIRCRAFT)
+    configure_parity_views(statistical, AIRCRAFT)
     configure_tone_tests(statistical["tone_config"], 1e-8, 45.0, 15.0, DT)
     swinging["force"][1] += 20.0
     for looks in (1, 2):
-        update_forces(statistical["forces"], statistical["gust"], swinging, U, DT)
+        update_all_force_innovations(statistical["forces"], statistical["gust"], swinging, U, DT)
         assert statistical["forces"]["n_updates"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         active = [v for v in statistical["views"] if parity.uses_force(v) and parity.max_test_score(v) > 0.0]
@@ -658,7 +671,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     (
         statistical["noise"]["input_noise_variance"],
         statistical["noise"]["uncertainty_bound"],
-        statistical["noise"]["relative_walk_intensity"],
+        statistical["noise"]["drift_intensity_over_squared_bound"],
     ) = (
         (1e-6, 4e-6, 9e-6),
         0.02,
@@ -671,7 +684,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         np.eye(3),
     )
     air["memory"]["gust_drift_intensity"] = 1e-5, 2e-5, 3e-5
-    component["noise_variance"], component["deflection_error_effect"] = (
+    component["noise_variance"], component["deflection_error_effect_bound"] = (
         ((2e-6, 1e-7), (3e-5, 2e-5)),
         (0.001, 0.002),
     )
@@ -696,7 +709,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     m, block = view["direction"], view["block"]
     rate_gust_sensitivity, force_gust_sensitivity = (
         np.abs(m[:3] @ air["output"]["rate_damping"]),
-        1.2 * np.abs(m[3:] @ component["damping"]),
+        1.2 * np.abs(m[3:] @ component["innovation_per_air_rotation"]),
     )
     gusts = 45.0 * np.sum(
         (np.sqrt(seen) * rate_gust_sensitivity + force_gust_sensitivity) ** 2
@@ -724,7 +737,7 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(dynamic_pressure_over_t
     sensors = {"alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}}
     fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
     record = fdi["statistical"]["forces"]
-    update_forces(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
+    update_all_force_innovations(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
     slopes = dynamic_pressure_over_trim * record["component"]["vane_error_effect_per_rad"][:, 1]
     noise = np.radians([0.02, 0.03])
     assert record["dynamic_pressure_over_trim"] == pytest.approx(dynamic_pressure_over_trim)
@@ -736,13 +749,13 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     """A vane that is off by little: forces give back where the flow is."""
     fdi = felt()
     record, air = fdi["statistical"]["forces"], fdi["statistical"]["gust"]
-    update_forces(record, air, measured(), U, DT)
+    update_all_force_innovations(record, air, measured(), U, DT)
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
         for f in (SIDE_COMPONENT, NORMAL_COMPONENT)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
-    update_forces(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
+    update_all_force_innovations(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
     forces.fill_readings_without_vanes(
         record, np.zeros(3), np.append(off, np.zeros(record["y_without_vanes"].size - 5))
     )
@@ -751,7 +764,11 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     forces.fill_readings_without_vanes(
         record, turning, np.append(off, np.zeros(record["y_without_vanes"].size - 5))
     )
-    damped = record["component"]["damping"] @ turning / record["component"]["vane_error_effect_per_rad"][:, 1]
+    damped = (
+        record["component"]["innovation_per_air_rotation"]
+        @ turning
+        / record["component"]["vane_error_effect_per_rad"][:, 1]
+    )
     assert still - record["y_without_vanes"][:2] == pytest.approx(damped[::-1])
 
 
@@ -777,7 +794,7 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
 def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
         viewed["statistical"]["gust"]["output"]["is_turbulent"] = moving
-        configure_views(viewed["statistical"], AIRCRAFT)
+        configure_parity_views(viewed["statistical"], AIRCRAFT)
         confirming_force = viewed["statistical"]["views"]["confirming_force"][:5].tolist()
         assert confirming_force == [moving * NORMAL_FORCE, 0, moving * SIDE_FORCE, moving * SIDE_FORCE, 0]
 
@@ -815,7 +832,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     fdi = felt()
     statistical = fdi["statistical"]
     statistical["gust"]["output"]["is_turbulent"] = 1
-    configure_views(statistical, aircraft)
+    configure_parity_views(statistical, aircraft)
     views = statistical["views"][: statistical["n_views"]]
     found = [(int(view["orthogonal_to_surface"]), tuple(view["plane_axes"].tolist())) for view in views[5:]]
     assert found == expected

@@ -65,7 +65,7 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
             assert information[slot, h] == pytest.approx(s @ inverse @ s, rel=1e-6)
             assert correlation[slot, h] == pytest.approx(s @ inverse @ nu.ravel(), rel=1e-6, abs=1e-9)
             overlap = [s @ inverse @ regressors[:, j].ravel() for j in range(3)]
-            assert by_onset(block, "regressor_overlap")[:3, slot, h] == pytest.approx(
+            assert by_onset(block, "regressor_correlation")[:3, slot, h] == pytest.approx(
                 overlap, rel=1e-6, abs=1e-9
             )
 
@@ -139,10 +139,13 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     nu = drawn(_block("two axes"), frames, DT, rng)
     clean = by_onset(_shown(_block("two axes", STEP_FAULT), nu, signatures), "correlation")[-1, 0]
     blank = _shown(_block("two axes", STEP_FAULT, tolerance=tolerance), nu, signatures, regressors)
-    worst = np.sign(clean) * np.sign(by_onset(blank, "regressor_overlap")[:2, -1, 0]) * tolerance
+    worst = np.sign(clean) * np.sign(by_onset(blank, "regressor_correlation")[:2, -1, 0]) * tolerance
     wrong = nu + np.einsum("j,kjn->kn", worst, regressors)
     block = _shown(_block("two axes", STEP_FAULT, tolerance=tolerance), wrong, signatures, regressors)
-    seen, slack = by_onset(block, "correlation")[-1, 0], by_onset(block, "coefficient_error_part")[-1, 0]
+    seen, slack = (
+        by_onset(block, "correlation")[-1, 0],
+        by_onset(block, "correlation_bound_by_coefficient_errors")[-1, 0],
+    )
     assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
 
@@ -176,7 +179,7 @@ def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
     return np.array(
         [
-            likelihood.max_uncertainty_part(
+            likelihood.correlation_bound_by_uncertainty(
                 block["onset_tests"][0], k, *block["transient_uncertainty_response"]
             )
             for k in range(N_ONSET_SLOTS)
@@ -220,7 +223,7 @@ def test_each_frame_counts_keep_times_what_the_next_one_counts():
         block = _block("one axis", STEP_FAULT, tolerance=(0.1, 0.2))
         _shown(block, nu[:k], signatures[:k], regressors[:k], keep=keep)
         N, D = by_onset(block, "correlation")[-1, 0], by_onset(block, "information")[-1, 0]
-        return np.array([N, D, *by_onset(block, "regressor_overlap")[:2, -1, 0]])
+        return np.array([N, D, *by_onset(block, "regressor_correlation")[:2, -1, 0]])
 
     each = np.diff([np.zeros(4), *(after(k, 1.0) for k in range(1, frames + 1))], axis=0)
     assert after(frames, keep) == pytest.approx(keep ** np.arange(frames)[::-1] @ each, rel=1e-9)

@@ -52,23 +52,23 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
     names = (
         "correlation",
         "information",
-        "constant_uncertainty_part",
-        "varying_uncertainty_part",
-        "bounded_rate_uncertainty_part",
-        "correlation_in_calm_air",
+        "correlation_bound_by_constant_uncertainty",
+        "correlation_bound_by_varying_uncertainty",
+        "correlation_bound_by_rate_limited_uncertainty",
+        "correlation_by_calm_air",
         "remaining_growth",
         "signature_filter_state",
         "correlation_weight",
-        "regressor_overlap",
+        "regressor_correlation",
     )
     for name in names[:-1]:
         block["onset_tests"][name] = 3.0
-    block["regressor_overlap"] = 3.0
+    block["regressor_correlation"] = 3.0
     likelihood.reset_onset_slot(block, 4)
     for name in names:
         kept = by_onset(block, name)
         assert (np.delete(kept, 4, axis=-2) == 3.0).all(), name
-        cleared = kept[:2, 4] if name == "regressor_overlap" else kept[..., 4, :]
+        cleared = kept[:2, 4] if name == "regressor_correlation" else kept[..., 4, :]
         assert (cleared == (1.0 if name == "remaining_growth" else 0.0)).all(), name
 
 
@@ -115,19 +115,31 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
         likelihood.accumulate_correlations(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
-    constant_uncertainty_part, swings = old @ np.abs(w) @ [0.1, 0.2], old @ changes @ [0.3, 0.4]
-    bounded_rate_uncertainty_part = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert onset_tests["constant_uncertainty_part"][lane] == pytest.approx(constant_uncertainty_part)
-    assert onset_tests["varying_uncertainty_part"][lane] == pytest.approx(swings)
-    assert onset_tests["bounded_rate_uncertainty_part"][lane] == pytest.approx(bounded_rate_uncertainty_part)
-    last = np.abs(w[-1]) @ [0.3, 0.4]
-    allowed = likelihood.max_uncertainty_part(onset_tests, lane, *block["transient_uncertainty_response"])
-    assert allowed == pytest.approx(
-        constant_uncertainty_part + min(swings + last, bounded_rate_uncertainty_part)
+    correlation_bound_by_constant_uncertainty, swings = (
+        old @ np.abs(w) @ [0.1, 0.2],
+        old @ changes @ [0.3, 0.4],
     )
-    onset_tests["bounded_rate_uncertainty_part"][lane] = 99.0
-    allowed = likelihood.max_uncertainty_part(onset_tests, lane, *block["transient_uncertainty_response"])
-    assert allowed == pytest.approx(constant_uncertainty_part + swings + last)
+    correlation_bound_by_rate_limited_uncertainty = old @ np.abs(w) @ [0.3, 0.4] * 0.05
+    assert onset_tests["correlation_bound_by_constant_uncertainty"][lane] == pytest.approx(
+        correlation_bound_by_constant_uncertainty
+    )
+    assert onset_tests["correlation_bound_by_varying_uncertainty"][lane] == pytest.approx(swings)
+    assert onset_tests["correlation_bound_by_rate_limited_uncertainty"][lane] == pytest.approx(
+        correlation_bound_by_rate_limited_uncertainty
+    )
+    last = np.abs(w[-1]) @ [0.3, 0.4]
+    allowed = likelihood.correlation_bound_by_uncertainty(
+        onset_tests, lane, *block["transient_uncertainty_response"]
+    )
+    assert allowed == pytest.approx(
+        correlation_bound_by_constant_uncertainty
+        + min(swings + last, correlation_bound_by_rate_limited_uncertainty)
+    )
+    onset_tests["correlation_bound_by_rate_limited_uncertainty"][lane] = 99.0
+    allowed = likelihood.correlation_bound_by_uncertainty(
+        onset_tests, lane, *block["transient_uncertainty_response"]
+    )
+    assert allowed == pytest.approx(correlation_bound_by_constant_uncertainty + swings + last)
 
 
 def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
@@ -145,24 +157,26 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
         "signature_filter_state",
         "correlation",
         "information",
-        "coefficient_error_part",
+        "correlation_bound_by_coefficient_errors",
     ):
         block["onset_tests"][name] = rng.normal(size=block["onset_tests"][name].shape)
-    block["regressor_overlap"] = rng.normal(size=block["regressor_overlap"].shape)
+    block["regressor_correlation"] = rng.normal(size=block["regressor_correlation"].shape)
     kept_by_name = (
         "signature_for_onset",
         "signature_filter_state",
         "correlation",
         "information",
-        "regressor_overlap",
+        "regressor_correlation",
     )
     before = {name: onset_tests_of(block, name) for name in kept_by_name}
-    for onset_tests, overlap in zip(block["onset_tests"], block["regressor_overlap"], strict=True):
+    for onset_tests, overlap in zip(block["onset_tests"], block["regressor_correlation"], strict=True):
         likelihood.accumulate_correlations(block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep)
-        likelihood.accumulate_regressor_overlap(block, onset_tests, overlap, N_ONSET_TESTS_PER_GROUP, keep)
+        likelihood.accumulate_regressor_correlation(
+            block, onset_tests, overlap, N_ONSET_TESTS_PER_GROUP, keep
+        )
     lane = {
         name: onset_tests_of(block, name)
-        for name in (*kept_by_name, "correlation_weight", "coefficient_error_part")
+        for name in (*kept_by_name, "correlation_weight", "correlation_bound_by_coefficient_errors")
     }
     x, d = before["signature_filter_state"][:2], before["signature_filter_state"][2:]
     r = x + dt * (before["signature_for_onset"] - d)
@@ -171,10 +185,12 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     assert lane["correlation_weight"] == pytest.approx(w)
     assert lane["correlation"] == pytest.approx(keep * before["correlation"] + seen @ w)
     assert lane["information"] == pytest.approx(keep * before["information"] + (w * r).sum(axis=0))
-    overlaps = keep * before["regressor_overlap"][:2] + regressors @ w
-    assert lane["regressor_overlap"][:2] == pytest.approx(overlaps)
-    assert lane["regressor_overlap"][2:] == pytest.approx(before["regressor_overlap"][2:])
-    assert lane["coefficient_error_part"] == pytest.approx(np.array([0.1, 0.2]) @ np.abs(overlaps))
+    overlaps = keep * before["regressor_correlation"][:2] + regressors @ w
+    assert lane["regressor_correlation"][:2] == pytest.approx(overlaps)
+    assert lane["regressor_correlation"][2:] == pytest.approx(before["regressor_correlation"][2:])
+    assert lane["correlation_bound_by_coefficient_errors"] == pytest.approx(
+        np.array([0.1, 0.2]) @ np.abs(overlaps)
+    )
 
 
 @pytest.mark.parametrize(
@@ -237,7 +253,7 @@ def test_what_calm_air_foretells_is_taken_off_where_it_speaks_for_the_fault(kind
             for name, value in {
                 "correlation": sided * 8.0 or 8.0,
                 "information": 4.0,
-                "correlation_in_calm_air": it,
+                "correlation_by_calm_air": it,
             }.items():
                 block["onset_tests"][name][0, :N_ONSET_SLOTS] = value
             likelihood.evaluate_hypotheses(block)
@@ -250,10 +266,10 @@ def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
     rng = np.random.default_rng(9)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), LOSS, STEP_FAULT, tolerance=(0.1, 0.2))
     block["alarm_level"], block["regressor"][:2] = 4.0, rng.normal(size=(2, 2))
-    names = (*block["onset_tests"].dtype.names, "regressor_overlap")
+    names = (*block["onset_tests"].dtype.names, "regressor_correlation")
     for name in names[:-1]:
         block["onset_tests"][name] = rng.uniform(1.0, 2.0, block["onset_tests"][name].shape)
-    block["regressor_overlap"] = rng.uniform(1.0, 2.0, block["regressor_overlap"].shape)
+    block["regressor_correlation"] = rng.uniform(1.0, 2.0, block["regressor_correlation"].shape)
     before = {name: onset_tests_of(block, name) for name in names}
     block["hypothesis"]["signature"], block["frame_innovation"] = rng.normal(size=2), rng.normal(size=2)
     likelihood.reset_onset_slot(block, 3)
@@ -264,7 +280,11 @@ def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
 
 def test_a_lane_without_information_comes_to_nothing():
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *MAX_HYPOTHESES * (LOSS,))
-    block["onset_tests"]["supporting_sign"], block["onset_tests"]["correlation"], block["alarm_level"] = (
+    (
+        block["onset_tests"]["supporting_correlation_sign"],
+        block["onset_tests"]["correlation"],
+        block["alarm_level"],
+    ) = (
         -1.0,
         -5.0,
         4.0,
@@ -280,7 +300,7 @@ def test_a_lane_without_information_comes_to_nothing():
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    block["hypothesis"]["growth_decay_factor"], block["onset_tests"]["remaining_growth"] = 0.8, 1.0
+    block["hypothesis"]["remaining_growth_decay_factor"], block["onset_tests"]["remaining_growth"] = 0.8, 1.0
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
@@ -324,12 +344,12 @@ def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
     lane = block["onset_tests"][0]
-    lane["supporting_sign"], lane["correlation"], lane["information"] = (
-        likelihood.SUPPORTING_SIGN_BY_KIND[kind],
+    lane["supporting_correlation_sign"], lane["correlation"], lane["information"] = (
+        likelihood.SUPPORTING_CORRELATION_SIGN_BY_KIND[kind],
         -7.0 * 9.0,
         81.0,
     )
-    lane["constant_uncertainty_part"] = 6.0 * 9.0
+    lane["correlation_bound_by_constant_uncertainty"] = 6.0 * 9.0
     likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, True)
     assert lane["llr_lower_bound"][0] == pytest.approx(certain)
     likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, False)
@@ -367,10 +387,10 @@ def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_all
 def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
     block["alarm_level"], block["noise_share_of_alarm_level"] = 1.0, 0.5
-    onsets, onset_tests, overlap = [1, 5], block["onset_tests"][0], block["regressor_overlap"][0]
+    onsets, onset_tests, overlap = [1, 5], block["onset_tests"][0], block["regressor_correlation"][0]
     onset_tests["correlation"][onsets], onset_tests["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
     onset_tests["correlation"][7] = -99.0  # nothing is known of that onset
-    overlap[:2, 1], overlap[:2, 5], onset_tests["constant_uncertainty_part"][onsets] = (
+    overlap[:2, 1], overlap[:2, 5], onset_tests["correlation_bound_by_constant_uncertainty"][onsets] = (
         (1.0, -2.0),
         (-3.0, 4.0),
         rooms,
@@ -378,7 +398,7 @@ def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_mos
     hypothesis = block["hypothesis"][0]
     hypothesis["score"], hypothesis["llr_lower_bound"], hypothesis["llr_upper_bound"] = 99.0, 99.0, at_most
     if has_regressors:
-        likelihood.accumulate_regressor_overlap(block, onset_tests, overlap, N_ONSET_SLOTS, 1.0)
+        likelihood.accumulate_regressor_correlation(block, onset_tests, overlap, N_ONSET_SLOTS, 1.0)
     likelihood.evaluate_hypotheses(block, memory)
     return hypothesis
 
@@ -595,7 +615,7 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     )
     gains = rng.normal(size=(2, 2))
     record["block"]["K_d"], record["block"]["drift_decay_factor"] = gains, 1.0
-    Statistical.filter_residual_mean(record, surprise, DT)
+    Statistical.filter_innovation_after_known_faults(record, surprise, DT)
     axes = [(1,), (0, 2)][b]
     left = DT * (surprise - mean)[list(axes)]
     drift = gains[: len(axes), : len(axes)] @ left

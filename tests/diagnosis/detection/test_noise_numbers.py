@@ -59,7 +59,7 @@ def test_gusts_drift_as_the_specification_has_them(turbulence):
 def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
     """eta_bar omega sqrt(2 sqrt 2 / i w0), w0 = (i / n)^(1/4); so fast that it hardly grows beside a loss."""
     eta_bar, omega, noise, level, dt = 0.02, 500.0, 1e-3, 6.0, 1e-3
-    i = statistical.derive_relative_walk_intensity(eta_bar, omega, noise, level, dt) * eta_bar**2
+    i = statistical.derive_drift_intensity_over_squared_bound(eta_bar, omega, noise, level, dt) * eta_bar**2
     ramp = 4.0 * (1.204 * eta_bar / level) ** 2 * omega
     walk = sqrt(i**2 - ramp**2)
     w0 = (walk / (noise**2 * dt)) ** 0.25
@@ -69,19 +69,22 @@ def test_a_swing_takes_half_the_level_where_gyros_are_noisy():
 def test_what_grows_beside_a_loss_takes_half_the_level():
     """eta_bar sqrt(omega / i) times 1.204, where next to nothing is left of the swing."""
     eta_bar, omega, level = 0.02, 3.0, 6.0
-    i = statistical.derive_relative_walk_intensity(eta_bar, omega, 1e-12, level, 1e-12) * eta_bar**2
+    i = (
+        statistical.derive_drift_intensity_over_squared_bound(eta_bar, omega, 1e-12, level, 1e-12)
+        * eta_bar**2
+    )
     assert 1.204 * eta_bar * sqrt(omega / i) == pytest.approx(level / 2, rel=1e-4)
 
 
 def test_without_noise_the_frame_rate_is_the_bandwidth():
     eta_bar, omega, level, dt = 0.02, 50.0, 6.0, 0.05
-    i = statistical.derive_relative_walk_intensity(eta_bar, omega, 0.0, level, dt) * eta_bar**2
+    i = statistical.derive_drift_intensity_over_squared_bound(eta_bar, omega, 0.0, level, dt) * eta_bar**2
     assert eta_bar * omega * sqrt(2.0 * sqrt(2.0) * dt / i) == pytest.approx(level / 2)
 
 
 def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
     none, least, more = (
-        statistical.derive_relative_walk_intensity(bound, 10.0, 1e-4, 6.0, 0.01)
+        statistical.derive_drift_intensity_over_squared_bound(bound, 10.0, 1e-4, 6.0, 0.01)
         for bound in (0.0, 1e-3, 2e-3)
     )
     assert none == least != more
@@ -89,7 +92,10 @@ def test_a_bound_of_zero_is_reckoned_with_as_a_small_one():
 
 def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
     record = np.zeros(1, statistical_dtype())[0]
-    record["noise"]["relative_walk_intensity"], record["test_config"]["alarm_level"] = rapidity, 6.0
+    record["noise"]["drift_intensity_over_squared_bound"], record["test_config"]["alarm_level"] = (
+        rapidity,
+        6.0,
+    )
     return statistical.drift_correlation_length(record, V, rate_hz, moving * rolling)
 
 
@@ -168,7 +174,7 @@ def test_the_times_and_levels_of_a_detector(alone):
         assert block["alarm_level"] == record["test_config"]["alarm_level"]
         assert block["noise_share_of_alarm_level"] == 0.5
         assert block["uncertainty_change_per_frame"] == pytest.approx(15.0 / 50.0)
-        assert block["hypothesis"]["growth_decay_factor"] == pytest.approx(exp(-1.5 / 50.0))
+        assert block["hypothesis"]["remaining_growth_decay_factor"] == pytest.approx(exp(-1.5 / 50.0))
     for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
         assert [block["noise_share_of_alarm_level"] for block in Detector(50.0, bounds=bounds).blocks] == [
             chance
@@ -317,10 +323,10 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
 
 def test_the_walk_is_that_of_the_largest_bound_and_the_noisiest_gyro():
     record = Detector(50.0, bounds=UNEVEN).detector
-    expected = statistical.derive_relative_walk_intensity(
+    expected = statistical.derive_drift_intensity_over_squared_bound(
         0.05, 15.0, radians(0.2), float(record["test_config"]["alarm_level"]), 0.02
     )
-    assert record["noise"]["relative_walk_intensity"] == pytest.approx(expected)
+    assert record["noise"]["drift_intensity_over_squared_bound"] == pytest.approx(expected)
 
 
 def test_vanes_and_airspeed_err_together_in_the_gust_they_see():
@@ -366,7 +372,7 @@ def test_a_sense_is_kept_for_every_onset(alone):
         n = int(block["n_hypotheses"])
         kinds = block["hypothesis"]["kind"][:n]
         signs = [{LOSS: -1.0, GROWING_LOSS: -1.0, LOSS_END: 1.0}.get(int(kind), 0.0) for kind in kinds]
-        sense = by_onset(block, "supporting_sign")
+        sense = by_onset(block, "supporting_correlation_sign")
         assert (sense[:, :n] == signs).all()
         assert not sense[:, n:].any()
 

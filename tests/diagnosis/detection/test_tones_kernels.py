@@ -77,10 +77,12 @@ def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_c
     found = view["tone_tests"]
     assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):
-        assert as_complex(found["regressor_overlap"][j]) == pytest.approx(resonance(2.0 * regressors[:, j]))
+        assert as_complex(found["regressor_correlation"][j]) == pytest.approx(
+            resonance(2.0 * regressors[:, j])
+        )
     faded = np.exp(-2.0 * EVERY * DT * np.arange(30) / TONE_MEMORY_S).sum()
     assert found["correlation_variance"] == pytest.approx(EVERY * faded)
-    assert not found["regressor_overlap"][3:].any()
+    assert not found["regressor_correlation"][3:].any()
 
 
 def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
@@ -131,7 +133,7 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)
     mean = parity.max_bounded_uncertainty_gain(TONE_FREQUENCIES_RAD_S, PACE)
-    assert view["tone_tests"]["max_uncertainty_part"] == pytest.approx(
+    assert view["tone_tests"]["correlation_bound_by_uncertainty"] == pytest.approx(
         2.0 * passed * mean * (faded.sum() + beat)
     )
 
@@ -177,26 +179,32 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 @given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=2))
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
     record = new_fdi()["statistical"]["views"][0]["tone_tests"]
-    record["regressor_overlap"][0, :, 4], size = parts, np.hypot(*parts)
-    parity.fill_coefficient_part(record, np.array([0.3]), 1)
-    assert 0.3 * size * (1.0 - 1e-12) <= record["coefficient_error_part"][4] <= 0.3 * 1.0825 * size + 1e-300
-    assert record["coefficient_error_part"][5] == 0.0
+    record["regressor_correlation"][0, :, 4], size = parts, np.hypot(*parts)
+    parity.fill_correlation_bound_by_coefficient_errors(record, np.array([0.3]), 1)
+    assert (
+        0.3 * size * (1.0 - 1e-12)
+        <= record["correlation_bound_by_coefficient_errors"][4]
+        <= 0.3 * 1.0825 * size + 1e-300
+    )
+    assert record["correlation_bound_by_coefficient_errors"][5] == 0.0
 
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
     record = view["tone_tests"]
-    record["regressor_overlap"][:] = 9.0
+    record["regressor_correlation"][:] = 9.0
     (
-        record["regressor_overlap"][:2, 0],
-        record["regressor_overlap"][:2, 1],
-        record["coefficient_error_part"],
+        record["regressor_correlation"][:2, 0],
+        record["regressor_correlation"][:2, 1],
+        record["correlation_bound_by_coefficient_errors"],
     ) = (
         -3.0,
         0.0,
         7.0,
     )
-    parity.fill_coefficient_part(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["coefficient_error_part"] == pytest.approx(np.full(N_TONE_FREQUENCIES, 0.9))
+    parity.fill_correlation_bound_by_coefficient_errors(record, np.array([0.1, 0.2, 0.4]), 2)
+    assert record["correlation_bound_by_coefficient_errors"] == pytest.approx(
+        np.full(N_TONE_FREQUENCIES, 0.9)
+    )
 
 
 def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_config, rng):
@@ -205,7 +213,7 @@ def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_s
     loud = np.array([np.abs(resonance(row)) for row in noise.reshape(4000, -1)])
     age_s = EVERY * DT * np.arange(150)
     root = np.sqrt(
-        tone_config["larger_part_variance_share"] * EVERY * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
+        tone_config["larger_complex_part_variance_share"] * EVERY * np.exp(-2.0 * age_s / TONE_MEMORY_S).sum()
     )
     for x in (1.0, 2.0, 3.0):
         share = np.mean(loud / root > x, axis=0)
@@ -221,18 +229,18 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
         80.0,
     )
     (
-        record["coefficient_error_part"][3],
+        record["correlation_bound_by_coefficient_errors"][3],
         record["correlation"][0, 7],
-        tone_config["larger_part_variance_share"][:],
+        tone_config["larger_complex_part_variance_share"][:],
     ) = (
         10.0,
         12.0,
         0.6,
     )
     parity.fill_tone_score(record, tone_config, 6.0)
-    root = sqrt(100.0 * tone_config["larger_part_variance_share"][3])
+    root = sqrt(100.0 * tone_config["larger_complex_part_variance_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["max_uncertainty_part"][3] = 200.0
+    record["correlation_bound_by_uncertainty"][3] = 200.0
     parity.fill_tone_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["correlation"][:] = 0.0

@@ -43,7 +43,7 @@ class Mapped(DesignPlant):
     def __init__(self, **given):
         super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
         self.map = self.fdi["bound"]["model_error_map"]
-        self.map["one_surface_anywhere"], self.map["several_surfaces_anywhere"] = 1, 0
+        self.map["one_surface_may_be_anywhere"], self.map["several_surfaces_may_be_anywhere"] = 1, 0
         self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
         self.amplitude *= 0.3
 
@@ -70,7 +70,7 @@ def test_no_healthy_flight_alarms(uncertainty):
     for seed in range(5):
         plant = Mapped(seed=seed).fly(FRAMES, UNCERTAINTIES[uncertainty])
         assert plant.detected_at_s == np.inf
-        assert plant.fdi["bank"]["output"]["max_threshold_ratio_so_far"].max() > 0.9
+        assert plant.fdi["bank"]["output"]["max_residual_over_threshold_so_far"].max() > 0.9
 
 
 @pytest.mark.parametrize("course", POSITIONS)
@@ -86,10 +86,11 @@ def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
     """Ablation: without what a surface at fault adds, and with the whole travel for the alarm as well."""
     assert not any(flown("jumps", seed=seed).position_excluded(ELEVATOR) for seed in range(4))
     assert any(
-        flown("jumps", seed=seed, one_surface_anywhere=0).position_excluded(ELEVATOR) for seed in range(4)
+        flown("jumps", seed=seed, one_surface_may_be_anywhere=0).position_excluded(ELEVATOR)
+        for seed in range(4)
     )
     for whole, found in ((0, True), (1, False)):
-        changes = {"uncertainty": "hide", "several_surfaces_anywhere": whole}
+        changes = {"uncertainty": "hide", "several_surfaces_may_be_anywhere": whole}
         hidden = [flown("bias", seed=seed, **changes) for seed in range(4)]
         assert all(np.isfinite(plant.detected_at_s) == found for plant in hidden)
 
@@ -113,7 +114,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
     fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
-        bound["model_error_map"]["one_surface_anywhere"],
+        bound["model_error_map"]["one_surface_may_be_anywhere"],
         bound["model_error_map"]["n_levels"],
         bound["model_error_map"]["travel_share"][:3],
     ) = (
@@ -123,7 +124,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     )
     bound["model_error_map"]["travel_low"], bound["model_error_map"]["travel_high"] = -0.5, 0.5
     (
-        bound["additional_map_error"][:3],
+        bound["additional_error_by_travel_level"][:3],
         bound["frame_innovation_bound"],
         fdi["bank"]["output"]["innovation"],
     ) = (

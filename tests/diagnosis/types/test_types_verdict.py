@@ -338,7 +338,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
 
 def conclude(fdi, kernel, *given, lead=()):
     """Hand a finding of the types to the conclusion."""
-    conclusion.record_isolation_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
+    conclusion.record_fault_type_finding(fdi["verdict"], (*on(kernel, fdi, *given), *lead))
 
 
 def take_lead(fdi, kernel, *given):
@@ -697,7 +697,10 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     Z[:, :, YAW] += 5.0
     for k in range(length):
         fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["gyro_change_bound_before"], fdi["bound"]["gyro_change_bound"] = noise[k], noise[k + 1]
+        fdi["bound"]["gyro_error_change_bound_before"], fdi["bound"]["gyro_error_change_bound"] = (
+            noise[k],
+            noise[k + 1],
+        )
         fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
         fdi["isolation"]["estimator"]["effect"]["base_acceleration"][:8] = offset[k]
         fdi["isolation"]["estimator"]["effect"]["error_bound"][:8] = spread[k]

@@ -52,12 +52,12 @@ def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
 
 
 @kernel
-def advance_gyro_error_bound(filtered_gyro_bound, gyro_change_bound, decay_factor):
+def advance_gyro_error_bound(filtered_gyro_bound, gyro_error_change_bound, decay_factor):
     """Advance the filtered bound on a gyro's changing error, rad/s, by one frame; nbar as the frame began.
 
     See bounds.py: what a residual may owe to the gyro is this and the present nbar.
     """
-    return decay_factor * filtered_gyro_bound + (1.0 - decay_factor) * gyro_change_bound
+    return decay_factor * filtered_gyro_bound + (1.0 - decay_factor) * gyro_error_change_bound
 
 
 @kernel
@@ -93,7 +93,7 @@ def residual_interval(
 
 
 @kernel
-def norm_bound_interval(theta_min, theta_max, filtered_regressor, theta_estimate, uncertainty_bound):
+def published_threshold_interval(theta_min, theta_max, filtered_regressor, theta_estimate, uncertainty_bound):
     """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
     Zhang2002].
     """
@@ -105,13 +105,17 @@ def norm_bound_interval(theta_min, theta_max, filtered_regressor, theta_estimate
 
 
 # The bank of detection filters; filter 0 is the published one. decay_factor: a_m; residual, threshold and its
-# parts rad/s; innovation rad/s2; max_threshold_ratio_so_far: of residual over threshold, in healthy flight.
+# parts rad/s; innovation rad/s2; max_residual_over_threshold_so_far: of residual over threshold, in healthy
+# flight.
 BANK_CONFIG_RECORD = record(n_filters=int, decay_factor=MAX_POLES)
 BANK_MEMORY_RECORD = record(
     threshold_uncertainty_part=(MAX_POLES, 3), threshold_gyro_error_part=(MAX_POLES, 3)
 )
 BANK_OUTPUT_RECORD = record(
-    innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), max_threshold_ratio_so_far=MAX_POLES
+    innovation=3,
+    residual=(MAX_POLES, 3),
+    threshold=(MAX_POLES, 3),
+    max_residual_over_threshold_so_far=MAX_POLES,
 )
 BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
 
@@ -131,9 +135,9 @@ def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: flo
 
 
 @kernel
-def start_bank(bank, gyro_change_bound):
-    """Start with the full bound on the change of the gyros' errors, gyro_change_bound (3,) rad/s."""
-    bank.memory.threshold_gyro_error_part[: bank.config.n_filters] = gyro_change_bound
+def start_bank(bank, gyro_error_change_bound):
+    """Start with the full bound on the change of the gyros' errors, gyro_error_change_bound (3,) rad/s."""
+    bank.memory.threshold_gyro_error_part[: bank.config.n_filters] = gyro_error_change_bound
 
 
 @kernel
@@ -168,7 +172,8 @@ def update_bank(bank, bound, x, x_before, predicted_acceleration, dt):
     for i in range(3):
         bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
         bound.frame_innovation_bound[i] = (
-            bound.eta_bar[i] + (bound.gyro_change_bound[i] + bound.gyro_change_bound_before[i]) / dt
+            bound.eta_bar[i]
+            + (bound.gyro_error_change_bound[i] + bound.gyro_error_change_bound_before[i]) / dt
         )
         for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
             bank.output.residual[m, i] = (
@@ -178,12 +183,14 @@ def update_bank(bank, bound, x, x_before, predicted_acceleration, dt):
                 bank.memory.threshold_uncertainty_part[m, i], bound.eta_bar[i], decay_factor, dt
             )
             bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
-                bank.memory.threshold_gyro_error_part[m, i], bound.gyro_change_bound_before[i], decay_factor
+                bank.memory.threshold_gyro_error_part[m, i],
+                bound.gyro_error_change_bound_before[i],
+                decay_factor,
             )
             bank.output.threshold[m, i] = (
                 bank.memory.threshold_uncertainty_part[m, i]
                 + bank.memory.threshold_gyro_error_part[m, i]
-                + bound.gyro_change_bound[i]
+                + bound.gyro_error_change_bound[i]
             )
 
 
@@ -226,12 +233,12 @@ def max_residual_threshold_ratio(bank):
 
 
 @kernel
-def update_max_threshold_ratios(bank):
+def update_max_residual_over_threshold(bank):
     """Keep the largest share of its bound that each filter has reached."""
     for m in range(bank.config.n_filters):
         for i in range(3):
-            bank.output.max_threshold_ratio_so_far[m] = max(
-                bank.output.max_threshold_ratio_so_far[m], residual_threshold_ratio(bank, m, i)
+            bank.output.max_residual_over_threshold_so_far[m] = max(
+                bank.output.max_residual_over_threshold_so_far[m], residual_threshold_ratio(bank, m, i)
             )
 
 
@@ -247,7 +254,7 @@ def fault_acceleration_range(fie, i):
 
 
 @kernel
-def fault_parity_range(fie):
+def fault_acceleration_range_along_parity(fie):
     """The same along `fie.parity_direction` (3,), in which the fault has little effect."""
     effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.effect, 0.0, 0.0, 0.0
     for i in range(3):
@@ -263,7 +270,11 @@ def fault_parity_range(fie):
 def advance_reachable_residuals(bank, fie, dt):
     """Advance the reach of the fault in each filter since the flight began; channel 3: `parity_direction`."""
     for channel in range(4):
-        low, high = fault_acceleration_range(fie, channel) if channel < 3 else fault_parity_range(fie)
+        low, high = (
+            fault_acceleration_range(fie, channel)
+            if channel < 3
+            else fault_acceleration_range_along_parity(fie)
+        )
         for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
             fie.reachable_effect_low[m, channel] = (
                 decay_factor * fie.reachable_effect_low[m, channel] + dt * low
@@ -414,12 +425,12 @@ def train_network(network, residual, threshold, do_weights_leak, dt):
 
 
 @kernel
-def start_fdae(fdae, gyro_change_bound, x):
+def start_fdae(fdae, gyro_error_change_bound, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
 
-    gyro_change_bound (3,) rad/s: by how much the gyros' errors may change.
+    gyro_error_change_bound (3,) rad/s: by how much the gyros' errors may change.
     """
-    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, gyro_change_bound
+    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, gyro_error_change_bound
 
 
 @kernel
@@ -475,25 +486,25 @@ def predict_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_w
             fdae.memory.threshold_uncertainty_part[i], bound.eta_bar[i], decay_factor, dt
         )
         fdae.memory.threshold_gyro_error_part[i] = advance_gyro_error_bound(
-            fdae.memory.threshold_gyro_error_part[i], bound.gyro_change_bound_before[i], decay_factor
+            fdae.memory.threshold_gyro_error_part[i], bound.gyro_error_change_bound_before[i], decay_factor
         )
         fdae.output.threshold[i] = (
             fdae.memory.threshold_uncertainty_part[i]
             + fdae.memory.threshold_gyro_error_part[i]
-            + bound.gyro_change_bound[i]
+            + bound.gyro_error_change_bound[i]
         )
 
 
 @kernel
-def fill_fdae_unknown_acceleration(fdae, gyro_change_bound, out):
+def fill_fdae_unknown_acceleration(fdae, gyro_error_change_bound, out):
     """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's gyro_change_bound (3,) rad/s alone explains
-    stays out of it, and off the surfaces.
+    weights, at the bandwidth of the estimator. What the gyro's gyro_error_change_bound (3,) rad/s alone
+    explains stays out of it, and off the surfaces.
     """
     for i in range(3):
-        noise_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_change_bound[i]
+        noise_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_error_change_bound[i]
         out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * apply_dead_zone(
             fdae.output.residual[i], noise_bound
         )

@@ -35,7 +35,7 @@ TYPICAL_BODY_RATE_RAD_S, TYPICAL_PATH_SLOPE_RAD = 0.2, 0.3  # typical rates and 
 MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
 MAX_FORCE_FLOW_LAG_S = 0.002
-DRIFT_SHARE_CHANGING_PER_S = 0.3  # share of a drift that may change within a second
+FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
 SIDESLIP_RATE_TERM_TOLERANCE = {
     False: 0.05,
     True: 0.2,
@@ -52,16 +52,16 @@ FORCE_RECORD = record(
     innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
     innovation_per_flow_angle_drift=float, innovation_drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    surface_effect_per_rad=MAX_SURFACES, predicted_surface_effect_per_rad=MAX_SURFACES,
+    surface_effect_per_rad=MAX_SURFACES, previous_surface_effect_per_rad=MAX_SURFACES,
     surface_effect_at_command=MAX_SURFACES, surface_effect_per_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane_error_effect_per_rad=2, vane_error_roll_acceleration_per_rad=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
     noise_variance_in_trim=2, noise_variance=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
-    damping=3, deflection_error_effect=float,
+    innovation_per_air_rotation=3, deflection_error_effect_bound=float,
     predicted_scaled_force=float,  # e of the model, rad/s2
-    lag_error_bound=float,  # bound on its error by a time lag, rad/s2
+    force_flow_lag_error_bound=float,  # bound on its error by a time lag, rad/s2
     # variance of e by noise of the accelerometer; independent of the pressure
     accelerometer_innovation_variance=float,
     n_regressors=int, regressor_tolerance=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
@@ -80,7 +80,7 @@ MEASURED_FORCES_RECORD = record(
 
 
 @kernel
-def update_forces(forces, gust, measured, u, dt):
+def update_all_force_innovations(forces, gust, measured, u, dt):
     """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
@@ -92,17 +92,17 @@ def update_forces(forces, gust, measured, u, dt):
     for f in range(2):
         scaled_force_before = forces.component[f].predicted_scaled_force
         update_force_innovation(forces, gust, f, measured, u)
-        fill_lag_error_bound(forces.component[f], scaled_force_before, forces.n_updates, dt)
+        fill_force_flow_lag_error_bound(forces.component[f], scaled_force_before, forces.n_updates, dt)
         integrate_inertial_flow_angle(forces, forces.component[f], f, measured.y, dt)
     fill_flow_angle_rates(forces, measured)
     forces.n_updates = min(forces.n_updates + 1, MIN_FORCE_UPDATES)
 
 
 @kernel
-def fill_lag_error_bound(force, scaled_force_before, has_earlier_update, dt):
-    """Fill `lag_error_bound` from the change of the model's e since `scaled_force_before`: force and flow
-    differ in time."""
-    force.lag_error_bound = (
+def fill_force_flow_lag_error_bound(force, scaled_force_before, has_earlier_update, dt):
+    """Fill `force_flow_lag_error_bound` from the change of the model's e since `scaled_force_before`: force
+    and flow differ in time."""
+    force.force_flow_lag_error_bound = (
         MAX_FORCE_FLOW_LAG_S * abs(force.predicted_scaled_force - scaled_force_before) / dt
         if has_earlier_update
         else 0.0
@@ -119,7 +119,7 @@ def fill_readings_without_vanes(forces, air_rotation, y):
     for f in range(2):
         force, vane_index, rotation_effect = forces.component[f], BETA if f == SIDE_COMPONENT else ALPHA, 0.0
         for k in range(3):
-            rotation_effect += force.damping[k] * air_rotation[k]
+            rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
             force.innovation / forces.dynamic_pressure_over_trim + rotation_effect
         ) / force.vane_error_effect_per_rad[1]
@@ -157,7 +157,7 @@ def update_force_innovation(forces, gust, f, measured, u):
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
     scaled_force = 0.0
-    force.predicted_surface_effect_per_rad[:] = force.surface_effect_per_rad
+    force.previous_surface_effect_per_rad[:] = force.surface_effect_per_rad
     force.surface_effect_per_rad[:], force.surface_effect_per_rad_error_bound[:] = 0.0, 0.0
     for k in range(first_term, end_term):
         s, unit_effect = table.surface[k], acceleration_per_coefficient * table.power[table.monomial[k]]
@@ -181,9 +181,9 @@ def update_force_innovation(forces, gust, f, measured, u):
         scaled_force += sideslip_rate_effect
     force.regressor[force.n_regressors - 1], force.predicted_scaled_force = scaled_force, scaled_force
     if forces.n_updates == 0:
-        force.predicted_surface_effect_per_rad[:] = force.surface_effect_per_rad
+        force.previous_surface_effect_per_rad[:] = force.surface_effect_per_rad
     for s in range(u.size):
-        force.surface_effect_at_command[s] = force.predicted_surface_effect_per_rad[s] * u[s]
+        force.surface_effect_at_command[s] = force.previous_surface_effect_per_rad[s] * u[s]
     force.innovation = measured.force[1 + f] * forces.inverse_chord_per_m - scaled_force
     pressure_noise_effect = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     for k in range(2):
@@ -258,7 +258,7 @@ def configure_forces(
         slopes, slipstream_slope = slopes_with_slipstream[:-1], slopes_with_slipstream[-1]
         force["vane_error_effect_per_rad"] = (-acceleration_slopes_by_y[axis, vane], -slopes[vane])
         force["vane_error_roll_acceleration_per_rad"] = -acceleration_slopes_by_y[0, vane]
-        force["damping"] = slopes[3:]
+        force["innovation_per_air_rotation"] = slopes[3:]
         total_slopes = slopes.copy()
         total_slopes[AIRSPEED] += slipstream_slope * slipstream_per_airspeed
         variance_parts = (total_slopes * reading_noise_std) ** 2
@@ -280,13 +280,13 @@ def configure_forces(
         acceleration_per_rad = acceleration_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
-        force["deflection_error_effect"] = acceleration_per_rad * declared.actuators.deflection_rad
+        force["deflection_error_effect_bound"] = acceleration_per_rad * declared.actuators.deflection_rad
         force["flow_angle_drift_bound"] = _flow_angle_drift_bound(
             sensors, gust["config"]["gravity"], y[AIRSPEED], f
         )
-        drift_intensity = (DRIFT_SHARE_CHANGING_PER_S * force["flow_angle_drift_bound"]) ** 2 + dt_s * (
-            accelerometer_noise_std / y[AIRSPEED]
-        ) ** 2
+        drift_intensity = (
+            FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force["flow_angle_drift_bound"]
+        ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
         force["innovation_drift_intensity"] = slopes[vane] ** 2 * (
             drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )

@@ -76,7 +76,7 @@ MAX_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, an
 MIN_UNCERTAINTY_BOUND_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP_FAULT, ALPHA_CUBED_EFFECT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
-SUPPORTING_SIGN_BY_KIND = {
+SUPPORTING_CORRELATION_SIGN_BY_KIND = {
     LOSS: -1.0,
     STEP_FAULT: 0.0,
     ALPHA_CUBED_EFFECT: 0.0,
@@ -98,14 +98,14 @@ CALM_AIR_SHARE_MARGIN_STD = 2.0  # standard deviations by which lambda is taken 
 HYPOTHESIS_RECORD = record(
     kind=int, surface=int, axis=int, raises_alarm=int, log_column_index=int,
     signature=2,  # s of this frame, rad/s2 per unit of theta
-    growth_decay_factor=float,  # exp(-kappa dt) of a growing loss
+    remaining_growth_decay_factor=float,  # exp(-kappa dt) of a growing loss
     score=float,  # largest normalised evidence over the onsets, standard deviations
     theta_estimate=float, theta_information=float,  # estimate at the likeliest onset; one over its variance
     llr_lower_bound=float, llr_upper_bound=float,  # bounds on the log-likelihood ratio against no fault
 )  # fmt: skip
 
 
-class Capacity(NamedTuple):
+class BlockCapacity(NamedTuple):
     """The numbers of regressors and hypotheses for which a block has memory."""
 
     max_regressors: int
@@ -119,20 +119,21 @@ class Capacity(NamedTuple):
 HYPOTHESES_PER_TEST_GROUP = 4
 N_ONSET_TESTS_PER_GROUP = HYPOTHESES_PER_TEST_GROUP * N_ONSET_SLOTS
 ONSET_TESTS_RECORD = record(
-    supporting_sign=N_ONSET_TESTS_PER_GROUP,  # sign of N that supports the hypothesis, or 0
+    supporting_correlation_sign=N_ONSET_TESTS_PER_GROUP,  # sign of N that supports the hypothesis, or 0
     signature_for_onset=(2, N_ONSET_TESTS_PER_GROUP),  # s since the onset, rad/s2
     signature_filter_state=(4, N_ONSET_TESTS_PER_GROUP),
     correlation_weight=(2, N_ONSET_TESTS_PER_GROUP),  # w = S^-1 g_s of the frame
     correlation=N_ONSET_TESTS_PER_GROUP, information=N_ONSET_TESTS_PER_GROUP,  # N; D
-    coefficient_error_part=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
+    correlation_bound_by_coefficient_errors=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
     remaining_growth=N_ONSET_TESTS_PER_GROUP,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
     signature_at_loss_end=(2, N_ONSET_TESTS_PER_GROUP),  # rad/s2
     # shares of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its rate of
     # change
-    constant_uncertainty_part=N_ONSET_TESTS_PER_GROUP, varying_uncertainty_part=N_ONSET_TESTS_PER_GROUP,
-    bounded_rate_uncertainty_part=N_ONSET_TESTS_PER_GROUP,
+    correlation_bound_by_constant_uncertainty=N_ONSET_TESTS_PER_GROUP,
+    correlation_bound_by_varying_uncertainty=N_ONSET_TESTS_PER_GROUP,
+    correlation_bound_by_rate_limited_uncertainty=N_ONSET_TESTS_PER_GROUP,
     # shares of N: of lambda p; of a roughly visible gust
-    correlation_in_calm_air=N_ONSET_TESTS_PER_GROUP, coarse_gust_part=N_ONSET_TESTS_PER_GROUP,
+    correlation_by_calm_air=N_ONSET_TESTS_PER_GROUP, correlation_by_coarse_gust=N_ONSET_TESTS_PER_GROUP,
     score=N_ONSET_TESTS_PER_GROUP,
     llr_lower_bound=N_ONSET_TESTS_PER_GROUP, llr_upper_bound=N_ONSET_TESTS_PER_GROUP,
     llr=N_ONSET_TESTS_PER_GROUP,  # log-likelihood ratio
@@ -147,23 +148,23 @@ _FILTER_FIELDS = {
 FILTER_RECORD = record(**_FILTER_FIELDS)
 
 
-def set_supporting_signs(block: np.void, kinds: Sequence[int]) -> None:
+def set_supporting_correlation_signs(block: np.void, kinds: Sequence[int]) -> None:
     """Fill the sign of N that supports each hypothesis, in all of its onset tests."""
-    block["onset_tests"]["supporting_sign"] = 0.0
+    block["onset_tests"]["supporting_correlation_sign"] = 0.0
     for h, kind in enumerate(kinds):
         first_test = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
-        block["onset_tests"]["supporting_sign"][
+        block["onset_tests"]["supporting_correlation_sign"][
             h // HYPOTHESES_PER_TEST_GROUP, first_test : first_test + N_ONSET_SLOTS
-        ] = SUPPORTING_SIGN_BY_KIND[kind]
+        ] = SUPPORTING_CORRELATION_SIGN_BY_KIND[kind]
 
 
-def max_test_groups(capacity: Capacity) -> int:
+def max_test_groups(capacity: BlockCapacity) -> int:
     """The number of groups of onset tests that the hypotheses of a block need."""
     return (capacity.max_hypotheses + HYPOTHESES_PER_TEST_GROUP - 1) // HYPOTHESES_PER_TEST_GROUP
 
 
 @sized
-def block_dtype(capacity: Capacity) -> np.dtype:
+def block_dtype(capacity: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
     return record(
         axis=(int, 2),  # first: a record that begins as another does is taken for one
@@ -184,7 +185,7 @@ def block_dtype(capacity: Capacity) -> np.dtype:
         n_hypotheses=int, hypothesis=(HYPOTHESIS_RECORD, capacity.max_hypotheses),
         onset_tests=(ONSET_TESTS_RECORD, max_test_groups(capacity)),
         # R_j of each onset test
-        regressor_overlap=(max_test_groups(capacity), capacity.max_regressors, N_ONSET_TESTS_PER_GROUP),
+        regressor_correlation=(max_test_groups(capacity), capacity.max_regressors, N_ONSET_TESTS_PER_GROUP),
     )  # fmt: skip
 
 
@@ -192,7 +193,7 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
-    blocks, n = np.zeros(1, block_dtype(Capacity(1, 1))), len(R)
+    blocks, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
     block, rates, drifts = blocks[0], slice(0, n), slice(n, 2 * n)
     block["n_axes"], block["axis"], block["gyro_noise_variance"][:n] = n, (0, 1), R
     for name, rows, columns in (("P_xx", rates, rates), ("P_xd", rates, drifts), ("P_dd", drifts, drifts)):
@@ -351,13 +352,13 @@ def onset_slot_to_reset(frame):
 
 
 @kernel
-def count_onset_tests(block, g):
+def n_onset_tests_in_group(block, g):
     """The number of onset tests in use in group g: the first entries of each array."""
     return min(block.n_hypotheses - g * HYPOTHESES_PER_TEST_GROUP, HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
 
 
 @kernel
-def count_test_groups(block):
+def n_test_groups(block):
     """The number of groups of onset tests in use."""
     return (block.n_hypotheses + HYPOTHESES_PER_TEST_GROUP - 1) // HYPOTHESES_PER_TEST_GROUP
 
@@ -365,19 +366,21 @@ def count_test_groups(block):
 @kernel
 def reset_onset_slot(block, slot):
     """Restart a slot: its onset is the next frame, without evidence."""
-    for g in range(count_test_groups(block)):
+    for g in range(n_test_groups(block)):
         onset_tests = block.onset_tests[g]
-        for k in range(slot, count_onset_tests(block, g), N_ONSET_SLOTS):
+        for k in range(slot, n_onset_tests_in_group(block, g), N_ONSET_SLOTS):
             onset_tests.correlation[k] = onset_tests.information[k] = 0.0
             onset_tests.correlation_weight[0, k] = onset_tests.correlation_weight[1, k] = 0.0
-            onset_tests.constant_uncertainty_part[k] = onset_tests.varying_uncertainty_part[k] = 0.0
-            onset_tests.bounded_rate_uncertainty_part[k] = 0.0
-            onset_tests.correlation_in_calm_air[k] = onset_tests.coarse_gust_part[k] = 0.0
+            onset_tests.correlation_bound_by_constant_uncertainty[
+                k
+            ] = onset_tests.correlation_bound_by_varying_uncertainty[k] = 0.0
+            onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = 0.0
+            onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_by_coarse_gust[k] = 0.0
             onset_tests.remaining_growth[k] = 1.0
             for i in range(4):
                 onset_tests.signature_filter_state[i, k] = 0.0
             for j in range(block.n_regressors):
-                block.regressor_overlap[g, j, k] = 0.0
+                block.regressor_correlation[g, j, k] = 0.0
 
 
 @kernel
@@ -420,7 +423,7 @@ def fill_signatures_for_onsets(hypothesis, onset_tests, first_test):
             onset_tests.signature_for_onset[0, k] = onset_tests.signature_at_loss_end[0, k]
             onset_tests.signature_for_onset[1, k] = onset_tests.signature_at_loss_end[1, k]
         elif hypothesis.kind == GROWING_LOSS:
-            onset_tests.remaining_growth[k] *= hypothesis.growth_decay_factor
+            onset_tests.remaining_growth[k] *= hypothesis.remaining_growth_decay_factor
             grown_share = 1.0 - onset_tests.remaining_growth[k]
             onset_tests.signature_for_onset[0, k] = grown_share * s0
             onset_tests.signature_for_onset[1, k] = grown_share * s1
@@ -456,30 +459,33 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay):
         w0, w1 = S_inv00 * r0 + S_inv01 * r1, S_inv10 * r0 + S_inv11 * r1
         onset_tests.correlation[k] = evidence_decay * onset_tests.correlation[k] + (w0 * g0 + w1 * g1)
         onset_tests.information[k] = evidence_decay * onset_tests.information[k] + w0 * r0 + w1 * r1
-        onset_tests.correlation_in_calm_air[k] = evidence_decay * onset_tests.correlation_in_calm_air[k] + (
+        onset_tests.correlation_by_calm_air[k] = evidence_decay * onset_tests.correlation_by_calm_air[k] + (
             w0 * p0 + w1 * p1
         )
         variation = transient0 * abs(w0 - weight[0, k]) + transient1 * abs(w1 - weight[1, k])
         constant = constant0 * abs(w0) + constant1 * abs(w1)
-        onset_tests.constant_uncertainty_part[k] = (
-            evidence_decay * onset_tests.constant_uncertainty_part[k] + constant
+        onset_tests.correlation_bound_by_constant_uncertainty[k] = (
+            evidence_decay * onset_tests.correlation_bound_by_constant_uncertainty[k] + constant
         )
-        onset_tests.varying_uncertainty_part[k] = (
-            evidence_decay * onset_tests.varying_uncertainty_part[k] + variation
+        onset_tests.correlation_bound_by_varying_uncertainty[k] = (
+            evidence_decay * onset_tests.correlation_bound_by_varying_uncertainty[k] + variation
         )
-        onset_tests.bounded_rate_uncertainty_part[k] = (
-            evidence_decay * onset_tests.bounded_rate_uncertainty_part[k]
+        onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = (
+            evidence_decay * onset_tests.correlation_bound_by_rate_limited_uncertainty[k]
             + uncertainty_change * (transient0 * abs(w0) + transient1 * abs(w1))
         )
         weight[0, k], weight[1, k] = w0, w1
 
 
 @kernel
-def accumulate_regressor_overlap(block, onset_tests, overlap, n_tests, evidence_decay):
+def accumulate_regressor_correlation(block, onset_tests, overlap, n_tests, evidence_decay):
     """Add the frame to R_j of n onset tests, `overlap` (regressors, tests), and fill their
-    `coefficient_error_part`."""
-    weight, coefficient_error_part = onset_tests.correlation_weight, onset_tests.coefficient_error_part
-    coefficient_error_part[:n_tests] = 0.0
+    `correlation_bound_by_coefficient_errors`."""
+    weight, correlation_bound_by_coefficient_errors = (
+        onset_tests.correlation_weight,
+        onset_tests.correlation_bound_by_coefficient_errors,
+    )
+    correlation_bound_by_coefficient_errors[:n_tests] = 0.0
     for j in range(block.n_regressors):
         r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
         overlap_of_regressor, tolerance = overlap[j], block.regressor_tolerance[j]
@@ -487,20 +493,20 @@ def accumulate_regressor_overlap(block, onset_tests, overlap, n_tests, evidence_
             overlap_of_regressor[k] = evidence_decay * overlap_of_regressor[k] + (
                 weight[0, k] * r0 + weight[1, k] * r1
             )
-            coefficient_error_part[k] += tolerance * abs(overlap_of_regressor[k])
+            correlation_bound_by_coefficient_errors[k] += tolerance * abs(overlap_of_regressor[k])
 
 
 @kernel
-def accumulate_coarse_gust_part(block, onset_tests, n_tests, evidence_decay):
+def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay):
     """Add the frame to the share of N that a roughly visible gust contributes.
 
     `accumulate_correlations` must have filled the weights of the frame.
     """
     gust0, gust1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
     for k in range(n_tests):
-        onset_tests.coarse_gust_part[k] = evidence_decay * onset_tests.coarse_gust_part[k] + (
-            onset_tests.correlation_weight[0, k] * gust0 + onset_tests.correlation_weight[1, k] * gust1
-        )
+        onset_tests.correlation_by_coarse_gust[k] = evidence_decay * onset_tests.correlation_by_coarse_gust[
+            k
+        ] + (onset_tests.correlation_weight[0, k] * gust0 + onset_tests.correlation_weight[1, k] * gust1)
 
 
 @kernel
@@ -513,19 +519,19 @@ def accumulate_evidence(block, has_regressors, dt, evidence_decay):
             block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP],
             (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS,
         )
-    for g in range(count_test_groups(block)):
-        onset_tests, n_tests = block.onset_tests[g], count_onset_tests(block, g)
+    for g in range(n_test_groups(block)):
+        onset_tests, n_tests = block.onset_tests[g], n_onset_tests_in_group(block, g)
         accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay)
         if block.has_coarse_gust_estimate:
-            accumulate_coarse_gust_part(block, onset_tests, n_tests, evidence_decay)
+            accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay)
         if has_regressors:
-            accumulate_regressor_overlap(
-                block, onset_tests, block.regressor_overlap[g], n_tests, evidence_decay
+            accumulate_regressor_correlation(
+                block, onset_tests, block.regressor_correlation[g], n_tests, evidence_decay
             )
 
 
 @kernel
-def max_uncertainty_part(onset_tests, k, transient0, transient1):
+def correlation_bound_by_uncertainty(onset_tests, k, transient0, transient1):
     """The largest share of |N| in test k that a bounded uncertainty explains.
 
     transient0, transient1: the two entries of the block's `transient_uncertainty_response`.
@@ -533,8 +539,9 @@ def max_uncertainty_part(onset_tests, k, transient0, transient1):
     last_variation = transient0 * abs(onset_tests.correlation_weight[0, k]) + transient1 * abs(
         onset_tests.correlation_weight[1, k]
     )
-    return onset_tests.constant_uncertainty_part[k] + min(
-        onset_tests.varying_uncertainty_part[k] + last_variation, onset_tests.bounded_rate_uncertainty_part[k]
+    return onset_tests.correlation_bound_by_constant_uncertainty[k] + min(
+        onset_tests.correlation_bound_by_varying_uncertainty[k] + last_variation,
+        onset_tests.correlation_bound_by_rate_limited_uncertainty[k],
     )
 
 
@@ -558,18 +565,22 @@ def max_log_likelihood_ratio(is_loss, evidence, information):
 
 
 @kernel
-def normalised_evidence(alarm_level, noise_share_of_level, evidence, uncertainty_part, information):
+def normalised_evidence(
+    alarm_level, noise_share_of_level, evidence, evidence_bound_by_uncertainty, information
+):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
-    uncertainty_part: the share of the evidence that a bounded uncertainty explains; alarm_level: of the
-    alarm; noise_share_of_level: share of the level that is reserved for noise in addition. The result is
-    compared with the level.
+    evidence_bound_by_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
+    of the alarm; noise_share_of_level: share of the level that is reserved for noise in addition. The result
+    is compared with the level.
     """
     evidence_std = sqrt(information)
     return evidence / (
         evidence_std
-        if uncertainty_part <= 0.0
-        else max(evidence_std, uncertainty_part / alarm_level + noise_share_of_level * evidence_std)
+        if evidence_bound_by_uncertainty <= 0.0
+        else max(
+            evidence_std, evidence_bound_by_uncertainty / alarm_level + noise_share_of_level * evidence_std
+        )
     )
 
 
@@ -582,7 +593,7 @@ def evaluate_onset_tests(block, onset_tests, n_tests, ignores_uncertainty, has_e
     has_error_map: the model's error is mapped; it is then large and lasting, so the bounds on other
     hypotheses always include it.
     """
-    supporting_sign = onset_tests.supporting_sign
+    supporting_correlation_sign = onset_tests.supporting_correlation_sign
     transient0 = block.transient_uncertainty_response[0]
     transient1 = block.transient_uncertainty_response[1]
     alarm_level = block.alarm_level
@@ -590,18 +601,22 @@ def evaluate_onset_tests(block, onset_tests, n_tests, ignores_uncertainty, has_e
     uncertainty_weight = 0.0 if ignores_uncertainty else 1.0
     for k in range(n_tests):
         N, D = onset_tests.correlation[k], onset_tests.information[k]
-        explained_part = onset_tests.coefficient_error_part[k] + max(
-            supporting_sign[k] * onset_tests.correlation_in_calm_air[k], 0.0
+        explained_part = onset_tests.correlation_bound_by_coefficient_errors[k] + max(
+            supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
         )
-        explained_part += max(supporting_sign[k] * onset_tests.coarse_gust_part[k], 0.0)
-        is_loss, has_information = supporting_sign[k] != 0.0, D > 0.0
-        evidence = supporting_sign[k] * N if is_loss else abs(N)
-        uncertainty_part = max_uncertainty_part(onset_tests, k, transient0, transient1)
+        explained_part += max(supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0)
+        is_loss, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
+        evidence = supporting_correlation_sign[k] * N if is_loss else abs(N)
+        evidence_bound_by_uncertainty = correlation_bound_by_uncertainty(
+            onset_tests, k, transient0, transient1
+        )
         evidence_error_bound = explained_part + (
-            uncertainty_part if has_error_map and not is_loss else uncertainty_weight * uncertainty_part
+            evidence_bound_by_uncertainty
+            if has_error_map and not is_loss
+            else uncertainty_weight * evidence_bound_by_uncertainty
         )
         score = normalised_evidence(
-            alarm_level, noise_share_of_level, evidence - explained_part, uncertainty_part, D
+            alarm_level, noise_share_of_level, evidence - explained_part, evidence_bound_by_uncertainty, D
         )
         llr = max_log_likelihood_ratio(is_loss, evidence, D)
         llr_lower_bound = max_log_likelihood_ratio(is_loss, evidence - evidence_error_bound, D)
@@ -619,9 +634,13 @@ def evaluate_hypotheses(block, upper_bound_decay=0.0, has_error_map=False):
     upper_bound_decay: if a loss may end, the factor by which its earlier upper bound decays per frame; else
     0. has_error_map: see `evaluate_onset_tests`.
     """
-    for g in range(count_test_groups(block)):
+    for g in range(n_test_groups(block)):
         evaluate_onset_tests(
-            block, block.onset_tests[g], count_onset_tests(block, g), upper_bound_decay > 0.0, has_error_map
+            block,
+            block.onset_tests[g],
+            n_onset_tests_in_group(block, g),
+            upper_bound_decay > 0.0,
+            has_error_map,
         )
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]

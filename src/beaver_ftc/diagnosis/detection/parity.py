@@ -62,7 +62,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis.bounds import axis_of_term
+from beaver_ftc.diagnosis.bounds import moment_axis_of_term
 from beaver_ftc.diagnosis.detection import forces, likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_COEFFICIENT_NAMES,
@@ -77,7 +77,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_INPUT_READINGS,
     PITCH_BLOCK,
     STEP_FAULT,
-    Capacity,
+    BlockCapacity,
     normalised_evidence,
 )
 from beaver_ftc.diagnosis.gusts import (
@@ -103,14 +103,15 @@ MAX_AIRSPEED_OVER_TRIM, MAX_VANE_ANGLE_RAD = 2.0, 0.5
 TONE_CONFIG_RECORD = record(
     min_airspeed=float, max_airspeed=float,  # airspeeds, m/s, between which the tests run
     frames_per_update=int, alarm_level=float,  # alarm level, standard deviations
-    sum_decay_factor=float,  # factor by which a sum decays from one update to the next
-    # (cos, sin) of the phase change per frame; per update, and twice that, both times `sum_decay_factor`
+    sum_decay_factor_per_update=float,  # factor by which a sum decays from one update to the next
+    # (cos, sin) of the phase change per frame; per update, and twice that, both times
+    # `sum_decay_factor_per_update`
     phase_rotation_per_frame=(2, N_TONE_FREQUENCIES), decayed_rotation_per_update=(2, N_TONE_FREQUENCIES),
     decayed_double_rotation_per_update=(2, N_TONE_FREQUENCIES),
     # largest mean of cos(w t) d(t) for a bounded uncertainty |d| <= 1
     bounded_uncertainty_gain=N_TONE_FREQUENCIES,
     # larger variance of real and imaginary part of N; the sum of both is 1
-    larger_part_variance_share=N_TONE_FREQUENCIES,
+    larger_complex_part_variance_share=N_TONE_FREQUENCIES,
 )  # fmt: skip
 
 
@@ -121,10 +122,11 @@ def tone_tests_dtype(n_regressors: int) -> np.dtype:
         # frames since the last update; sums of g and of n_regressors
         frames_since_update=int, innovation_sum=float, regressor_sums=n_regressors,
         # N and R_j: real and imaginary parts
-        correlation=(2, N_TONE_FREQUENCIES), regressor_overlap=(n_regressors, 2, N_TONE_FREQUENCIES),
+        correlation=(2, N_TONE_FREQUENCIES), regressor_correlation=(n_regressors, 2, N_TONE_FREQUENCIES),
         # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, the
         # filtered bound: its mean, and its component at twice the frequency
-        coefficient_error_part=N_TONE_FREQUENCIES, max_uncertainty_part=N_TONE_FREQUENCIES,
+        correlation_bound_by_coefficient_errors=N_TONE_FREQUENCIES,
+        correlation_bound_by_uncertainty=N_TONE_FREQUENCIES,
         uncertainty_bound_mean=N_TONE_FREQUENCIES,
         uncertainty_bound_harmonic=(2, N_TONE_FREQUENCIES),
         correlation_variance=float,  # variance of N without a fault
@@ -160,14 +162,18 @@ def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regre
         return
     advance_resonators(tone_config, tone_tests.correlation, tone_tests.innovation_sum)
     for j in range(n_regressors):
-        advance_resonators(tone_config, tone_tests.regressor_overlap[j], tone_tests.regressor_sums[j])
+        advance_resonators(tone_config, tone_tests.regressor_correlation[j], tone_tests.regressor_sums[j])
         tone_tests.regressor_sums[j] = 0.0
     tone_tests.correlation_variance = (
-        tone_config.sum_decay_factor * tone_config.sum_decay_factor * tone_tests.correlation_variance
+        tone_config.sum_decay_factor_per_update
+        * tone_config.sum_decay_factor_per_update
+        * tone_tests.correlation_variance
         + tone_tests.frames_since_update
     )
-    update_uncertainty_part(tone_tests, tone_config, block, inverse_std * view.uncertainty_bound[0], dt)
-    fill_coefficient_part(tone_tests, block.regressor_tolerance, n_regressors)
+    update_correlation_bound_by_uncertainty(
+        tone_tests, tone_config, block, inverse_std * view.uncertainty_bound[0], dt
+    )
+    fill_correlation_bound_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
     fill_tone_score(tone_tests, tone_config, alarm_level)
     tone_tests.innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
@@ -196,17 +202,17 @@ def tone_whitening_gain(K_x, K_d, drift_decay, cos, sin, dt):
 
 
 @kernel
-def update_uncertainty_part(tone_tests, tone_config, block, uncertainty_bound, dt):
-    """Update `max_uncertainty_part`: the most that an uncertainty |d| <= bounded, in whitened units, adds to
-    |N|.
+def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, uncertainty_bound, dt):
+    """Update `correlation_bound_by_uncertainty`: the most that an uncertainty |d| <= bounded, in whitened
+    units, adds to |N|.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
     rotation = tone_config.decayed_double_rotation_per_update
-    sum_decay = tone_config.sum_decay_factor
+    sum_decay = tone_config.sum_decay_factor_per_update
     bound_sum = uncertainty_bound * tone_tests.frames_since_update
-    for f in range(tone_tests.max_uncertainty_part.size):
+    for f in range(tone_tests.correlation_bound_by_uncertainty.size):
         cos, sin = tone_config.phase_rotation_per_frame[0, f], tone_config.phase_rotation_per_frame[1, f]
         bounded_input = bound_sum * tone_whitening_gain(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos, sin, dt
@@ -220,7 +226,7 @@ def update_uncertainty_part(tone_tests, tone_config, block, uncertainty_bound, d
         tone_tests.uncertainty_bound_mean[f] = (
             sum_decay * tone_tests.uncertainty_bound_mean[f] + bounded_input
         )
-        tone_tests.max_uncertainty_part[f] = tone_config.bounded_uncertainty_gain[f] * (
+        tone_tests.correlation_bound_by_uncertainty[f] = tone_config.bounded_uncertainty_gain[f] * (
             tone_tests.uncertainty_bound_mean[f]
             + np.hypot(
                 tone_tests.uncertainty_bound_harmonic[0, f], tone_tests.uncertainty_bound_harmonic[1, f]
@@ -229,18 +235,18 @@ def update_uncertainty_part(tone_tests, tone_config, block, uncertainty_bound, d
 
 
 @kernel
-def fill_coefficient_part(tone_tests, tolerance, n_regressors):
-    """Fill `coefficient_error_part`: the most that the declared errors of the first n coefficients add to
-    |N|.
+def fill_correlation_bound_by_coefficient_errors(tone_tests, tolerance, n_regressors):
+    """Fill `correlation_bound_by_coefficient_errors`: the most that the declared errors of the first n
+    coefficients add to |N|.
 
     The magnitude of R_j is at most its larger part plus (sqrt 2 - 1) times its smaller part.
     """
-    tone_tests.coefficient_error_part[:] = 0.0
+    tone_tests.correlation_bound_by_coefficient_errors[:] = 0.0
     for j in range(n_regressors):
-        overlap, coefficient_tolerance = tone_tests.regressor_overlap[j], tolerance[j]
-        for f in range(tone_tests.coefficient_error_part.size):
+        overlap, coefficient_tolerance = tone_tests.regressor_correlation[j], tolerance[j]
+        for f in range(tone_tests.correlation_bound_by_coefficient_errors.size):
             real_part, imaginary_part = abs(overlap[0, f]), abs(overlap[1, f])
-            tone_tests.coefficient_error_part[f] += coefficient_tolerance * (
+            tone_tests.correlation_bound_by_coefficient_errors[f] += coefficient_tolerance * (
                 max(real_part, imaginary_part) + 0.41421356237309515 * min(real_part, imaginary_part)
             )
 
@@ -249,19 +255,19 @@ def fill_coefficient_part(tone_tests, tolerance, n_regressors):
 def fill_tone_score(tone_tests, tone_config, alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
-    for f in range(tone_tests.coefficient_error_part.size):
+    for f in range(tone_tests.correlation_bound_by_coefficient_errors.size):
         evidence = (
             np.hypot(tone_tests.correlation[0, f], tone_tests.correlation[1, f])
-            - tone_tests.coefficient_error_part[f]
+            - tone_tests.correlation_bound_by_coefficient_errors[f]
         )
-        variance = tone_config.larger_part_variance_share[f] * tone_tests.correlation_variance
+        variance = tone_config.larger_complex_part_variance_share[f] * tone_tests.correlation_variance
         max_score = max(
             max_score,
             normalised_evidence(
                 tone_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
-                tone_tests.max_uncertainty_part[f],
+                tone_tests.correlation_bound_by_uncertainty[f],
                 variance,
             ),
         )
@@ -304,7 +310,7 @@ def configure_tone_tests(
     phase_per_frame = TONE_FREQUENCIES_RAD_S * dt_s
     decay_factor = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
     tone_config["frames_per_update"] = frames_per_update
-    tone_config["sum_decay_factor"] = decay_factor
+    tone_config["sum_decay_factor_per_update"] = decay_factor
     tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability))
     tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame), np.sin(phase_per_frame)
     tone_config["decayed_rotation_per_update"] = (
@@ -319,7 +325,7 @@ def configure_tone_tests(
     variance_difference = (1.0 - decay_factor**2) / np.abs(
         1.0 - decay_factor**2 * np.exp(2j * frames_per_update * phase_per_frame)
     )
-    tone_config["larger_part_variance_share"] = 0.5 * (1.0 + variance_difference)
+    tone_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + variance_difference)
 
 
 VANE_EFFECT_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
@@ -340,19 +346,19 @@ AXIS_VIEW, VANE_VIEW = -1, -2
 class StatisticalRecordSize(NamedTuple):
     """Capacities of a record: of a block of the rates, of a view; numbers of views and of error-map boxes."""
 
-    rate_block: Capacity
-    view_block: Capacity
+    rate_block: BlockCapacity
+    view_block: BlockCapacity
     n_views: int
     n_error_map_boxes: int
 
 
 USUAL_RECORD_SIZE = StatisticalRecordSize(
-    Capacity(23, MAX_HYPOTHESES), Capacity(36, 3), 13, 6
+    BlockCapacity(23, MAX_HYPOTHESES), BlockCapacity(36, 3), 13, 6
 )  # enough for most aircraft: see `required_record_size`
 
 
 @sized
-def parity_view_dtype(capacity: Capacity) -> np.dtype:
+def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
     """A view whose block has these capacities."""
     return record(
         orthogonal_to_surface=int,  # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
@@ -379,7 +385,7 @@ def innovation_component(view, forces, gust, inertial_gust, innovation, i):
     """Component i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if i < SIDE_FORCE:
         gust_acceleration = 0.0
-        if uses_gust_estimate(view, gust):
+        if subtracts_gust_estimate(view, gust):
             gust_acceleration = gust_estimate_of_view(
                 view, gust, inertial_gust
             ).output.mean_gust_acceleration[i]
@@ -397,7 +403,7 @@ def column_entry_and_error(view, forces, bound, G, j):
         return entry, VANE_EFFECT_TOLERANCE * abs(entry)
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
-        return force.predicted_surface_effect_per_rad[s], force.surface_effect_per_rad_error_bound[s]
+        return force.previous_surface_effect_per_rad[s], force.surface_effect_per_rad_error_bound[s]
     return G[i, s], bound.effectiveness_error_per_rad[i, s] if bound.has_declared_surface_errors else 0.0
 
 
@@ -455,7 +461,7 @@ def set_view_direction_across_gust(view, forces, gust):
 
 
 @kernel
-def uses_gust_estimate(view, gust):
+def subtracts_gust_estimate(view, gust):
     """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
     return view.confirming_force > 0 and gust.output.uses_accelerometers == 1
 
@@ -488,7 +494,9 @@ def fill_gust_sensitivity(view, forces, rate_damping):
         view.force_gust_sensitivity[k] = 0.0
         for f in range(2):
             view.force_gust_sensitivity[k] += (
-                m[SIDE_FORCE + f] * forces.component[f].damping[k] * forces.dynamic_pressure_over_trim
+                m[SIDE_FORCE + f]
+                * forces.component[f].innovation_per_air_rotation[k]
+                * forces.dynamic_pressure_over_trim
             )
 
 
@@ -506,7 +514,7 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
         if view.is_immune_to_vane_error:
             model_noise_std += abs(m[i]) * forces.gust_estimate_noise_std[i]
         uncertainty_bound += abs(m[i]) * (
-            noise_model.uncertainty_bound[i] + noise_model.surface_anywhere_additional_bound[i]
+            noise_model.uncertainty_bound[i] + noise_model.additional_bound_for_surface_anywhere[i]
         )
     for f, force in enumerate(forces.component):
         model_noise_std += abs(m[SIDE_FORCE + f]) * np.sqrt(
@@ -517,11 +525,12 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
                 m[SIDE_FORCE + f] * forces.dynamic_pressure_over_trim
             ) ** 2 * force.innovation_drift_intensity
         uncertainty_bound += abs(m[SIDE_FORCE + f]) * (
-            force.deflection_error_effect * forces.dynamic_pressure_over_trim + force.lag_error_bound
+            force.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
+            + force.force_flow_lag_error_bound
         )
     if gust.output.is_turbulent:
         fill_gust_sensitivity(view, forces, gust.output.rate_damping)
-        if uses_gust_estimate(view, gust):
+        if subtracts_gust_estimate(view, gust):
             drift_intensity += remaining_gust_drift_intensity(
                 gust_estimate_of_view(view, gust, inertial_gust),
                 V,
@@ -540,7 +549,7 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
     block.model_noise_variance[0] = model_noise_std * model_noise_std
     view.uncertainty_bound[0] = uncertainty_bound
     block.drift_intensity[0, 0] = (
-        drift_intensity + noise_model.relative_walk_intensity * drift_bound * drift_bound
+        drift_intensity + noise_model.drift_intensity_over_squared_bound * drift_bound * drift_bound
     )
 
 
@@ -672,7 +681,7 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
     """
     if uses_force(view) and not forces.in_use:
         return 0.0
-    if view.is_immune_to_vane_error or not (uses_force(view) or uses_gust_estimate(view, gust)):
+    if view.is_immune_to_vane_error or not (uses_force(view) or subtracts_gust_estimate(view, gust)):
         return max_test_score(view)
     confirming_score = 0.0
     for other in views:
@@ -731,7 +740,9 @@ class ParityDirection(NamedTuple):
     plane_axes: tuple[int, int]
     surfaces_tested_for_loss: list[int]
     uses_inertial_flow_angle: bool = False
-    uses_vane: bool = False  # for the gust estimate in moving air, which has no rolling component
+    may_use_vane_gust_estimate: bool = (
+        False  # for the gust estimate in moving air, which has no rolling component
+    )
 
 
 def parity_directions_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[ParityDirection]:
@@ -743,17 +754,29 @@ def parity_directions_of(aircraft: Aircraft, with_force: bool = False) -> Iterat
     pitch_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
     yield ParityDirection(
-        AXIS_VIEW, _sum_of_unit_vectors((PITCH,)), PITCH_PLANE, pitch_surfaces, uses_vane=True
+        AXIS_VIEW,
+        _sum_of_unit_vectors((PITCH,)),
+        PITCH_PLANE,
+        pitch_surfaces,
+        may_use_vane_gust_estimate=True,
     )
     yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, lateral_surfaces)
     yield ParityDirection(
-        AXIS_VIEW, _sum_of_unit_vectors((YAW,)), LATERAL_PLANE, lateral_surfaces, uses_vane=True
+        AXIS_VIEW,
+        _sum_of_unit_vectors((YAW,)),
+        LATERAL_PLANE,
+        lateral_surfaces,
+        may_use_vane_gust_estimate=True,
     )
     for s in lateral_surfaces:
         crosses_roll_column = aircraft.dominant_axis[s] == ROLL
         others = [other for other in lateral_surfaces if other != s]
         yield ParityDirection(
-            s, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, others, uses_vane=crosses_roll_column
+            s,
+            _sum_of_unit_vectors((ROLL,)),
+            LATERAL_PLANE,
+            others,
+            may_use_vane_gust_estimate=crosses_roll_column,
         )
     if not with_force:
         return
@@ -787,7 +810,7 @@ def _sum_of_unit_vectors(components: tuple[int, ...]) -> tuple[float, ...]:
 
 def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     """The capacities that the records of an aircraft need."""
-    axes = [axis_of_term(term) for term in aircraft.moments]
+    axes = [moment_axis_of_term(term) for term in aircraft.moments]
     views = list(parity_directions_of(aircraft, aircraft.forces_separate_surfaces))
     n_rate_regressors = N_INPUT_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
     n_force_regressors = (
@@ -801,14 +824,14 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     error_map = aircraft.file.model_error_map
     n_boxes = len(error_map.boxes) if error_map else 0
     return StatisticalRecordSize(
-        Capacity(n_rate_regressors, 3 * n_losses + 2),
-        Capacity(n_rate_regressors + n_force_regressors + 2, n_tested_losses + 1),
+        BlockCapacity(n_rate_regressors, 3 * n_losses + 2),
+        BlockCapacity(n_rate_regressors + n_force_regressors + 2, n_tested_losses + 1),
         len(views),
         n_boxes,
     )
 
 
-def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
+def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
     surfaces_separated_by_force = [
@@ -827,7 +850,7 @@ def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
         plane_axes,
         moving_surfaces,
         uses_inertial_flow_angle,
-        uses_vane,
+        may_use_vane_gust_estimate,
     ) in zip(statistical["views"], views, strict=False):
         view["orthogonal_to_surface"], view["direction"], view["plane_axes"], block = (
             orthogonal_to_surface,
@@ -852,7 +875,7 @@ def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
         for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_per_frame"):
             block[name] = rate_block[name]
         block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
-        if uses_vane and subtracts_gust:
+        if may_use_vane_gust_estimate and subtracts_gust:
             view["confirming_force"] = NORMAL_FORCE if plane_axes == PITCH_PLANE else SIDE_FORCE
         if any(direction[SIDE_FORCE:]):
             force, view["confirming_force"] = (
@@ -880,7 +903,7 @@ def configure_views(statistical: np.void, aircraft: Aircraft) -> None:
         )
         view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
         view["is_immune_to_vane_error"] = uses_inertial_flow_angle or orthogonal_to_surface == VANE_VIEW
-        likelihood.set_supporting_signs(block, kinds)
+        likelihood.set_supporting_correlation_signs(block, kinds)
 
 
 @kernel

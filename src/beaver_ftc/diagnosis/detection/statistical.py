@@ -41,8 +41,8 @@ from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import (
     UNMAPPED_ERROR_IN_FILTERS_RAD_S2,
     add_published_bound,
-    additional_map_error,
-    axis_of_term,
+    additional_error_at_travel_level,
+    moment_axis_of_term,
     moment_term_tolerances,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
@@ -65,8 +65,8 @@ from beaver_ftc.diagnosis.detection.parity import (
     USUAL_RECORD_SIZE,
     ParityDirection,
     StatisticalRecordSize,
+    configure_parity_views,
     configure_tone_tests,
-    configure_views,
     parity_directions_of,
     parity_view_dtype,
 )
@@ -101,17 +101,16 @@ LOSS_GROWTH_RATE_PER_S = 1.5
 # Share of the alarm level reserved for noise in addition to an uncertainty at its bound (theory.md,
 # section 7).
 NOISE_SHARE_OF_ALARM_LEVEL = 0.5
-DAMAGE_DRIFT_FREQUENCY_RAD_S = (
-    3.0  # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
-)
+# 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
+MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S = 3.0
 MIN_GYRO_NOISE_STD_RAD_S = (
     1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 )
 # (kind, surface, axis, raises alarms)
-Hypothesis = tuple[int, int, int, int]
+HypothesisEntry = tuple[int, int, int, int]
 
 
-def block_hypotheses(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[Hypothesis, ...]], ...]:
+def block_hypotheses(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
     are held against. Roll and yaw are there twice, see above."""
     pitch = (
@@ -126,18 +125,18 @@ def block_hypotheses(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[H
     return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
 
 
-def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
         if surface in aircraft.class_of_losses and axis in axes:
             yield LOSS, s, axis, 1
 
 
-def _growing_and_ending_hypotheses(members: tuple[Hypothesis, ...]) -> Iterator[Hypothesis]:
+def _growing_and_ending_hypotheses(members: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
     losses = [(surface, axis) for kind, surface, axis, _ in members if kind == LOSS]
     return ((kind, surface, axis, 0) for surface, axis in losses for kind in (GROWING_LOSS, LOSS_END))
 
 
-def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[Hypothesis]:
+def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
     return ((STEP_FAULT, -1, axis, 1) for axis in axes)
 
 
@@ -231,7 +230,7 @@ def configure_statistical_detector(
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
                 np.add(MIN_UNMEASURED_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
             )
-        configure_views(statistical, aircraft)
+        configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling_gust_length_m = (
         float(gust["config"]["rolling_gust_correlation_length"]) if gust["output"]["is_turbulent"] else 0.0
@@ -268,14 +267,14 @@ def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Airc
     statistical["test_config"]["n_score_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
         block["n_axes"], block["n_hypotheses"] = len(axes), len(members)
-        block["n_regressors"] = sum(axis_of_term(term) in axes for term in aircraft.moments)
+        block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
         block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axis"][i] = axis
             variance = max(errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
             block["gyro_noise_variance"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
-        likelihood.set_supporting_signs(block, [kind for kind, *_ in members])
+        likelihood.set_supporting_correlation_signs(block, [kind for kind, *_ in members])
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
@@ -296,12 +295,12 @@ def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
     """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
     The evidence that the uncertainty explains is bounded by its declared rate of change in any case
-    (`likelihood.max_uncertainty_part`). The drift only sets how much of it the filters remove. If damage may
-    take surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the
-    model.
+    (`likelihood.correlation_bound_by_uncertainty`). The drift only sets how much of it the filters remove. If
+    damage may take surfaces, a weaker drift detects most: motion that no loss explains is then rarely an
+    error of the model.
     """
     return (
-        min(DAMAGE_DRIFT_FREQUENCY_RAD_S, settings.uncertainty_rad_s)
+        min(MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S, settings.uncertainty_rad_s)
         if aircraft.loses_surfaces
         else settings.uncertainty_rad_s
     )
@@ -320,7 +319,7 @@ def _configure_bounded_uncertainty(
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
-        block["hypothesis"]["growth_decay_factor"] = exp(-LOSS_GROWTH_RATE_PER_S * dt_s)
+        block["hypothesis"]["remaining_growth_decay_factor"] = exp(-LOSS_GROWTH_RATE_PER_S * dt_s)
 
 
 def _configure_drift_and_model_noise(
@@ -337,7 +336,7 @@ def _configure_drift_and_model_noise(
     gyro_noise_std = float(errors[:3].max())
     max_bound = max(declared.constant_rad_s2)
     alarm_level = float(statistical["test_config"]["alarm_level"])
-    statistical["noise"]["relative_walk_intensity"] = derive_relative_walk_intensity(
+    statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
         max_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
     _, G, f_x, f_y = jacobian(design, *trim)
@@ -353,7 +352,7 @@ def _configure_drift_and_model_noise(
     )
 
 
-def derive_relative_walk_intensity(
+def derive_drift_intensity_over_squared_bound(
     eta_bar: float, uncertainty_frequency_rad_s: float, gyro_noise_std: float, alarm_level: float, dt_s: float
 ) -> float:
     """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
@@ -383,18 +382,18 @@ def drift_correlation_length(
     is left for this. The drift returns no later than the gust. A gust with a longer correlation length is
     represented by a stronger one, of equal power at low frequency and more power at high frequency.
     """
-    if statistical["noise"]["relative_walk_intensity"] == 0.0:
+    if statistical["noise"]["drift_intensity_over_squared_bound"] == 0.0:
         # 0 in still air: nothing is declared that drifts, and the two views are one
         return gust_correlation_length_m
     longest_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
     alarm_level = float(statistical["test_config"]["alarm_level"])
-    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["relative_walk_intensity"]) / alarm_level
+    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["drift_intensity_over_squared_bound"]) / alarm_level
     return min(airspeed_mps * lag_s, gust_correlation_length_m or np.inf)
 
 
 def _configure_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
     """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
-    axis = np.array([axis_of_term(term) for term in aircraft.moments])
+    axis = np.array([moment_axis_of_term(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         block_tolerance = tolerance[np.isin(axis, axes)]
         block["regressor_tolerance"][: block_tolerance.size] = block_tolerance
@@ -512,11 +511,11 @@ TEST_CONFIG_RECORD = record(
 # The noise model: accelerations that are not caused by a fault.
 NOISE_RECORD = record(
     # of the drift that represents a bounded uncertainty, over bound squared, 1/s
-    relative_walk_intensity=float,
+    drift_intensity_over_squared_bound=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
     base_uncertainty_change_per_frame=float,
     uncertainty_bound=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
-    surface_anywhere_additional_bound=3,  # what one surface anywhere in its travel adds to it, rad/s2
+    additional_bound_for_surface_anywhere=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
     # variance by noise of all inputs of the model; without the air data; (rad/s2)2
     input_noise_variance=3, input_noise_variance_without_air_data=3,
@@ -564,7 +563,7 @@ def update_blocks(
         if gust.config.only_coarse_estimate:
             likelihood.set_coarse_gust_response(block, gust.output.coarse_gust_acceleration)
         if gust.output.is_turbulent:
-            add_turn_to_drift_covariance(gust, block)
+            add_gust_axes_turn_to_drift_covariance(gust, block)
             if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
@@ -582,7 +581,7 @@ def update_blocks(
 
 
 @kernel
-def add_turn_to_drift_covariance(gust, block):
+def add_gust_axes_turn_to_drift_covariance(gust, block):
     """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
     for i in range(block.n_axes):
         for j in range(block.n_axes):
@@ -592,7 +591,7 @@ def add_turn_to_drift_covariance(gust, block):
 
 
 @kernel
-def filter_residual_mean(blocks, gust, innovation_after_known_faults, dt):
+def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_faults, dt):
     """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
         for i, axis in enumerate(block.axis[: block.n_axes]):
@@ -872,7 +871,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
         measured.x,
         design,
         bound.inertia_coupling,
-        bound.constant_bound,
+        bound.constant_error_bound,
         bound.earth_rate_rad_s,
         uncertainty_bound,
     )
@@ -881,8 +880,8 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
         if has_error_map:
             uncertainty_bound[i] += min(bound.model_error_map.error_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2)
-        if bound.model_error_map.one_surface_anywhere:
-            noise_model.surface_anywhere_additional_bound[i] = additional_map_error(
+        if bound.model_error_map.one_surface_may_be_anywhere:
+            noise_model.additional_bound_for_surface_anywhere[i] = additional_error_at_travel_level(
                 bound.model_error_map, bound.model_error_map.n_levels - 1, i
             )
     for b, block in enumerate(blocks):
@@ -895,7 +894,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
                     )
                     block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift
             drift_bound = max(uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
-            walk_intensity = noise_model.relative_walk_intensity * drift_bound * drift_bound
+            walk_intensity = noise_model.drift_intensity_over_squared_bound * drift_bound * drift_bound
             block.drift_intensity[i, i] += walk_intensity
             block.no_gust_filter.drift_intensity[i, i] = walk_intensity
             block.model_noise_variance[i] = block.no_gust_filter.model_noise_variance[i] = (

@@ -25,7 +25,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
-from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_effect
+from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, acceleration_per_air_rotation
 from beaver_ftc.diagnosis.detection.filters import advance_gyro_error_bound, advance_residual_bound
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
@@ -226,7 +226,7 @@ def configure_sensor_monitor(
         scenario.airframe.has_engine_instruments,
     )
     config["trim_reading"][3:7] = y[:4]
-    config["rate_damping_per_s"] = air_rotation_effect(DesignFunctions(np.array([design])), y)
+    config["rate_damping_per_s"] = acceleration_per_air_rotation(DesignFunctions(np.array([design])), y)
     monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine_sensors"]:
         monitor["redundancy"]["memory"]["engine_command"] = initial.engine_rpm, initial.manifold_pressure_inhg

@@ -78,8 +78,8 @@ def restart_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> N
         "max_score_over_alarm_level"
     ]
     if fdi["bank"]["config"]["n_filters"] == previous_fdi["bank"]["config"]["n_filters"]:
-        fdi["bank"]["output"]["max_threshold_ratio_so_far"] = previous_fdi["bank"]["output"][
-            "max_threshold_ratio_so_far"
+        fdi["bank"]["output"]["max_residual_over_threshold_so_far"] = previous_fdi["bank"]["output"][
+            "max_residual_over_threshold_so_far"
         ]
     for gust in ("gust", "inertial_gust"):
         fdi["statistical"][gust]["config"]["starts_in_flight"] = in_flight

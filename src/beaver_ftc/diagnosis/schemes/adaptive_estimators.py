@@ -72,8 +72,8 @@ def accumulate_nothing(fdi, prediction, measured):
 @kernel
 def begin_filters(fdi, x):
     """Begin the detection filters at the first measurement x (3,) rad/s."""
-    filters.start_fdae(fdi.fdae, fdi.bound.gyro_change_bound, x)
-    filters.start_bank(fdi.bank, fdi.bound.gyro_change_bound)
+    filters.start_fdae(fdi.fdae, fdi.bound.gyro_error_change_bound, x)
+    filters.start_bank(fdi.bank, fdi.bound.gyro_error_change_bound)
 
 
 @kernel
@@ -136,7 +136,7 @@ def isolate_fault(fdi, measured, t, was_detected_before):
     """
     variant, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
     if not was_detected_before:
-        isolation.start_estimators(fdi.isolation, fdi.bound.gyro_change_bound, measured.x)
+        isolation.start_estimators(fdi.isolation, fdi.bound.gyro_error_change_bound, measured.x)
         begin_isolation_variant(variant, fdi)
     sensors_are_sound = not sensor_monitor.surface_alarm_may_be_initial_error(
         monitor, fdi.verdict.detected_at_s
@@ -263,13 +263,13 @@ def decide_fault_type(fdi, t, isolation_has_run):
     verdict.record_excluded_estimators(types.surface, layout, estimators)
     if types.pair.enabled:
         pairs.observe_and_judge_pairs(types, layout, estimators, bank, bound.frame_innovation_bound)
-        conclusion.record_isolation_finding(
+        conclusion.record_fault_type_finding(
             conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
         )
         return
     if isolation_has_run or fdi.isolation.config.uses_reach_test:
         registry.observe_and_judge_frame(types, layout, estimators, bank.output.innovation, bound)
-    conclusion.record_isolation_finding(
+    conclusion.record_fault_type_finding(
         conclusion_record, verdict.decide_surface_and_type(types, conclusion_record, layout, estimators, t)
     )
 
@@ -368,7 +368,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         detector.alarm, tests, blocks, parity_views, force_record, gust, t, is_error_mapped
     )
     form_innovation(prediction, measured.x, dt)
-    statistical.filter_residual_mean(blocks, gust, prediction.innovation_after_known_faults, dt)
+    statistical.filter_innovation_after_known_faults(
+        blocks, gust, prediction.innovation_after_known_faults, dt
+    )
 
 
 @apart
@@ -411,7 +413,7 @@ def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt)
 @kernel
 def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
-    forces.update_forces(force_record, gust, measured, prediction.u, dt)
+    forces.update_all_force_innovations(force_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.is_turbulent:
         forces.fill_readings_without_vanes(
             force_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y

@@ -317,8 +317,8 @@ def find_sole_pitch_surface_at_fault(types, layout):
 @kernel
 def decide_pair_isolation(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_isolation_finding`: `isolated` is the one named first, the law acts on all. conclusion:
-    that of the frame before."""
+    `conclusion.record_fault_type_finding`: `isolated` is the one named first, the law acts on all.
+    conclusion: that of the frame before."""
     lateral_fault_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
     decide_pitch_isolation(types, layout, t)
     first_isolated = NO_SURFACE

@@ -290,7 +290,7 @@ FAULT_PAIR_RECORD = record(
 
 # Blocks of frames.
 FRAME_BLOCK_RECORD = record(
-    n_frames=int, mean_innovation=3, mean_innovation_bound=3, gyro_change_bound_at_start=3
+    n_frames=int, mean_innovation=3, mean_innovation_bound=3, gyro_error_change_bound_at_start=3
 )
 
 
@@ -505,11 +505,11 @@ def observe_and_judge_frame(types, layout, estimators, innovation, bound):
 
 
 @kernel
-def begin_frame_block(types, layout, estimators, gyro_change_bound_before):
-    """Begin a block with the elapsed frame; gyro_change_bound_before (3,) rad/s: as it began."""
+def begin_frame_block(types, layout, estimators, gyro_error_change_bound_before):
+    """Begin a block with the elapsed frame; gyro_error_change_bound_before (3,) rad/s: as it began."""
     block = types.block
     block.mean_innovation[:], block.mean_innovation_bound[:] = 0.0, 0.0
-    block.gyro_change_bound_at_start[:] = gyro_change_bound_before
+    block.gyro_error_change_bound_at_start[:] = gyro_error_change_bound_before
     for estimator_index in layout.position_estimator:
         isolation.clear_mean_effect(estimators[estimator_index].block_mean_effect)
 
@@ -532,7 +532,7 @@ def observe_and_judge_block(types, layout, estimators, innovation, bound):
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.n_frames == 0:
-        begin_frame_block(types, layout, estimators, bound.gyro_change_bound_before)
+        begin_frame_block(types, layout, estimators, bound.gyro_error_change_bound_before)
     add_frame_to_block(types, layout, estimators, innovation, bound.eta_bar)
     block.n_frames += 1
     if block.n_frames < config.frames_per_block:
@@ -540,7 +540,7 @@ def observe_and_judge_block(types, layout, estimators, innovation, bound):
     block.n_frames = 0
     for i in range(3):
         block.mean_innovation_bound[i] += (
-            block.gyro_change_bound_at_start[i] + bound.gyro_change_bound[i]
+            block.gyro_error_change_bound_at_start[i] + bound.gyro_error_change_bound[i]
         ) / config.block_duration_s
     infer_surface_positions(types, layout, estimators, block.mean_innovation, block.mean_innovation_bound)
     judge_previous_frame(types)

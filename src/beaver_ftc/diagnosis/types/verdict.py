@@ -302,7 +302,7 @@ def sole_remaining_varying_type(surface, must_show_itself):
 @kernel
 def decide_surface_and_type(types, conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, for
-    `conclusion.record_isolation_finding`.
+    `conclusion.record_fault_type_finding`.
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """

@@ -61,7 +61,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
         "diagnosis.bounds.add_published_bound": nothing,
         "diagnosis.detection.filters.advance_residual_bound": unlimited,
         "diagnosis.detection.filters.residual_interval": all_residuals,
-        "diagnosis.detection.filters.norm_bound_interval": all_residuals,
+        "diagnosis.detection.filters.published_threshold_interval": all_residuals,
     },
     # the network of the detection estimator, which learns after the alarm
     "network": {

@@ -171,7 +171,7 @@ def alarmed(known=0, speaks=0, score=2.0):
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score
     fdi["fdae"]["network"]["memory"]["weights"], fdi["fdae"]["network"]["output"] = 1.0, 0.0
     fdi["isolation"]["estimator"]["xhat"] = 9.0
-    adaptive_estimators.conclude(fdi, frame["prediction"], frame["measured"], 5.0)
+    adaptive_estimators.update_verdict(fdi, frame["prediction"], frame["measured"], 5.0)
     return fdi
 
 

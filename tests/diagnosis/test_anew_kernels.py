@@ -47,7 +47,7 @@ def test_the_drift_of_the_detectors_blocks(moving):
     for before in (0.0, 9.0):
         fdi = new_fdi()
         record = fdi["statistical"]
-        record["gust"]["output"]["is_turbulent"], record["noise"]["deflection_error_effect_bound"] = (
+        record["gust"]["output"]["accounts_for_gusts"], record["noise"]["deflection_error_effect_bound"] = (
             moving,
             0.01,
         )

@@ -25,7 +25,7 @@ def new_air(**fields):
     (
         record["config"]["wing_span"],
         record["config"]["gravity"],
-        record["output"]["is_turbulent"],
+        record["output"]["accounts_for_gusts"],
         record["output"]["is_gust_measured"],
     ) = SPAN, GRAVITY, 1, 1
     record["config"]["turbulence_scale_length"], record["config"]["rolling_gust_correlation_length"] = (
@@ -109,16 +109,22 @@ def test_axes_swing_where_a_gust_that_keeps_its_size_would_be_seen_to_change(tur
         gusts.update_gust_rotation(record, y, attitude, DT)
     fastest = turn_rad / DT  # nearly: a little less where the axis is not square to what turns it
     walk = 0.5 * (fastest * ROLLING / y[2]) ** 2
-    assert not 0.8 * gusts.MIN_AXES_TURN_INTENSITY_SHARE < walk < 1.3 * gusts.MIN_AXES_TURN_INTENSITY_SHARE
     assert (
-        bool(record["memory"]["has_fast_axes_turn"]) == swings == (walk > gusts.MIN_AXES_TURN_INTENSITY_SHARE)
+        not 0.8 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE
+        < walk
+        < 1.3 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE
+    )
+    assert (
+        bool(record["memory"]["has_fast_axes_turn"])
+        == swings
+        == (walk > gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE)
     )
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_the_fastest_swing_decides(share):
     record = new_air(gust_axes_in_body=np.eye(3))
-    most = np.sqrt(2.0 * gusts.MIN_AXES_TURN_INTENSITY_SHARE) * 45.0 / ROLLING
+    most = np.sqrt(2.0 * gusts.MIN_GUST_AXES_TURN_INTENSITY_SHARE) * 45.0 / ROLLING
     record["memory"]["gust_axes_rate"] = np.eye(3)
     record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
     record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT
@@ -147,12 +153,12 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     ):
         gusts.update_gust_rotation(record, y, np.array(attitude), DT)
         assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(gust)
-        assert record["memory"]["unmeasured_share_by_past_turns"] == pytest.approx(turning)
+        assert record["memory"]["unmeasured_share_by_past_heading_turns"] == pytest.approx(turning)
         record["memory"]["specific_force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
     gusts.update_gust_rotation(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["memory"]["unmeasured_share_by_turn"] == pytest.approx(0.25)
-    assert record["memory"]["unmeasured_share_by_past_turns"] == pytest.approx(max(lag**3, 0.25))
+    assert record["memory"]["unmeasured_share_by_heading_turn"] == pytest.approx(0.25)
+    assert record["memory"]["unmeasured_share_by_past_heading_turns"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
     assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(
         0.05 * lag**5 - aside / (45.0 * tau_r)
@@ -205,15 +211,15 @@ def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(
         has_acceleration_before=1,
-        unmeasured_share_by_turn=0.4,
-        unmeasured_share_by_past_turns=0.3,
+        unmeasured_share_by_heading_turn=0.4,
+        unmeasured_share_by_past_heading_turns=0.3,
         air_rotation_in_level_axes=(0.1, 0.2, 0.3),
     )
     gusts.start_gust_estimate(record, *flight.reading())
     assert (
         record["memory"]["has_acceleration_before"],
-        record["memory"]["unmeasured_share_by_turn"],
-        record["memory"]["unmeasured_share_by_past_turns"],
+        record["memory"]["unmeasured_share_by_heading_turn"],
+        record["memory"]["unmeasured_share_by_past_heading_turns"],
     ) == (
         0,
         0.0,
@@ -263,12 +269,12 @@ def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
         (
             "air_rotation_in_level_axes",
             "has_acceleration_before",
-            "unmeasured_share_by_turn",
-            "unmeasured_share_by_past_turns",
-            "axes_turn_variance_now",
-            "axes_turn_variance_before",
-            "axes_turn_variance",
-            "n_axes_turn_frames",
+            "unmeasured_share_by_heading_turn",
+            "unmeasured_share_by_past_heading_turns",
+            "acceleration_variance_by_axes_turn_now",
+            "acceleration_variance_by_axes_turn_before",
+            "acceleration_variance_by_axes_turn",
+            "n_frames_with_axes_turn_variance",
         ),
         1,
     )

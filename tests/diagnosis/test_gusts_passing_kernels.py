@@ -69,7 +69,7 @@ def test_where_no_gust_is_seen_the_airspeed_serves():
     record["output"]["is_gust_measured"] = 0
     gusts.update_gust_velocity_and_speed(record, 45.0, 1.1, 3.3, 44.1, 0.5)
     assert record["output"]["speed_relative_to_mean_air"] == 44.1
-    assert gusts.total_unmeasured_share(record, 1) == 0.0
+    assert gusts.unmeasured_gust_intensity_share(record, 1) == 0.0
 
 
 @pytest.mark.parametrize(("g", "further"), [(1, 0.02), (2, 0.05)])
@@ -78,7 +78,7 @@ def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further
     (
         record["memory"]["unmeasured_intensity_share"],
         record["memory"]["unmeasured_share_by_start"],
-        record["memory"]["unmeasured_share_by_past_turns"],
+        record["memory"]["unmeasured_share_by_past_heading_turns"],
     ) = (
         (1.0, 0.003, 0.03),
         0.02,
@@ -91,10 +91,10 @@ def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further
         record["config"]["unmeasured_share_per_speed_variance"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
-    assert gusts.total_unmeasured_share(record, g) == pytest.approx(
+    assert gusts.unmeasured_gust_intensity_share(record, g) == pytest.approx(
         record["memory"]["unmeasured_intensity_share"][g] + off + further
     )
-    assert gusts.total_unmeasured_share(record, 0) == 1.0
+    assert gusts.unmeasured_gust_intensity_share(record, 0) == 1.0
 
 
 def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
@@ -116,8 +116,8 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(gusts.GUST_RECORD)
-    record["config"]["drift_intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
-    record["config"]["drift_intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
+    record["config"]["gust_drift_intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["config"]["gust_drift_intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
     record["config"]["altitude_error_bound"], record["config"]["altitude_error_share"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
     gusts.set_gust_drift_intensity(record, reading)
@@ -156,7 +156,7 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
     kept = []
     for turbulence in ("light", "severe"):
         record = record_of(gusts.GUST_RECORD)
-        record["output"]["is_turbulent"] = record["output"]["is_gust_measured"] = record["output"][
+        record["output"]["accounts_for_gusts"] = record["output"]["is_gust_measured"] = record["output"][
             "uses_accelerometers"
         ] = 1
         gusts.configure_speed_error(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)

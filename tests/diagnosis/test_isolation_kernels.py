@@ -6,7 +6,7 @@ from kernels import DT, estimator, new_fdi, on, put
 
 from beaver_ftc.diagnosis import conclusion, isolation
 from beaver_ftc.diagnosis.detection.likelihood import STEP_FAULT
-from beaver_ftc.diagnosis.isolation import fill_hypothesis
+from beaver_ftc.diagnosis.isolation import fill_effect_of_hypothesis
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import (
     INTERVAL_THRESHOLD,
@@ -35,18 +35,22 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         eta, believed, spread = eta_bar * rng.uniform(-1, 1, 3), rng.normal(size=3), rng.uniform(0, 0.1, 3)
         eta *= eta_share
         offset = rng.normal(size=3)
-        fie["effect"]["regressor"], fie["effect"]["base_acceleration"], fie["effect"]["error_bound"] = (
+        (
+            fie["effect"]["regressor"],
+            fie["effect"]["acceleration_at_zero_theta"],
+            fie["effect"]["error_bound"],
+        ) = (
             Z,
             offset,
             spread,
         )
         fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta_bar, noise_before
-        isolation.update_residual(fie, fdi["isolation"]["config"]["threshold_kind"], x)
+        isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
         on(isolation.predict_estimators, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_before, spread), strict=True):
             fed[name].append(value)
-    within = isolation.update_residual(fie, fdi["isolation"]["config"]["threshold_kind"], x)
+    within = isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
     return fdi, fie, {name: np.array(value) for name, value in fed.items()}, within
 
 
@@ -159,7 +163,9 @@ def test_a_residual_at_its_limit_is_within_and_beyond_it_is_not(thresholds, axis
             limits = (-0.6 * 0.3 - 0.03, 0.6 * 0.3 + 0.03)
         x = np.zeros(3)
         x[axis] = limits[side > 0] + side * beyond
-        return bool(isolation.update_residual(fie, fdi["isolation"]["config"]["threshold_kind"], x))
+        return bool(
+            isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
+        )
 
     assert within(-1e-12)
     assert not within(1e-9)
@@ -212,7 +218,10 @@ def test_the_one_left_is_the_fault(excluded, isolated):
 def test_one_that_is_left_for_an_end_that_nobody_saw_begin_is_not_named(doubted, shown, named):
     fdi = new_fdi()
     fdi["isolation"]["config"]["n_estimators"], fdi["isolation"]["estimator"]["excluded"][:3] = 3, (1, 0, 1)
-    fdi["isolation"]["estimator"]["weakly_excluded"][1], fdi["isolation"]["estimator"]["confirmed"][1] = (
+    (
+        fdi["isolation"]["estimator"]["weakly_excluded"][1],
+        fdi["isolation"]["estimator"]["confirmed_by_likelihood"][1],
+    ) = (
         doubted,
         shown,
     )
@@ -226,7 +235,7 @@ def test_a_hypothesis_is_the_difference_it_makes_to_the_moment(kind):
     """Surface 2 at u: healthy it gives G u; at share 1 + theta of it, or at the position theta."""
     rng, u = np.random.default_rng(3), np.array([0.1, -0.2, 0.3, 0.0])
     G, base, Z, theta = rng.normal(size=(3, 4)), np.zeros(3), np.zeros(3), -0.35
-    fill_hypothesis(kind, 2, G, G * u, base, Z)
+    fill_effect_of_hypothesis(kind, 2, G, G * u, base, Z)
     there = (1.0 + theta) * u[2] if kind == LOSS else theta
     assert base + theta * Z == pytest.approx(G[:, 2] * (there - u[2]))
 
@@ -237,12 +246,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["config"]["uses_reach_test"], fdi["verdict"]["detected"] = memory, 0
-    on(isolation.update_hypotheses, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
-    assert fie["reachable_effect_low"][:3, :3].any() == memory
+    assert fie["reachable_residual_low"][:3, :3].any() == memory
     assert fie["effect"]["regressor"].any() == memory
     fdi["verdict"]["detected"] = 1
-    on(isolation.update_hypotheses, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
     assert fie["effect"]["regressor"] == pytest.approx(Gu[:, 2])
     assert fie["effect"]["error_bound"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -290,7 +299,7 @@ def test_a_loss_that_has_shown_is_not_excluded_by_what_comes_later(abrupt):
     fdi = new_fdi()
     fie, fdi["config"]["abrupt"] = told(fdi, 20.0, 0.0), abrupt
     assert not excludes(fdi, ("published", "either"))
-    assert fie["confirmed"] == (not abrupt)
+    assert fie["confirmed_by_likelihood"] == (not abrupt)
     told(fdi, 0.0, 90.0)
     assert excludes(fdi, ("published", "either")) == bool(abrupt)
 
@@ -317,8 +326,8 @@ def doubtful(kind=LOSS, **switches):
 )  # fmt: skip
 def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, possible):
     fdi, fie = doubtful(kind, **switches)
-    assert on(isolation.is_fault_possible, fdi, fie, np.zeros(3), started) == possible
-    assert not on(isolation.is_fault_possible, fdi, fie, np.full(3, 9.0), started), (
+    assert on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), started) == possible
+    assert not on(isolation.update_and_test_if_fault_possible, fdi, fie, np.full(3, 9.0), started), (
         "beyond its limits it is excluded"
     )
 
@@ -326,15 +335,15 @@ def test_each_test_that_is_switched_on_can_exclude(kind, switches, started, poss
 def test_a_position_is_asked_in_the_first_frame_where_the_past_is_kept():
     fdi, fie = doubtful(POSITION, memory=1)
     fdi["bank"]["output"]["residual"] = 0.0
-    assert not on(isolation.is_fault_possible, fdi, fie, np.zeros(3), False)
+    assert not on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), False)
     fdi["bank"]["output"]["innovation"] = 0.0
-    assert on(isolation.is_fault_possible, fdi, fie, np.zeros(3), False)
+    assert on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), False)
 
 
 def test_what_is_learned_of_a_constant_loss_is_kept_of_no_position():
     fdi, fie = doubtful(POSITION, membership=1, abrupt=1)
     fdi["bank"]["output"]["innovation"] = 0.0
-    on(isolation.is_fault_possible, fdi, fie, np.zeros(3), True)
+    on(isolation.update_and_test_if_fault_possible, fdi, fie, np.zeros(3), True)
     assert fie["feasible_theta_min"].tolist() == [-1.0] * 3
 
 

@@ -10,17 +10,17 @@ from beaver_ftc.diagnosis.state import POSITION
 
 @pytest.mark.parametrize("slope", [2.0, -2.0])
 def test_the_parameters_that_agree_solve_the_inequality(slope):
-    low, high = isolation.consistent_parameters(0.6, 0.2, slope, -5.0, 5.0)
+    low, high = isolation.consistent_theta_interval(0.6, 0.2, slope, -5.0, 5.0)
     theta = np.linspace(-1, 1, 2001)
     agrees = theta[np.abs(0.6 - theta * slope) <= 0.2 + 1e-12]
     assert (low, high) == pytest.approx((agrees[0], agrees[-1]))
-    low, high = isolation.consistent_parameters(0.6, 0.2, slope, -0.25, 0.25)
+    low, high = isolation.consistent_theta_interval(0.6, 0.2, slope, -0.25, 0.25)
     assert sorted([abs(low), abs(high)]) == pytest.approx([0.2, 0.25])
 
 
 def test_without_an_effect_every_parameter_agrees_or_none():
-    assert isolation.consistent_parameters(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
-    low, high = isolation.consistent_parameters(-0.21, 0.2, 0.0, -1.0, 0.5)
+    assert isolation.consistent_theta_interval(-0.2, 0.2, 0.0, -1.0, 0.5) == (-1.0, 0.5)
+    low, high = isolation.consistent_theta_interval(-0.21, 0.2, 0.0, -1.0, 0.5)
     assert low > high
 
 
@@ -28,7 +28,7 @@ def agreeing(innovation, **fields):
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
     fdi["bank"]["output"]["innovation"], fdi["bound"]["frame_innovation_bound"] = innovation, 0.1
-    fie["effect"]["regressor"], fie["effect"]["base_acceleration"], fie["effect"]["error_bound"] = (
+    fie["effect"]["regressor"], fie["effect"]["acceleration_at_zero_theta"], fie["effect"]["error_bound"] = (
         (1.0, 2.0, -1.0),
         0.3,
         0.05,
@@ -61,14 +61,14 @@ def test_of_a_constant_theta_every_frame_leaves_what_it_agrees_with(shared):
     fdi["isolation"]["config"]["shares_theta_across_axes"] = shared
     fie["filtered_regressor"], fie["theta"], fie["filtered_uncertainty_bound"] = (0.5, 0.0, 1.0), -0.2, 0.05
     fie["residual"] = fie["filtered_regressor"] * (-0.5 + 0.2)
-    assert on(isolation.narrow_parameter_sets, fdi, fie)
+    assert on(isolation.narrow_feasible_theta_sets, fdi, fie)
     # frame: (0.1 + 0.05) / |Z|; filtered: 0.05 / |omega|
     half = np.minimum(0.15 / np.array([1.0, 2.0, 1.0]), [0.1, np.inf, 0.05])
     half = np.full(3, half.min()) if shared else half
     assert fie["feasible_theta_min"] == pytest.approx(-0.5 - half)
     assert fie["feasible_theta_max"] == pytest.approx(-0.5 + half)
     fie["feasible_theta_min"][2], fie["feasible_theta_max"][2] = -0.2, -0.1
-    assert not on(isolation.narrow_parameter_sets, fdi, fie)
+    assert not on(isolation.narrow_feasible_theta_sets, fdi, fie)
 
 
 def test_the_dominant_axis_is_that_of_the_largest_effect():
@@ -94,7 +94,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
         (0.1, 0.4, 0.2),
         (0.01, 0.02, 0.2),
     )
-    fie["effect"]["regressor"], fie["effect"]["base_acceleration"], fie["effect"]["error_bound"] = (
+    fie["effect"]["regressor"], fie["effect"]["acceleration_at_zero_theta"], fie["effect"]["error_bound"] = (
         (0.1, 5.0, 1.0),
         -0.1,
         0.01,

@@ -90,7 +90,7 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
     over(frames)
     fie["effect"]["regressor"][0], fie["effect"]["error_bound"][0] = (
         prediction["frame_means"]["Gu"][0, 0],
-        prediction["frame_means"]["Gu_spread"][0, 0],
+        prediction["frame_means"]["Gu_tolerance_for_fault_change"][0, 0],
     )
     fie["parity_direction"][0] = 1.0
     effect = (theta0 * moment0 + (n - 1) * theta * moment) / n
@@ -103,4 +103,4 @@ def test_one_instant_leaves_no_room():
     fill(frames[0], np.random.default_rng(0))
     first(frames)
     over(frames)
-    assert (frames[0]["prediction"]["frame_means"]["Gu_spread"] == 0.0).all()
+    assert (frames[0]["prediction"]["frame_means"]["Gu_tolerance_for_fault_change"] == 0.0).all()

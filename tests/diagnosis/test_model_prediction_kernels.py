@@ -20,7 +20,7 @@ def test_what_is_foreseen_has_the_effectiveness_of_the_frame_before(instants):
     for k in range(5):
         prediction["sums"]["G"], prediction["sums"]["Gu"] = instants * G[k], instants * G[k] * u[k]
         model_prediction.fill_frame_means(prediction, bound)
-        model_prediction.predict_control_effect(prediction["frame_means"])
+        model_prediction.fill_surface_effects_with_previous_G(prediction["frame_means"])
         assert prediction["frame_means"]["Gu"] == pytest.approx(G[k] * u[k])
         if k > 0:
             assert prediction["frame_means"]["previous_G"] == pytest.approx(G[k - 1])
@@ -32,7 +32,7 @@ def test_of_the_first_frame_nothing_is_foreseen():
     prediction["frame_share_per_instant"] = 1.0
     prediction["sums"]["G"][:, 0] = prediction["sums"]["Gu"][:, 0] = 1.0
     model_prediction.fill_frame_means(prediction, np.zeros(1, bound_dtype(2))[0])
-    model_prediction.predict_control_effect(prediction["frame_means"])
+    model_prediction.fill_surface_effects_with_previous_G(prediction["frame_means"])
     assert not prediction["frame_means"]["Gu_with_previous_G"].any()
 
 

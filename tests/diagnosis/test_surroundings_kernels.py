@@ -37,7 +37,7 @@ EITHER = 0
 
 def new_air(**fields):
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    fill(record, wing_span=SPAN, gravity=9.8, is_turbulent=1, is_gust_measured=1)
+    fill(record, wing_span=SPAN, gravity=9.8, accounts_for_gusts=1, is_gust_measured=1)
     return fill(record, **fields)
 
 
@@ -115,7 +115,9 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     """
     rng = np.random.default_rng(7)
     record = new_air(
-        has_fast_axes_turn=swings, unmeasured_share_by_past_turns=0.4, rolling_gust_correlation_length=30.0
+        has_fast_axes_turn=swings,
+        unmeasured_share_by_past_heading_turns=0.4,
+        rolling_gust_correlation_length=30.0,
     )
     (
         record["output"]["rate_damping"],
@@ -138,16 +140,18 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     once = swings * DT * V * swing @ np.diag(turned) @ swing.T
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
-            gusts.add_axes_turn_variance(record, V, DT)
+            gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
         gusts.fill_frame_mean_gust(record, 1.0)
-        assert record["output"]["axes_turn_variance"] == pytest.approx(leap * once, rel=1e-12)
+        assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
 def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
     record, rate = new_air(turbulence_scale_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert gusts.unmeasured_share_of_turn(record, V, rate) == pytest.approx(rate**2 * lag / (3.0 * V / 500.0))
+    assert gusts.unmeasured_share_by_heading_rate(record, V, rate) == pytest.approx(
+        rate**2 * lag / (3.0 * V / 500.0)
+    )
 
 
 def test_the_bound_of_a_true_estimator_covers_every_course_of_its_parameter():
@@ -298,7 +302,7 @@ def new_detector(**fields):
 def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     fdi, record, design = new_detector()
     rng = np.random.default_rng(1)
-    record["gust"]["output"]["is_turbulent"] = moving
+    record["gust"]["output"]["accounts_for_gusts"] = moving
     record["gust"]["output"]["rate_damping"], record["gust"]["output"]["gust_axes_in_body"] = rng.normal(
         size=(2, 3, 3)
     )
@@ -382,7 +386,7 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
     expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
     assert prediction["acceleration_with_known_faults"] == pytest.approx(expected)
     prediction["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
-    model_prediction.form_innovation(prediction, x, 0.5)
+    model_prediction.form_innovation_after_known_faults(prediction, x, 0.5)
     innovation = np.array([0.4, -0.2, 0.0]) - expected
     assert prediction["innovation_after_known_faults"] == pytest.approx(innovation)
 
@@ -501,7 +505,7 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
     block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["output"]["axes_turn_variance"], block["drift_intensity_scale"], block["P_dd"] = (
+    record["output"]["acceleration_variance_by_axes_turn"], block["drift_intensity_scale"], block["P_dd"] = (
         rng.normal(size=(3, 3)),
         1.7,
         0.3,
@@ -509,5 +513,5 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     block["n_axes"], block["axis"] = 2, (0, 2)
     statistical.add_gust_axes_turn_to_drift_covariance(record, block)
     assert block["P_dd"] == pytest.approx(
-        0.3 + 1.7 * record["output"]["axes_turn_variance"][np.ix_((0, 2), (0, 2))]
+        0.3 + 1.7 * record["output"]["acceleration_variance_by_axes_turn"][np.ix_((0, 2), (0, 2))]
     )

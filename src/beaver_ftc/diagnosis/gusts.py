@@ -66,16 +66,15 @@ MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to
 MAX_GUST_VELOCITY_SIGMA = 4.0  # limit of the estimated gust velocity, standard deviations
 MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
 MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
-MIN_AXES_TURN_INTENSITY_SHARE = (
-    0.01  # share of a gust's own intensity below which the turn of its axes is ignored
-)
+# share of a gust's own intensity below which the turn of its axes is ignored
+MIN_GUST_AXES_TURN_INTENSITY_SHARE = 0.01
 
 GUST_CONFIG_RECORD = record(
     has_force_model=int,  # whether the design model has forces
     only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
     wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
     # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
-    drift_intensity_aloft=3, drift_intensity_at_1_m=3,
+    gust_drift_intensity_aloft=3, gust_drift_intensity_at_1_m=3,
     altitude_error_bound=float,
     altitude_error_share=float,  # bound on the altimeter's error: m; share of the reading
     # limit of a gust component, m/s; decay of `gust_velocity`, 1/s
@@ -106,22 +105,25 @@ GUST_MEMORY_RECORD = record(
     gust_velocity=3, initial_gust_variance_share=float,
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
     # the pitching gust that was present when the diagnosis has_acceleration_before.
-    unmeasured_share_by_turn=float, unmeasured_share_by_past_turns=float, unmeasured_share_by_start=float,
+    unmeasured_share_by_heading_turn=float, unmeasured_share_by_past_heading_turns=float,
+    unmeasured_share_by_start=float,
     # turn of the gusts' axes in the body, 1/s; whether it counts
     gust_axes_rate=(3, 3), has_fast_axes_turn=int,
     # Variance of the accelerations by that turn, (rad/s2)2: in the current frame, in the frame before; number
     # of frames for which there is any.
-    axes_turn_variance_now=(3, 3), axes_turn_variance_before=(3, 3), n_axes_turn_frames=int,
+    acceleration_variance_by_axes_turn_now=(3, 3), acceleration_variance_by_axes_turn_before=(3, 3),
+    n_frames_with_axes_turn_variance=int,
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
     # Whether there is turbulence; whether accelerometers are used; whether the gust is measured. These are
     # filled by configure, and end with the accelerometers.
-    is_turbulent=int, uses_accelerometers=int, is_gust_measured=int,
+    accounts_for_gusts=int, uses_accelerometers=int, is_gust_measured=int,
     # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
     gust_acceleration=3, mean_gust_acceleration=3,
     coarse_gust_acceleration=3,  # effect of the coarse estimate, rad/s2
-    axes_turn_variance=(3, 3),  # `axes_turn_variance_now` plus `axes_turn_variance_before`, (rad/s2)2
+    # `acceleration_variance_by_axes_turn_now` plus `acceleration_variance_by_axes_turn_before`, (rad/s2)2
+    acceleration_variance_by_axes_turn=(3, 3),
     speed_relative_to_mean_air=float,  # relative to the mean air, m/s
     rate_damping=(3, 3), gust_axes_in_body=(3, 3),  # 1/s; rotation from the gusts' axes to body axes
 )  # fmt: skip
@@ -195,15 +197,15 @@ def start_gust_estimate(gust, y, attitude):
     measure_air_relative_velocity(gust, y, attitude)
     update_gust_axes(gust, 0.0, 1.0)
     gust.memory.air_rotation_in_level_axes[:] = 0.0
-    gust.memory.has_acceleration_before, gust.memory.unmeasured_share_by_turn = 0, 0.0
-    gust.memory.unmeasured_share_by_past_turns = gust.memory.unmeasured_share_by_start = (
+    gust.memory.has_acceleration_before, gust.memory.unmeasured_share_by_heading_turn = 0, 0.0
+    gust.memory.unmeasured_share_by_past_heading_turns = gust.memory.unmeasured_share_by_start = (
         gust.memory.initial_gust_variance_share
     ) = float(gust.config.starts_in_flight)
     gust.memory.gust_velocity[:], gust.output.speed_relative_to_mean_air = 0.0, y[AIRSPEED]
-    gust.memory.axes_turn_variance_now[:] = 0.0
-    gust.memory.axes_turn_variance_before[:] = 0.0
-    gust.output.axes_turn_variance[:] = 0.0
-    gust.memory.n_axes_turn_frames = 0
+    gust.memory.acceleration_variance_by_axes_turn_now[:] = 0.0
+    gust.memory.acceleration_variance_by_axes_turn_before[:] = 0.0
+    gust.output.acceleration_variance_by_axes_turn[:] = 0.0
+    gust.memory.n_frames_with_axes_turn_variance = 0
 
 
 @kernel
@@ -238,12 +240,12 @@ def update_gust_axes_rate(gust, dt, V):
             fastest_turn = max(fastest_turn, abs(gust.memory.gust_axes_rate[i, g]))
     gust.memory.has_fast_axes_turn = (
         0.5 * (fastest_turn * gust.config.rolling_gust_correlation_length / V) ** 2
-        > MIN_AXES_TURN_INTENSITY_SHARE
+        > MIN_GUST_AXES_TURN_INTENSITY_SHARE
     )
 
 
 @kernel
-def unmeasured_share_of_turn(gust, V, heading_rate):
+def unmeasured_share_by_heading_rate(gust, V, heading_rate):
     """Share of the yawing gust's intensity that is unmeasured while the heading turns at `heading_rate`
     rad/s.
 
@@ -294,11 +296,16 @@ def update_gust_rotation(gust, y, attitude, dt):
     update_gust_axes(gust, sin, cos)
     update_gust_axes_rate(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    share_before = gust.memory.unmeasured_share_by_turn
-    gust.memory.unmeasured_share_by_turn = unmeasured_share_of_turn(gust, V, heading_change / dt)
-    unmeasured_share = max(share_before, gust.memory.unmeasured_share_by_turn)
-    gust.memory.unmeasured_share_by_past_turns = min(
-        max(np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_share_by_past_turns, unmeasured_share), 1.0
+    share_before = gust.memory.unmeasured_share_by_heading_turn
+    gust.memory.unmeasured_share_by_heading_turn = unmeasured_share_by_heading_rate(
+        gust, V, heading_change / dt
+    )
+    unmeasured_share = max(share_before, gust.memory.unmeasured_share_by_heading_turn)
+    gust.memory.unmeasured_share_by_past_heading_turns = min(
+        max(
+            np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_share_by_past_heading_turns, unmeasured_share
+        ),
+        1.0,
     )
     gust.memory.unmeasured_share_by_start *= np.exp(-dt / pitching_lag_s)
     gust.memory.air_rotation_in_level_axes[1] = np.exp(
@@ -352,11 +359,11 @@ def set_gust_drift_intensity(gust, altitude):
     """Fill the intensity of turbulence at this altitude, m as measured."""
     height = min_true_height_m(altitude, gust.config.altitude_error_bound, gust.config.altitude_error_share)
     gust.memory.gust_drift_intensity[0] = max(
-        gust.config.drift_intensity_aloft[0], gust.config.drift_intensity_at_1_m[0] / height**1.5
+        gust.config.gust_drift_intensity_aloft[0], gust.config.gust_drift_intensity_at_1_m[0] / height**1.5
     )
     for g in range(1, 3):
         gust.memory.gust_drift_intensity[g] = max(
-            gust.config.drift_intensity_aloft[g], gust.config.drift_intensity_at_1_m[g] / height
+            gust.config.gust_drift_intensity_aloft[g], gust.config.gust_drift_intensity_at_1_m[g] / height
         )
 
 
@@ -406,7 +413,7 @@ def fill_gust_effect(gust, design, x, y, u):
 def begin_gust_sums(gust, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
     gust.memory.gust_angular_acceleration_sum[:] = gust.output.gust_acceleration
-    add_axes_turn_variance(gust, V, dt)
+    add_acceleration_variance_by_axes_turn(gust, V, dt)
 
 
 @kernel
@@ -419,7 +426,7 @@ def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
     fill_gust_effect(gust, design, x, y, u)
     for i in range(3):
         gust.memory.gust_angular_acceleration_sum[i] += gust.output.gust_acceleration[i]
-    add_axes_turn_variance(gust, y[AIRSPEED], dt)
+    add_acceleration_variance_by_axes_turn(gust, y[AIRSPEED], dt)
 
 
 @kernel
@@ -431,7 +438,7 @@ def store_accelerometer_reading(gust, force):
 @kernel
 def stop_gust_estimate(gust):
     """Stop estimating the gust."""
-    gust.output.is_turbulent = 0
+    gust.output.accounts_for_gusts = 0
 
 
 @kernel
@@ -447,21 +454,21 @@ def stop_accelerometers(gust):
         half_yaw_length_m = 0.5 * gust_correlation_length(gust, 2)
         for i in range(3):
             for j in range(3):
-                gust.memory.axes_turn_variance_now[i, j] += (
+                gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                     half_pitch_length_m
                     * gust.memory.gust_drift_intensity[1]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 1)
                 )
-                gust.memory.axes_turn_variance_now[i, j] += (
+                gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                     half_yaw_length_m
                     * gust.memory.gust_drift_intensity[2]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 2)
                 )
-        gust.memory.n_axes_turn_frames = 3
+        gust.memory.n_frames_with_axes_turn_variance = 3
 
 
 @kernel
-def total_unmeasured_share(gust, g):
+def unmeasured_gust_intensity_share(gust, g):
     """Share of the intensity of the gust about axis g that is unmeasured in this frame."""
     if g == 0:
         return min(gust.memory.unmeasured_intensity_share[g], 1.0)
@@ -478,7 +485,11 @@ def total_unmeasured_share(gust, g):
     return min(
         gust.memory.unmeasured_intensity_share[g]
         + speed_error_share
-        + (gust.memory.unmeasured_share_by_start if g == 1 else gust.memory.unmeasured_share_by_past_turns),
+        + (
+            gust.memory.unmeasured_share_by_start
+            if g == 1
+            else gust.memory.unmeasured_share_by_past_heading_turns
+        ),
         1.0,
     )
 
@@ -523,7 +534,7 @@ def unmeasured_gust_drift_intensity(gust, V, i, j, with_rolling_correlation_leng
         power_ratio = low_frequency_power_ratio(gust, g) if with_rolling_correlation_length else 1.0
         total += (
             gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, g)
-            * total_unmeasured_share(gust, g)
+            * unmeasured_gust_intensity_share(gust, g)
             * gust.memory.gust_drift_intensity[g]
             * power_ratio
         )
@@ -531,8 +542,9 @@ def unmeasured_gust_drift_intensity(gust, V, i, j, with_rolling_correlation_leng
 
 
 @kernel
-def add_axes_turn_variance(gust, V, dt):
-    """Add to `axes_turn_variance_now` the effect of the turn of the gusts' axes in dt s; V m/s."""
+def add_acceleration_variance_by_axes_turn(gust, V, dt):
+    """Add to `acceleration_variance_by_axes_turn_now` the effect of the turn of the gusts' axes in dt s; V
+    m/s."""
     if not gust.memory.has_fast_axes_turn:
         return
     rolling_variance = 0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_drift_intensity[0]
@@ -540,36 +552,39 @@ def add_axes_turn_variance(gust, V, dt):
         0.5
         * gust_lag_s(gust, 2, V) ** 2
         * gust.memory.gust_drift_intensity[2]
-        * gust.memory.unmeasured_share_by_past_turns
+        * gust.memory.unmeasured_share_by_past_heading_turns
     )
     for i in range(3):
         for j in range(3):
             roll_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
             yaw_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
-            gust.memory.axes_turn_variance_now[i, j] += (
+            gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                 dt * V * (rolling_variance * roll_product + yawing_variance * yaw_product)
             )
-    gust.memory.n_axes_turn_frames = 3
+    gust.memory.n_frames_with_axes_turn_variance = 3
 
 
 @kernel
 def fill_frame_mean_gust(gust, frame_share):
-    """Fill `mean_gust_acceleration` and `axes_turn_variance` for the elapsed frame.
+    """Fill `mean_gust_acceleration` and `acceleration_variance_by_axes_turn` for the elapsed frame.
 
     frame_share: one over the number of instants. Axes may turn in the middle of a frame. A part of the
     effect is then in this frame and the rest in the next, so the variance counts in both frames.
     """
     for i in range(3):
         gust.output.mean_gust_acceleration[i] = frame_share * gust.memory.gust_angular_acceleration_sum[i]
-    if gust.memory.n_axes_turn_frames > 0:
-        gust.memory.n_axes_turn_frames -= 1
+    if gust.memory.n_frames_with_axes_turn_variance > 0:
+        gust.memory.n_frames_with_axes_turn_variance -= 1
         for i in range(3):
             for j in range(3):
-                gust.output.axes_turn_variance[i, j] = (
-                    gust.memory.axes_turn_variance_before[i, j] + gust.memory.axes_turn_variance_now[i, j]
+                gust.output.acceleration_variance_by_axes_turn[i, j] = (
+                    gust.memory.acceleration_variance_by_axes_turn_before[i, j]
+                    + gust.memory.acceleration_variance_by_axes_turn_now[i, j]
                 )
-                gust.memory.axes_turn_variance_before[i, j] = gust.memory.axes_turn_variance_now[i, j]
-                gust.memory.axes_turn_variance_now[i, j] = 0.0
+                gust.memory.acceleration_variance_by_axes_turn_before[i, j] = (
+                    gust.memory.acceleration_variance_by_axes_turn_now[i, j]
+                )
+                gust.memory.acceleration_variance_by_axes_turn_now[i, j] = 0.0
 
 
 @kernel
@@ -605,7 +620,7 @@ def remaining_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_se
     """
     total = 0.0
     for g in range(3):
-        unmeasured_sensitivity = np.sqrt(total_unmeasured_share(gust, g)) * abs(
+        unmeasured_sensitivity = np.sqrt(unmeasured_gust_intensity_share(gust, g)) * abs(
             project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, g)
         )
         total += (
@@ -638,22 +653,22 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
     turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
-    gust["output"]["is_turbulent"] = turbulence.moves
+    gust["output"]["accounts_for_gusts"] = turbulence.moves
     gust["config"]["has_force_model"] = bool(aircraft.measurable_forces)
     gust["output"]["is_gust_measured"] = (
         gust["config"]["has_force_model"] or gust["output"]["uses_accelerometers"]
     )  # only where forces are known
     gust["config"]["only_coarse_estimate"] = (
-        gust["output"]["is_turbulent"] and not gust["output"]["is_gust_measured"]
+        gust["output"]["accounts_for_gusts"] and not gust["output"]["is_gust_measured"]
     )
     fill_table(gust["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
     gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     gust["config"]["wing_span"] = span_m
-    gust["config"]["drift_intensity_aloft"] = turbulence.rotation_walk(span_m)
-    gust["config"]["drift_intensity_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
+    gust["config"]["gust_drift_intensity_aloft"] = turbulence.rotation_walk(span_m)
+    gust["config"]["gust_drift_intensity_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
     gust["memory"]["gust_drift_intensity"], gust["memory"]["unmeasured_intensity_share"] = (
-        gust["config"]["drift_intensity_aloft"],
+        gust["config"]["gust_drift_intensity_aloft"],
         MIN_UNMEASURED_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
     gust["config"]["altitude_error_bound"] = errors["altitude"].worst
@@ -698,7 +713,7 @@ def configure_speed_error(gust: np.void, declared: Declared, alarm_level: float,
     variance sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
     sigma, errors = declared.air.sigma_mps, declared.sensors
-    if not (gust["output"]["is_turbulent"] and gust["output"]["is_gust_measured"]):
+    if not (gust["output"]["accounts_for_gusts"] and gust["output"]["is_gust_measured"]):
         return
     gust_return_rate_per_s, airspeed_errors = airspeed_mps / SCALE_M, errors["V"]
     acceleration_error = (

@@ -99,7 +99,7 @@ class WhiteningFilter:
         return float(np.sqrt(max(squared_deflection, 0.0)))
 
 
-def with_measured_gust(context: Context, noise_rad_s2: np.ndarray) -> Context:
+def context_with_measured_gust(context: Context, noise_rad_s2: np.ndarray) -> Context:
     """Return the context of a test that knows the gusts the vanes measure, with noise (3,) rad/s2."""
     declared = context.declared
     if not declared.air:

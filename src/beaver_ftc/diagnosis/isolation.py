@@ -71,48 +71,52 @@ N_DEFLECTION_BOUND_ITERATIONS = (
 
 
 @kernel
-def is_healthy(innovation, bound):
-    """True if the declared uncertainty alone explains an innovation (3,): |nu| <= bound (3,), rad/s2."""
+def uncertainty_explains_innovation(innovation, innovation_bound):
+    """True if the declared uncertainty alone explains an innovation (3,): |nu| <= innovation_bound (3,),
+    rad/s2."""
     is_within = True
     for i in range(3):
-        is_within = is_within and abs(innovation[i]) <= bound[i]
+        is_within = is_within and abs(innovation[i]) <= innovation_bound[i]
     return is_within
 
 
 @kernel
-def consistent_parameters(measured_effect, bound, slope, low, high):
-    """The theta of [low, high] with |measured_effect - theta slope| <= bound, as (low, high); low > high if
-    none."""
-    if slope == 0.0:
-        return (low, high) if abs(measured_effect) <= bound else EMPTY_SET
-    first_end, other_end = (measured_effect - bound) / slope, (measured_effect + bound) / slope
-    return max(low, min(first_end, other_end)), min(high, max(first_end, other_end))
+def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min, theta_max):
+    """The theta of [theta_min, theta_max] with |measured_effect - theta regressor| <= error_bound, as (low,
+    high); low > high if none."""
+    if regressor == 0.0:
+        return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_SET
+    first_end, other_end = (
+        (measured_effect - error_bound) / regressor,
+        (measured_effect + error_bound) / regressor,
+    )
+    return max(theta_min, min(first_end, other_end)), min(theta_max, max(first_end, other_end))
 
 
 @kernel
-def consistent_parameters_on_axis(innovation, bound, fie, effect, i):
+def consistent_theta_interval_on_axis(innovation, bound, fie, effect, i):
     """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
 
     It is the whole known set if the axis is ignored. bound (3,) rad/s2: on the innovation without a fault;
-    effect: acceleration by the fault, of dtype EFFECT_RECORD.
+    effect: acceleration by the fault, of dtype FAULT_EFFECT_RECORD.
     """
     if fie.ignored_axes[i]:
         return fie.theta_min, fie.theta_max
     measured_effect, error_bound = (
-        innovation[i] - effect.base_acceleration[i],
+        innovation[i] - effect.acceleration_at_zero_theta[i],
         bound[i] + effect.error_bound[i],
     )
-    return consistent_parameters(
+    return consistent_theta_interval(
         measured_effect, error_bound, effect.regressor[i], fie.theta_min, fie.theta_max
     )
 
 
 @kernel
-def axis_of_largest_effect(Z):
-    """The axis on which a regressor Z (3,) is largest."""
+def axis_of_largest_effect(regressor):
+    """The axis on which a regressor (3,) is largest."""
     axis = 0
     for i in range(1, 3):
-        if abs(Z[i]) > abs(Z[axis]):
+        if abs(regressor[i]) > abs(regressor[axis]):
             axis = i
     return axis
 
@@ -138,7 +142,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         (fie.theta_min, fie.theta_max),
     )
     map_level = map_travel_level_at_position(error_map, fie, position_range, n_substeps)
-    measured_effect = innovation[axis] - effect.base_acceleration[axis]
+    measured_effect = innovation[axis] - effect.acceleration_at_zero_theta[axis]
     deflection_at_first_substep = 2.0 * previous_max_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         surface_error = max(
@@ -147,7 +151,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
             0.0,
         )
         surface_error += bound.additional_error_by_travel_level[map_level, axis]
-        low, high = consistent_parameters(
+        low, high = consistent_theta_interval(
             measured_effect,
             bound.frame_innovation_bound[axis] + error_bound + surface_error,
             effect.regressor[axis],
@@ -192,17 +196,19 @@ def map_travel_level_at_position(error_map, fie, position_range, n_substeps):
 @kernel
 def is_theta_consistent(fie, innovation, innovation_bound):
     """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
-    if is_healthy(innovation, innovation_bound):
+    if uncertainty_explains_innovation(innovation, innovation_bound):
         return True
     low, high = fie.theta_min, fie.theta_max
     for i in range(3):
-        axis_low, axis_high = consistent_parameters_on_axis(innovation, innovation_bound, fie, fie.effect, i)
+        axis_low, axis_high = consistent_theta_interval_on_axis(
+            innovation, innovation_bound, fie, fie.effect, i
+        )
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
 
 
 @kernel
-def reset_parameter_sets(fie, projection_disabled):
+def reset_feasible_theta_sets(fie, projection_disabled):
     """Start with the known set of theta on every axis, or, if `projection_disabled`, without limits."""
     fie.feasible_theta_min[:], fie.feasible_theta_max[:] = fie.theta_min, fie.theta_max
     if projection_disabled:
@@ -210,7 +216,7 @@ def reset_parameter_sets(fie, projection_disabled):
 
 
 @kernel
-def intersect_parameter_sets(fie, i, interval, shared_by_axes):
+def intersect_feasible_theta_sets(fie, i, interval, shared_by_axes):
     """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `interval`."""
     low, high = interval
     for j in range(3):
@@ -220,19 +226,21 @@ def intersect_parameter_sets(fie, i, interval, shared_by_axes):
 
 
 @kernel
-def narrow_parameter_sets(fie, innovation, innovation_bound, shared_by_axes):
+def narrow_feasible_theta_sets(fie, innovation, innovation_bound, shared_by_axes):
     """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
 
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
     """
     for i in range(3):
-        consistent_in_frame = consistent_parameters_on_axis(innovation, innovation_bound, fie, fie.effect, i)
-        intersect_parameter_sets(fie, i, consistent_in_frame, shared_by_axes)
+        consistent_in_frame = consistent_theta_interval_on_axis(
+            innovation, innovation_bound, fie, fie.effect, i
+        )
+        intersect_feasible_theta_sets(fie, i, consistent_in_frame, shared_by_axes)
         filtered_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
-        intersect_parameter_sets(
+        intersect_feasible_theta_sets(
             fie,
             i,
-            consistent_parameters(
+            consistent_theta_interval(
                 filtered_effect,
                 fie.filtered_uncertainty_bound[i],
                 fie.filtered_regressor[i],
@@ -256,36 +264,36 @@ def set_effect_error_bound(effect, effect_error_bound, surface):
 
 @kernel
 def clear_mean_effect(mean):
-    """Begin the mean of a fault's effect over a block of frames (dtype EFFECT_RECORD)."""
-    mean.base_acceleration[:], mean.regressor[:], mean.error_bound[:] = 0.0, 0.0, 0.0
+    """Begin the mean of a fault's effect over a block of frames (dtype FAULT_EFFECT_RECORD)."""
+    mean.acceleration_at_zero_theta[:], mean.regressor[:], mean.error_bound[:] = 0.0, 0.0, 0.0
 
 
 @kernel
 def add_to_mean_effect(mean, effect, frame_share):
     """Add the effect of a frame, a `frame_share` of the block, to the mean over the block."""
     for i in range(3):
-        mean.base_acceleration[i] += frame_share * effect.base_acceleration[i]
+        mean.acceleration_at_zero_theta[i] += frame_share * effect.acceleration_at_zero_theta[i]
         mean.regressor[i] += frame_share * effect.regressor[i]
         mean.error_bound[i] += frame_share * effect.error_bound[i]
 
 
-# Acceleration by a fault, rad/s2: base_acceleration + theta regressor, within +/- error_bound.
-EFFECT_RECORD = record(base_acceleration=3, regressor=3, error_bound=3)
+# Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
+FAULT_EFFECT_RECORD = record(acceleration_at_zero_theta=3, regressor=3, error_bound=3)
 
 ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
     excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3,
     lower_threshold=3, upper_threshold=3,
-    confirmed=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
+    confirmed_by_likelihood=int, weakly_excluded=int, excluded_by_likelihood=int,  # by likelihood ratios
     # Omega, and the same of the positive and the negative part of Z
     filtered_regressor=3, filtered_positive_regressor=3, filtered_negative_regressor=3,
     filtered_uncertainty_bound=3, filtered_eta_bar=3, filtered_gyro_error_bound=3, theta=3, theta_variance=3,
-    effect=EFFECT_RECORD, block_mean_effect=EFFECT_RECORD,  # of the frame; mean over a block
+    effect=FAULT_EFFECT_RECORD, block_mean_effect=FAULT_EFFECT_RECORD,  # of the frame; mean over a block
     # that the surface can have had: rad; share of its travel
     max_possible_deflection=float, max_possible_travel_share=float,
     # on the residuals of the bank (filters.py)
-    parity_direction=3, reachable_effect_low=(MAX_POLES, 4), reachable_effect_high=(MAX_POLES, 4),
+    parity_direction=3, reachable_residual_low=(MAX_POLES, 4), reachable_residual_high=(MAX_POLES, 4),
     feasible_theta_min=3, feasible_theta_max=3,  # what the frames since the alarm leave of the known set
 )  # fmt: skip
 
@@ -375,16 +383,16 @@ def configure_isolation(
 
 
 @kernel
-def fill_hypothesis(hypothesis_kind, surface, G, Gu, base_acceleration, regressor):
-    """Fill base_acceleration (3,) rad/s2 and regressor (3,) rad/s2 per unit of theta, for one fault.
+def fill_effect_of_hypothesis(hypothesis_kind, surface, G, Gu, acceleration_at_zero_theta, regressor):
+    """Fill acceleration_at_zero_theta (3,) rad/s2 and regressor (3,) rad/s2 per unit of theta, for one fault.
 
     G (3, n) rad/s2 per rad; Gu (3, n) rad/s2, the acceleration each commanded surface would give if healthy.
     """
     for i in range(3):
         if hypothesis_kind == POSITION:
-            base_acceleration[i], regressor[i] = -Gu[i, surface], G[i, surface]
+            acceleration_at_zero_theta[i], regressor[i] = -Gu[i, surface], G[i, surface]
         else:
-            base_acceleration[i], regressor[i] = 0.0, Gu[i, surface]
+            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu[i, surface]
 
 
 @kernel
@@ -395,7 +403,9 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
     effect_error_bound (3, n) rad/s2: error of the mean if a fault changes within the frame.
     """
     effect = fie.effect
-    fill_hypothesis(fie.hypothesis_kind, fie.surface, G, Gu, effect.base_acceleration, effect.regressor)
+    fill_effect_of_hypothesis(
+        fie.hypothesis_kind, fie.surface, G, Gu, effect.acceleration_at_zero_theta, effect.regressor
+    )
     set_effect_error_bound(effect, effect_error_bound, fie.surface)
     if (
         bound.has_declared_surface_errors or bound.model_error_map.one_surface_may_be_anywhere
@@ -406,7 +416,7 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
 
 
 @kernel
-def update_hypotheses(isolation, bank, bound, config, detected, G, Gu, effect_error_bound):
+def update_fault_effects(isolation, bank, bound, config, detected, G, Gu, effect_error_bound):
     """`update_fault_effect` for every estimator, where something will ask for it."""
     if isolation.config.uses_reach_test or config.diagnoses_all_types or detected:
         for fie in isolation.estimator[: isolation.config.n_estimators]:
@@ -422,11 +432,11 @@ def start_estimators(isolation, gyro_error_change_bound, x):
     for fie in isolation.estimator[: isolation.config.n_estimators]:
         fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, gyro_error_change_bound
         fie.theta_variance[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
-        reset_parameter_sets(fie, isolation.config.projection_disabled)
+        reset_feasible_theta_sets(fie, isolation.config.projection_disabled)
 
 
 @kernel
-def update_residual(fie, threshold_kind, x):
+def update_residual_and_thresholds(fie, threshold_kind, x):
     """Form the residual and its thresholds; true if it is within them on every axis that counts."""
     is_within = True
     for i in range(3):
@@ -462,13 +472,13 @@ def update_residual(fie, threshold_kind, x):
 
 
 @kernel
-def is_fault_possible(isolation, fie, bank, innovation_bound, abrupt, x, isolation_has_run):
+def update_and_test_if_fault_possible(isolation, fie, bank, innovation_bound, abrupt, x, isolation_has_run):
     """True if no test that is switched on excludes the fault of estimator fie.
 
     innovation_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as
     it is; x (3,) rad/s: measured; isolation_has_run: it started a frame or more ago.
     """
-    is_possible = update_residual(fie, isolation.config.threshold_kind, x)
+    is_possible = update_residual_and_thresholds(fie, isolation.config.threshold_kind, x)
     if isolation.config.uses_reach_test:
         is_possible = is_possible and are_residuals_reachable(
             bank, fie, isolation.config.shares_theta_across_axes
@@ -478,7 +488,7 @@ def is_fault_possible(isolation, fie, bank, innovation_bound, abrupt, x, isolati
     ):
         is_possible = is_possible and is_theta_consistent(fie, bank.output.innovation, innovation_bound)
     if isolation.config.narrows_theta_sets and abrupt and isolation_has_run and fie.hypothesis_kind == LOSS:
-        is_possible = is_possible and narrow_parameter_sets(
+        is_possible = is_possible and narrow_feasible_theta_sets(
             fie, bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
         )
     return is_possible
@@ -512,7 +522,9 @@ def decide_isolation(isolation, t):
             last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
         else:
             n_not_excluded += 1
-            remaining = NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed else estimator_index
+            remaining = (
+                NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed_by_likelihood else estimator_index
+            )
     if t - last_exclusion_s < isolation.config.isolation_hold_off_s:
         remaining = NOT_ISOLATED
     return NOT_ISOLATED if n_not_excluded > 1 else (remaining if n_not_excluded == 1 else UNANTICIPATED)
@@ -586,15 +598,15 @@ def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
     the frame; fie.effect must be that of this frame.
     """
     for i in range(3):
-        base_acceleration, regressor, theta, decay = (
-            fie.effect.base_acceleration[i],
+        acceleration_at_zero_theta, regressor, theta, decay = (
+            fie.effect.acceleration_at_zero_theta[i],
             fie.effect.regressor[i],
             fie.theta[i],
             isolation.config.filter_decay[i],
         )
         fie.xhat[i] = (
             x[i]
-            + dt * (predicted_acceleration[i] + base_acceleration + regressor * theta)
+            + dt * (predicted_acceleration[i] + acceleration_at_zero_theta + regressor * theta)
             + decay * (fie.xhat[i] - x[i])
         )
     adapt_estimate(isolation, fie, dt)
@@ -656,7 +668,8 @@ def predict_estimators(isolation, bound, x, predicted_acceleration, dt):
 def update_likelihood_exclusion(
     fie, tests, filter_blocks, isolation, loss_estimator, abrupt, vane_error_can_hide
 ):
-    """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed` and `weakly_excluded`.
+    """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed_by_likelihood` and
+    `weakly_excluded`.
 
     vane_error_can_hide: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be
     the effect of that error, so all estimators become weakly excluded. loss_estimator (n,): of each surface;
@@ -664,11 +677,11 @@ def update_likelihood_exclusion(
     """
     all_estimators, s = isolation.estimator, fie.surface
     fie.excluded_by_likelihood = 0
-    if not fie.confirmed and (fie.weakly_excluded or not abrupt):
-        fie.confirmed = statistical.confirms_loss(
+    if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not abrupt):
+        fie.confirmed_by_likelihood = statistical.confirms_loss(
             tests, filter_blocks, all_estimators, loss_estimator, s
         )  # what follows later may be its end
-    if fie.confirmed or not statistical.excludes_loss(
+    if fie.confirmed_by_likelihood or not statistical.excludes_loss(
         tests, filter_blocks, all_estimators, loss_estimator, s, False, abrupt
     ):
         return

@@ -39,7 +39,8 @@ def frame_sums_dtype(n: int) -> np.dtype:
 def frame_means_dtype(n: int) -> np.dtype:
     """Means over the elapsed frame, of an aircraft with n surfaces."""
     return record(
-        G=(3, n), Gu=(3, n), Gu_spread=(3, n),  # rad/s2 per rad; rad/s2; see `fill_effect_spread`, rad/s2
+        # rad/s2 per rad; rad/s2; see `fill_effect_tolerance_for_fault_change`, rad/s2
+        G=(3, n), Gu=(3, n), Gu_tolerance_for_fault_change=(3, n),
         acceleration=3,  # f + G u, rad/s2
         # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
@@ -138,11 +139,11 @@ def fill_frame_means(prediction, bound):
         bound.effectiveness_error_per_rad[:] = frame_share * sums.effectiveness_error_per_rad
         bound.surface_error_at_command[:] = frame_share * sums.surface_error_at_command
     if frame_share < 1.0:
-        fill_effect_spread(prediction)
+        fill_effect_tolerance_for_fault_change(prediction)
 
 
 @kernel
-def predict_control_effect(means):
+def fill_surface_effects_with_previous_G(means):
     """Fill `Gu_with_previous_G` (3, n) rad/s2: the effect of each surface with G of the frame before."""
     for i in range(3):
         for s in range(means.G_min.size):
@@ -151,8 +152,9 @@ def predict_control_effect(means):
 
 
 @kernel
-def fill_effect_spread(prediction):
-    """Fill `Gu_spread` (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
+def fill_effect_tolerance_for_fault_change(prediction):
+    """Fill `Gu_tolerance_for_fault_change` (3, n) rad/s2: the error of the mean effect if a fault changes
+    within the frame.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
     are the effects of a healthy surface in the first and in the other n - 1 steps. The mean effect of the
@@ -163,7 +165,9 @@ def fill_effect_spread(prediction):
         for s in range(prediction.u.size):
             first_effect = sums.first_instant_Gu[i, s]
             mean_effect_of_others = (sums.Gu[i, s] - first_effect) * frame_share / (1.0 - frame_share)
-            prediction.frame_means.Gu_spread[i, s] = frame_share * abs(first_effect - mean_effect_of_others)
+            prediction.frame_means.Gu_tolerance_for_fault_change[i, s] = frame_share * abs(
+                first_effect - mean_effect_of_others
+            )
 
 
 @kernel
@@ -229,7 +233,7 @@ def predict_acceleration(prediction, include_known_faults, effectiveness, deflec
 
 
 @kernel
-def form_innovation(prediction, rates, dt):
+def form_innovation_after_known_faults(prediction, rates, dt):
     """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; rates (3,) rad/s:
     now."""
     for i in range(3):

@@ -97,10 +97,10 @@ class DeclaredBounds(NamedTuple):
 
 
 class GustReadout(NamedTuple):
-    """Gusts as the vanes see them. is_turbulent: turbulence is declared; is_gust_measured: its effect is
-    subtracted from the innovation; gust_acceleration_rad_s2 (3,): what the gust does now."""
+    """Gusts as the vanes see them. accounts_for_gusts: turbulence is declared; is_gust_measured: its effect
+    is subtracted from the innovation; gust_acceleration_rad_s2 (3,): what the gust does now."""
 
-    is_turbulent: bool
+    accounts_for_gusts: bool
     is_gust_measured: bool
     gust_acceleration_rad_s2: np.ndarray
 
@@ -289,7 +289,7 @@ class DiagnosisReadout:
         """Gusts as the vanes see them."""
         gust = self._fdi["statistical"]["gust"]["output"]
         return GustReadout(
-            bool(gust["is_turbulent"]), bool(gust["is_gust_measured"]), gust["gust_acceleration"].copy()
+            bool(gust["accounts_for_gusts"]), bool(gust["is_gust_measured"]), gust["gust_acceleration"].copy()
         )
 
     @cached_property
@@ -350,7 +350,8 @@ def arrays_of_every_frame(
     estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     views = {
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
-        "offset": estimators["effect"]["base_acceleration"], "slope": estimators["effect"]["regressor"],
+        "offset": estimators["effect"]["acceleration_at_zero_theta"],
+        "slope": estimators["effect"]["regressor"],
         "spread": estimators["effect"]["error_bound"], "excluded": estimators["excluded"],
         "types": surfaces["feasible_sets"]["excluded"],
     }  # fmt: skip
@@ -381,8 +382,8 @@ def arrays_until_alarm(
     """
     estimators = fdi["isolation"]["estimator"][:n_estimators]
     views = {
-        "reach_low": estimators["reachable_effect_low"],
-        "reach_high": estimators["reachable_effect_high"],
+        "reach_low": estimators["reachable_residual_low"],
+        "reach_high": estimators["reachable_residual_high"],
     }
     if has_statistical_detector:
         detector = fdi["statistical"]
@@ -392,7 +393,7 @@ def arrays_until_alarm(
             "signature": blocks["hypothesis"]["signature"],
             "bounded": detector["noise"]["uncertainty_bound"],
         }
-        views |= {"air": gust["mean_gust_acceleration"], "leap": gust["axes_turn_variance"]}
+        views |= {"air": gust["mean_gust_acceleration"], "leap": gust["acceleration_variance_by_axes_turn"]}
     return views
 
 

@@ -409,15 +409,15 @@ def diagnose(frame):
     )
     monitors.disable_if_differential_thrust(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
-        schemes.begin(scheme, fdi, prediction, measured)
+        schemes.begin_scheme(scheme, fdi, prediction, measured)
     else:
         predict_acceleration(
             prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
         )
-        schemes.predict(scheme, fdi, prediction, measured, k, frame.t)
-    schemes.conclude(scheme, fdi, prediction, measured, frame.t)
+        schemes.advance_to_frame(scheme, fdi, prediction, measured, k, frame.t)
+    schemes.update_verdict(scheme, fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
-    schemes.prepare(scheme, fdi, prediction, measured, k)
+    schemes.prepare_next_frame(scheme, fdi, prediction, measured, k)
     begin_frame_sums(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
     follow_guarantee(
         frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.frame_share_per_instant, k, frame.t
@@ -438,7 +438,7 @@ def assess_faults(frame):
 def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
-    schemes.accumulate(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
+    schemes.accumulate_substep(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
     add_instant_to_frame(
         frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured
     )

@@ -335,7 +335,7 @@ class Loop:
             fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True
         )
         stop_accelerometers(fdi["statistical"]["gust"])
-        fdi["statistical"]["inertial_gust"]["output"]["is_turbulent"] = 0
+        fdi["statistical"]["inertial_gust"]["output"]["accounts_for_gusts"] = 0
         return True
 
     def read_more(self) -> None:

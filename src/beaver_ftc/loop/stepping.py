@@ -182,12 +182,20 @@ def kernels_flown(frames: np.ndarray, arrays: tuple[np.ndarray, ...]) -> Iterato
 def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
     fdi = frame["fdi"]
     scheme = SCHEMES[fdi["config"]["scheme_number"]]
-    yield from (scheme.begin, scheme.predict, scheme.conclude, scheme.prepare)
-    if scheme.predict is adaptive_estimators.predict:
+    yield from (
+        scheme.begin_scheme,
+        scheme.advance_to_frame,
+        scheme.update_verdict,
+        scheme.prepare_next_frame,
+    )
+    if scheme.advance_to_frame is adaptive_estimators.advance_to_frame:
         faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["isolation_variant"]]
         yield from (faults.begin, faults.observe, faults.isolate)
         if fdi["statistical"]["test_config"]["enabled"]:
-            yield from (adaptive_estimators.update_statistical_tests, adaptive_estimators.prepare_statistical)
+            yield from (
+                adaptive_estimators.update_statistical_tests,
+                adaptive_estimators.prepare_statistical_tests,
+            )
     if fdi["sensor_monitor"]["config"]["enabled"]:
         yield whole.monitor_sensors
 

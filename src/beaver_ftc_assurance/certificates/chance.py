@@ -196,7 +196,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         its["keep"] = then["drift_decay_factor"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response
-    if diagnosis.gust.is_turbulent:
+    if diagnosis.gust.accounts_for_gusts:
         its["air"] = tape.filters["air"][here][1:][:, axes]
         drift += (
             block.drift_intensity_scale * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]

@@ -60,7 +60,7 @@ def fdi(rng):
     parity.configure_tone_tests(statistical["tone_config"], 1e-8, V, 15.0, DT)
     air = statistical["gust"]
     (
-        air["output"]["is_turbulent"],
+        air["output"]["accounts_for_gusts"],
         air["config"]["rolling_gust_correlation_length"],
         air["memory"]["gust_drift_intensity"],
     ) = (
@@ -68,10 +68,11 @@ def fdi(rng):
         34.0,
         rng.uniform(1e-5, 1e-4, 3),
     )
-    for name in ("rate_damping", "gust_axes_in_body", "gust_axes_rate", "axes_turn_variance"):
+    for name in ("rate_damping", "gust_axes_in_body", "gust_axes_rate", "acceleration_variance_by_axes_turn"):
         holder(air, name)[name] = rng.normal(size=(3, 3))
-    air["output"]["axes_turn_variance"] = (
-        air["output"]["axes_turn_variance"] @ air["output"]["axes_turn_variance"].T
+    air["output"]["acceleration_variance_by_axes_turn"] = (
+        air["output"]["acceleration_variance_by_axes_turn"]
+        @ air["output"]["acceleration_variance_by_axes_turn"].T
     )
     fdi["bound"]["effectiveness_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
@@ -118,16 +119,22 @@ def declared_along(statistical, m):
         turned = air["output"]["rate_damping"] @ air["memory"]["gust_axes_rate"]
         longest_s = air["config"]["rolling_gust_correlation_length"] / V
         walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["gust_drift_intensity"]) @ turned.T
-    moves = float(air["output"]["is_turbulent"])
+    moves = float(air["output"]["accounts_for_gusts"])
     size = max(bound, MIN_UNCERTAINTY_BOUND_RAD_S2)
     drift = statistical["noise"]["drift_intensity_over_squared_bound"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["input_noise_variance"])) ** 2
-    return m**2 @ noise, jitter, bound, drift, moves * m @ air["output"]["axes_turn_variance"] @ m
+    return (
+        m**2 @ noise,
+        jitter,
+        bound,
+        drift,
+        moves * m @ air["output"]["acceleration_variance_by_axes_turn"] @ m,
+    )
 
 
 @pytest.mark.parametrize(
     ("changes", "swings"),
-    [({}, 0), ({}, 1), ({"is_turbulent": 0}, 1)],
+    [({}, 0), ({}, 1), ({"accounts_for_gusts": 0}, 1)],
 )
 @pytest.mark.parametrize("mix", [(0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (-0.6, 0.0, 0.8)])
 def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, changes, swings):
@@ -155,7 +162,7 @@ def test_what_is_declared_of_the_axes_is_seen_along_a_direction(fdi, mix, change
 
 def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
     statistical, view = fdi["statistical"], fdi["statistical"]["views"][ROLL_AXIS]
-    statistical["noise"]["uncertainty_bound"], statistical["gust"]["output"]["is_turbulent"] = 0.0, 0
+    statistical["noise"]["uncertainty_bound"], statistical["gust"]["output"]["accounts_for_gusts"] = 0.0, 0
     Across.blur(view, statistical, V)
     assert view["uncertainty_bound"][0] == 0.0
     assert view["block"]["drift_intensity"][0, 0] == pytest.approx(2.0 * MIN_UNCERTAINTY_BOUND_RAD_S2**2)
@@ -319,7 +326,9 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     """And across a column one tolerance more, which is of the column itself."""
     statistical = fdi["statistical"]
     pitch, lateral = statistical["block"][:2]
-    statistical["gust"]["output"]["is_turbulent"] = 0  # else no view of pitch tries what answers the gusts
+    statistical["gust"]["output"]["accounts_for_gusts"] = (
+        0  # else no view of pitch tries what answers the gusts
+    )
     for b, block in enumerate((pitch, lateral)):
         block["alarm_level"], block["noise_share_of_alarm_level"], block["uncertainty_change_per_frame"] = (
             5.0 + b,

@@ -217,7 +217,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
         at_command if has_declared_surface_errors else 0.0
     )
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
-    assert mean["Gu_spread"] == pytest.approx(spread)
+    assert mean["Gu_tolerance_for_fault_change"] == pytest.approx(spread)
     own_axis = np.array([G[(0, 1, 2, 1), range(4)] for _, G, *_ in seen])
     assert mean["G_min"] == pytest.approx(own_axis.min(axis=0))
     assert mean["G_max"] == pytest.approx(own_axis.max(axis=0))

@@ -260,12 +260,12 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
 
 def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical, G = viewed["statistical"], np.ones((3, 4))
-    statistical["inertial_gust"]["output"]["is_turbulent"] = 1
+    statistical["inertial_gust"]["output"]["accounts_for_gusts"] = 1
     views = statistical["views"]
     views["decaying_peak_score"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
     forces.stop_using_forces(*(statistical[name] for name in ("forces", "gust", "inertial_gust")))
     assert not statistical["gust"]["output"]["uses_accelerometers"]
-    assert not statistical["inertial_gust"]["output"]["is_turbulent"]
+    assert not statistical["inertial_gust"]["output"]["accounts_for_gusts"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
         assert Across.shown(statistical, views[v]) == 0.0
     assert Across.shown(statistical, views[0]) == 50.0
@@ -279,7 +279,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
     """Their forces still count, and ask for the vane to be cleared, once the rates alone have alarmed."""
     statistical = viewed["statistical"]
     air, views = statistical["gust"], statistical["views"]
-    air["output"]["is_turbulent"] = 1
+    air["output"]["accounts_for_gusts"] = 1
     configure_parity_views(statistical, AIRCRAFT)
     views["direction"][ELEVATOR_VIEW], views["decaying_peak_score"][ELEVATOR_VIEW] = (
         (0.0, 0.3, 0.0, 0.0, -0.95),
@@ -308,7 +308,7 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
         statistical["forces"]["component"],
     )
     (
-        air["output"]["is_turbulent"],
+        air["output"]["accounts_for_gusts"],
         air["output"]["rate_damping"],
         air["output"]["gust_axes_in_body"],
         air["output"]["uses_accelerometers"],
@@ -501,7 +501,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     """Of roll, yaw and side force: neither the vane's error nor a rolling gust moves what is looked at, and
     what errors of the vane's column let show is the most that its corners do."""
     statistical, rng = viewed["statistical"], np.random.default_rng(3)
-    statistical["gust"]["output"]["is_turbulent"] = 1
+    statistical["gust"]["output"]["accounts_for_gusts"] = 1
     configure_parity_views(statistical, AIRCRAFT)
     view, moving = statistical["views"][BETA_VIEW], statistical["gust"]
     moving = moving["output"]
@@ -533,7 +533,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
 
 def test_where_no_vane_and_no_gust_moves_anything_the_direction_stays(viewed):
     statistical = viewed["statistical"]
-    statistical["gust"]["output"]["is_turbulent"] = 1
+    statistical["gust"]["output"]["accounts_for_gusts"] = 1
     configure_parity_views(statistical, AIRCRAFT)
     view = statistical["views"][BETA_VIEW]
     view["direction"] = 0.6, 0.0, 0.8, 0.0, 0.0
@@ -678,7 +678,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         2.0,
     )
     air, view, component = statistical["gust"], statistical["views"][v], statistical["forces"]["component"]
-    air["output"]["is_turbulent"], air["output"]["rate_damping"], air["output"]["gust_axes_in_body"] = (
+    air["output"]["accounts_for_gusts"], air["output"]["rate_damping"], air["output"]["gust_axes_in_body"] = (
         1,
         rng.normal(size=(3, 3)),
         np.eye(3),
@@ -692,7 +692,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         (1e-4, 2e-4),
         1.2,
     )
-    for name in ("is_turbulent", "rate_damping", "gust_axes_in_body", "gust_drift_intensity"):
+    for name in ("accounts_for_gusts", "rate_damping", "gust_axes_in_body", "gust_drift_intensity"):
         holder(statistical["inertial_gust"], name)[name] = holder(air, name)[name]
     (
         air["memory"]["unmeasured_intensity_share"],
@@ -793,7 +793,7 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
 
 def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
-        viewed["statistical"]["gust"]["output"]["is_turbulent"] = moving
+        viewed["statistical"]["gust"]["output"]["accounts_for_gusts"] = moving
         configure_parity_views(viewed["statistical"], AIRCRAFT)
         confirming_force = viewed["statistical"]["views"]["confirming_force"][:5].tolist()
         assert confirming_force == [moving * NORMAL_FORCE, 0, moving * SIDE_FORCE, moving * SIDE_FORCE, 0]
@@ -831,7 +831,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     """And no vane is asked in moving air: none looks at both planes."""
     fdi = felt()
     statistical = fdi["statistical"]
-    statistical["gust"]["output"]["is_turbulent"] = 1
+    statistical["gust"]["output"]["accounts_for_gusts"] = 1
     configure_parity_views(statistical, aircraft)
     views = statistical["views"][: statistical["n_views"]]
     found = [(int(view["orthogonal_to_surface"]), tuple(view["plane_axes"].tolist())) for view in views[5:]]

@@ -197,12 +197,12 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     )
     assert last["drift_intensity_scale"] == pytest.approx((rolling / last["correlation_length"]) ** 2)
     assert [float(block["drift_intensity_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
-    assert air["output"]["is_turbulent"] == 1
+    assert air["output"]["accounts_for_gusts"] == 1
     assert air["config"]["wing_area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
     assert air["memory"]["unmeasured_intensity_share"] == pytest.approx([1.0, 0.003, 0.03])
     assert air["config"]["wing_span"] == SPAN_M
     assert air["config"]["gravity"] == pytest.approx(9.80665)
-    assert Detector(50.0).detector["gust"]["output"]["is_turbulent"] == 0
+    assert Detector(50.0).detector["gust"]["output"]["accounts_for_gusts"] == 0
 
 
 def test_where_nothing_diagnoses_nothing_is_enabled():

@@ -23,7 +23,7 @@ POLE, DT = 10.0, 0.01
 
 def network(gain=60.0, limit=20.0):
     new = np.zeros(1, published_scheme.STATE_NETWORK_RECORD).view(np.recarray)[0]
-    published_scheme.configure_network(new, gain, limit, TRAVEL)
+    published_scheme.configure_state_network(new, gain, limit, TRAVEL)
     return new
 
 
@@ -73,14 +73,14 @@ def test_the_network_learns_what_exceeds_the_threshold_once_there_is_an_alarm(
 ):
     published = np.zeros(1, published_scheme.PUBLISHED_RECORD).view(np.recarray)[0]
     published.config.uses_dead_zone = dead_zone
-    published_scheme.configure_network(published.network, 60.0, 20.0, TRAVEL)
+    published_scheme.configure_state_network(published.network, 60.0, 20.0, TRAVEL)
     at(published.network)
     fdae = np.zeros(1, zhang2005_fdae()).view(np.recarray)[0]
     fdae.output.residual[:], fdae.output.threshold[:] = (0.0, residual, -0.001), 0.01
     published_scheme.train_fdae_network(published, fdae, detected, DT)
     expected = DT * 60.0 * published.network.memory.basis * fdae.output.residual[:, None] if learns else 0.0
     np.testing.assert_allclose(
-        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NODES))
+        published.network.memory.weights, np.broadcast_to(expected, (3, published_scheme.N_NETWORK_NODES))
     )
 
 

@@ -509,7 +509,10 @@ def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
     effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
-    effect["regressor"], effect["base_acceleration"] = (0.5, 0.0, -2.0), (-0.05, 0.0, 0.2)  # commanded to 0.1
+    effect["regressor"], effect["acceleration_at_zero_theta"] = (
+        (0.5, 0.0, -2.0),
+        (-0.05, 0.0, 0.2),
+    )  # commanded to 0.1
     (
         surface["last_observation"]["position_low"],
         surface["last_observation"]["position_high"],
@@ -702,7 +705,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
             noise[k + 1],
         )
         fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
-        fdi["isolation"]["estimator"]["effect"]["base_acceleration"][:8] = offset[k]
+        fdi["isolation"]["estimator"]["effect"]["acceleration_at_zero_theta"][:8] = offset[k]
         fdi["isolation"]["estimator"]["effect"]["error_bound"][:8] = spread[k]
         on(registry.observe_and_judge_block, fdi)
         assert fdi["types"]["block"]["n_frames"] == (k + 1) % length
@@ -712,7 +715,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     assert fdi["types"]["block"]["mean_innovation_bound"] == pytest.approx(eta.mean(axis=0) + ends)
     mean = fdi["isolation"]["estimator"][4 + RUDDER]["block_mean_effect"]
     assert mean["regressor"] == pytest.approx(Z[:, 4 + RUDDER].mean(axis=0))
-    assert mean["base_acceleration"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
+    assert mean["acceleration_at_zero_theta"] == pytest.approx(offset[:, 4 + RUDDER].mean(axis=0))
     assert mean["error_bound"] == pytest.approx(spread[:, 4 + RUDDER].mean(axis=0))
 
 

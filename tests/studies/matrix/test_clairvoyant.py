@@ -92,7 +92,9 @@ def test_the_time_since_the_fault_and_the_air_as_the_vanes_show_it(lost, monkeyp
     told = seen_when_told(scenario, kept, "elevator")
     rate = scenario.fdi.statistical.false_alarms_per_h
     assert seen == [(told["told_deflection"], scenario.duration_s - AT_S, rate)]
-    monkeypatch.setattr(clairvoyant, "with_measured_gust", lambda context, std: seen.append(std) or context)
+    monkeypatch.setattr(
+        clairvoyant, "context_with_measured_gust", lambda context, std: seen.append(std) or context
+    )
     clairvoyant._declared(rough)
     frames = Loop(rough).frames
     variance = FrameReadout(frames[0]).diagnosis.input_noise_variance

@@ -23,7 +23,7 @@ from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
 from beaver_ftc.diagnosis.schemes.published import (
     STATE_NETWORK_RECORD,
-    configure_network,
+    configure_state_network,
     evaluate_state_network,
     train_state_network,
 )
@@ -56,7 +56,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, scenario: Sce
     limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
     layout = control["layout"]
     travel = np.array([layout["low"], layout["high"]])[:, layout["main"]]
-    configure_network(law["network"], option["network_gain"], limit, travel)
+    configure_state_network(law["network"], option["network_gain"], limit, travel)
     config["least"], config["most"] = -np.inf, np.inf
     if option["projection"]:
         config["least"], config["most"] = settled.least_effectiveness, 1.0

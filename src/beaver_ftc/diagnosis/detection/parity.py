@@ -528,7 +528,7 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
             force.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
             + force.force_flow_lag_error_bound
         )
-    if gust.output.is_turbulent:
+    if gust.output.accounts_for_gusts:
         fill_gust_sensitivity(view, forces, gust.output.rate_damping)
         if subtracts_gust_estimate(view, gust):
             drift_intensity += remaining_gust_drift_intensity(
@@ -543,7 +543,7 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
             )
         for i in range(3):
             for j in range(3):
-                block.P_dd[0, 0] += m[i] * m[j] * gust.output.axes_turn_variance[i, j]
+                block.P_dd[0, 0] += m[i] * m[j] * gust.output.acceleration_variance_by_axes_turn[i, j]
     drift_bound = max(uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
     block.gyro_noise_variance[0] = gyro_noise_variance
     block.model_noise_variance[0] = model_noise_std * model_noise_std
@@ -839,7 +839,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     ]
     subtracts_gust = (
         forces["in_use"]
-        and statistical["gust"]["output"]["is_turbulent"]
+        and statistical["gust"]["output"]["accounts_for_gusts"]
         and all(surfaces_separated_by_force)
     )
     views = list(parity_directions_of(aircraft, bool(forces["in_use"])))[: len(statistical["views"])]
@@ -866,7 +866,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         rate_block = statistical["block"][PITCH_BLOCK if plane_axes == PITCH_PLANE else LATERAL_BLOCK]
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
-        law_reacts_to_gust = statistical["gust"]["output"]["is_turbulent"] and direction[PITCH]
+        law_reacts_to_gust = statistical["gust"]["output"]["accounts_for_gusts"] and direction[PITCH]
         tested_losses = [] if law_reacts_to_gust else moving_surfaces[: len(block["hypothesis"]) - 1]
         kinds, n_regressors = [STEP_FAULT, *(LOSS for _ in tested_losses)], int(rate_block["n_regressors"])
         block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(kinds), 1.0
@@ -899,7 +899,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         view["is_orthogonal_to_rolling_gust"] = (
             orthogonal_to_surface == VANE_VIEW
             and plane_axes == YAW_PLANE
-            and statistical["gust"]["output"]["is_turbulent"]
+            and statistical["gust"]["output"]["accounts_for_gusts"]
         )
         view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
         view["is_immune_to_vane_error"] = uses_inertial_flow_angle or orthogonal_to_surface == VANE_VIEW

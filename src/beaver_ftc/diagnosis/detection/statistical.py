@@ -226,14 +226,18 @@ def configure_statistical_detector(
                 "uses_accelerometers"
             ] = not declared.monitors_sensors  # the monitor may find them broken
             statistical["inertial_gust"] = gust
-            statistical["inertial_gust"]["output"]["is_turbulent"] *= gust["output"]["uses_accelerometers"]
+            statistical["inertial_gust"]["output"]["accounts_for_gusts"] *= gust["output"][
+                "uses_accelerometers"
+            ]
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
                 np.add(MIN_UNMEASURED_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
             )
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling_gust_length_m = (
-        float(gust["config"]["rolling_gust_correlation_length"]) if gust["output"]["is_turbulent"] else 0.0
+        float(gust["config"]["rolling_gust_correlation_length"])
+        if gust["output"]["accounts_for_gusts"]
+        else 0.0
     )
     gust_lengths_m = (
         rotation_lengths(gust["config"]["wing_span"])
@@ -243,7 +247,7 @@ def configure_statistical_detector(
     mean_reverting_block["correlation_length"] = drift_correlation_length(
         statistical, airspeed_mps, rate_hz, float(min(gust_lengths_m))
     )
-    if gust["output"]["is_turbulent"]:
+    if gust["output"]["accounts_for_gusts"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
@@ -562,7 +566,7 @@ def update_blocks(
         block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
         if gust.config.only_coarse_estimate:
             likelihood.set_coarse_gust_response(block, gust.output.coarse_gust_acceleration)
-        if gust.output.is_turbulent:
+        if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)
             if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
@@ -586,7 +590,8 @@ def add_gust_axes_turn_to_drift_covariance(gust, block):
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             block.P_dd[i, j] += (
-                block.drift_intensity_scale * gust.output.axes_turn_variance[block.axis[i], block.axis[j]]
+                block.drift_intensity_scale
+                * gust.output.acceleration_variance_by_axes_turn[block.axis[i], block.axis[j]]
             )
 
 
@@ -794,7 +799,7 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measure
     bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
-    if gust.output.is_turbulent:
+    if gust.output.accounts_for_gusts:
         gusts.fill_gust_effect(gust, design, x, y, u)
     if test_config.has_regressors:
         for block in blocks:
@@ -811,7 +816,7 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measure
     fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measured, dt)
     if bound.model_error_map.n_boxes > 0:
         update_uncertainty_change(noise_model, blocks, bound.model_error_map, u)
-    if gust.output.is_turbulent:
+    if gust.output.accounts_for_gusts:
         gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
 
@@ -837,7 +842,7 @@ def update_uncertainty_change(noise_model, blocks, error_map, u):
 @kernel
 def add_instant_to_tests(test_config, noise_model, blocks, gust, bound, design, measured, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
-    if gust.output.is_turbulent:
+    if gust.output.accounts_for_gusts:
         gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
     if test_config.has_regressors:
         add_regressors(
@@ -888,7 +893,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
         for i, axis in enumerate(block.axis[: block.n_axes]):
             for j in range(block.n_axes):
                 block.drift_intensity[i, j] = 0.0
-                if gust.output.is_turbulent:
+                if gust.output.accounts_for_gusts:
                     gust_drift = gusts.unmeasured_gust_drift_intensity(
                         gust, V, axis, block.axis[j], b == likelihood.MEAN_REVERTING_LATERAL_BLOCK
                     )

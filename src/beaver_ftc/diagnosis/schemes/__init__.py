@@ -1,7 +1,8 @@
 """The diagnosis as a whole: its record, its configuration, and the kernels of the scheme in charge.
 
-`begin`, `predict`, `conclude`, `prepare` and `accumulate` call the kernel of a scheme by its number
-(adaptive_estimators.CompiledScheme; state.SCHEME_PATHS). The frame (loop/frame.py) calls them.
+`begin_scheme`, `advance_to_frame`, `update_verdict`, `prepare_next_frame` and `accumulate_substep` call the
+kernel of a scheme by its number (adaptive_estimators.CompiledScheme; state.SCHEME_PATHS). The frame
+(loop/frame.py) calls them.
 
 fdi: of `diagnosis_dtype`; t s.
 """
@@ -67,7 +68,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     conclusions.reset_conclusion(fdi["verdict"])
 
 
-def restart_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
+def carry_over_to_restarted_diagnosis(fdi: np.void, previous_fdi: np.void, in_flight: bool) -> None:
     """Prepare a configured diagnosis to take over from the one in `previous_fdi`, of the same flight.
 
     Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.
@@ -134,8 +135,8 @@ def _load_scheme(path: str) -> CompiledScheme:
 
 SCHEMES = tuple(map(_load_scheme, SCHEME_PATHS))
 
-begin = one_of([scheme.begin for scheme in SCHEMES])
-predict = one_of([scheme.predict for scheme in SCHEMES])
-conclude = one_of([scheme.conclude for scheme in SCHEMES])
-prepare = one_of([scheme.prepare for scheme in SCHEMES])
-accumulate = one_of([scheme.accumulate for scheme in SCHEMES])
+begin_scheme = one_of([scheme.begin_scheme for scheme in SCHEMES])
+advance_to_frame = one_of([scheme.advance_to_frame for scheme in SCHEMES])
+update_verdict = one_of([scheme.update_verdict for scheme in SCHEMES])
+prepare_next_frame = one_of([scheme.prepare_next_frame for scheme in SCHEMES])
+accumulate_substep = one_of([scheme.accumulate_substep for scheme in SCHEMES])

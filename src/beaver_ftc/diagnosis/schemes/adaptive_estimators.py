@@ -23,7 +23,10 @@ from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
-from beaver_ftc.diagnosis.model_prediction import form_innovation, predict_control_effect
+from beaver_ftc.diagnosis.model_prediction import (
+    fill_surface_effects_with_previous_G,
+    form_innovation_after_known_faults,
+)
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import pairs, registry, verdict
@@ -35,49 +38,50 @@ class CompiledScheme(NamedTuple):
     records of the prediction and the sensors. A row of plugins.yaml names
     the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
-    begin(fdi, prediction, measured): start the estimators at the first frame.
-    predict(fdi, prediction, measured, k, t): bring the estimators from the frame before to frame k at t s.
-    conclude(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
-    prepare(fdi, prediction, measured, k): prepare the estimators for the next frame.
-    accumulate(fdi, prediction, measured): add one JSBSim frame inside the next frame.
+    begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
+    advance_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before to frame k
+    at t s.
+    update_verdict(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
+    prepare_next_frame(fdi, prediction, measured, k): prepare the estimators for the next frame.
+    accumulate_substep(fdi, prediction, measured): add one JSBSim frame inside the next frame.
     """
 
-    begin: Callable[..., None]
-    predict: Callable[..., None]
-    conclude: Callable[..., None]
-    prepare: Callable[..., None]
-    accumulate: Callable[..., None]
+    begin_scheme: Callable[..., None]
+    advance_to_frame: Callable[..., None]
+    update_verdict: Callable[..., None]
+    prepare_next_frame: Callable[..., None]
+    accumulate_substep: Callable[..., None]
 
 
 @apart
-def predict_nothing(fdi, prediction, measured, k, t):
-    """The `predict` of a scheme without estimators."""
+def skip_advance_to_frame(fdi, prediction, measured, k, t):
+    """The `advance_to_frame` of a scheme without estimators."""
 
 
 @apart
-def conclude_nothing(fdi, prediction, measured, t):
-    """The `conclude` of a scheme without a verdict."""
+def skip_update_verdict(fdi, prediction, measured, t):
+    """The `update_verdict` of a scheme without a verdict."""
 
 
 @apart
-def prepare_nothing(fdi, prediction, measured, k):
-    """The `prepare` of a scheme whose estimators need nothing but the means over the frame."""
+def skip_prepare_next_frame(fdi, prediction, measured, k):
+    """The `prepare_next_frame` of a scheme whose estimators need nothing but the means over the frame."""
 
 
 @apart
-def accumulate_nothing(fdi, prediction, measured):
-    """The `accumulate` of such a scheme."""
+def skip_accumulate_substep(fdi, prediction, measured):
+    """The `accumulate_substep` of such a scheme."""
 
 
 @kernel
-def begin_filters(fdi, x):
+def start_detection_filters(fdi, x):
     """Begin the detection filters at the first measurement x (3,) rad/s."""
     filters.start_fdae(fdi.fdae, fdi.bound.gyro_error_change_bound, x)
     filters.start_bank(fdi.bank, fdi.bound.gyro_error_change_bound)
 
 
 @kernel
-def update_estimators(fdi, prediction):
+def update_isolation_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
     config, bound, isolation_record, frame_means = (
         fdi.config,
@@ -86,7 +90,7 @@ def update_estimators(fdi, prediction):
         prediction.frame_means,
     )
     is_detected = fdi.verdict.detected
-    isolation.update_hypotheses(
+    isolation.update_fault_effects(
         isolation_record,
         fdi.bank,
         bound,
@@ -94,7 +98,7 @@ def update_estimators(fdi, prediction):
         is_detected,
         frame_means.G,
         frame_means.Gu,
-        frame_means.Gu_spread,
+        frame_means.Gu_tolerance_for_fault_change,
     )
     if is_detected:
         isolation.predict_estimators(
@@ -105,11 +109,12 @@ def update_estimators(fdi, prediction):
 @apart
 def begin_without_diagnosis(fdi, prediction, measured):
     """Begin the detection filters, which the log records (CompiledScheme)."""
-    begin_filters(fdi, measured.x)
+    start_detection_filters(fdi, measured.x)
 
 
 NO_DIAGNOSIS = CompiledScheme(
-    begin_without_diagnosis, predict_nothing, conclude_nothing, prepare_nothing, accumulate_nothing
+    begin_without_diagnosis, skip_advance_to_frame, skip_update_verdict, skip_prepare_next_frame,
+    skip_accumulate_substep
 )  # fmt: skip
 
 
@@ -150,9 +155,9 @@ def isolate_fault(fdi, measured, t, was_detected_before):
 
 
 @kernel
-def is_possible_in_worst_case(fdi, fie, x, isolation_has_run):
+def update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_has_run):
     """Whether the fault of estimator fie is possible in the worst case; x (3,) rad/s: measured."""
-    return isolation.is_fault_possible(
+    return isolation.update_and_test_if_fault_possible(
         fdi.isolation,
         fie,
         fdi.bank,
@@ -164,12 +169,12 @@ def is_possible_in_worst_case(fdi, fie, x, isolation_has_run):
 
 
 @kernel
-def likelihood_excludes(fdi, fie):
+def update_and_test_if_likelihood_excludes(fdi, fie):
     """Whether the statistical detector excludes the loss of estimator fie, once it has raised its alarm."""
     detector, config = fdi.statistical, fdi.config
     if detector.alarm.detected_at_s < 0.0:
         return False
-    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.gust.output.is_turbulent
+    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.gust.output.accounts_for_gusts
     isolation.update_likelihood_exclusion(
         fie,
         detector.test_config,
@@ -199,7 +204,7 @@ def parity_excludes(fdi, fie):
 def exclude_by_worst_case(fdi, x, t, isolation_has_run):
     """Exclude the faults that are not possible in the worst case."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not is_possible_in_worst_case(fdi, fie, x, isolation_has_run):
+        if not update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_has_run):
             isolation.exclude_fault(fie, t)
 
 
@@ -220,9 +225,9 @@ def isolate_loss(fdi, measured, t, isolation_has_run):
 def isolate_loss_by_either(fdi, measured, t, isolation_has_run):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run) or likelihood_excludes(
-            fdi, fie
-        ):
+        if not update_and_test_if_possible_in_worst_case(
+            fdi, fie, measured.x, isolation_has_run
+        ) or update_and_test_if_likelihood_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
     decide_isolated_loss(fdi, t)
 
@@ -231,8 +236,8 @@ def isolate_loss_by_either(fdi, measured, t, isolation_has_run):
 def isolate_loss_by_statistics(fdi, measured, t, isolation_has_run):
     """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run)
-        if likelihood_excludes(fdi, fie):
+        update_and_test_if_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run)
+        if update_and_test_if_likelihood_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
     decide_isolated_loss(fdi, t)
 
@@ -248,9 +253,9 @@ def isolate_fault_type(fdi, measured, t, isolation_has_run):
 def isolate_fault_type_by_either(fdi, measured, t, isolation_has_run):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not is_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run) or parity_excludes(
-            fdi, fie
-        ):
+        if not update_and_test_if_possible_in_worst_case(
+            fdi, fie, measured.x, isolation_has_run
+        ) or parity_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
     decide_fault_type(fdi, t, isolation_has_run)
 
@@ -340,9 +345,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     )
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
     gusts.fill_frame_mean_gust(gust, prediction.frame_share_per_instant)
-    if inertial_gust.output.is_turbulent:
+    if inertial_gust.output.accounts_for_gusts:
         gusts.fill_frame_mean_gust(inertial_gust, prediction.frame_share_per_instant)
-    predict_control_effect(mean)
+    fill_surface_effects_with_previous_G(mean)
     fill_block_signatures(blocks, mean.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0))
     is_alarm_latched, loss_can_end = detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.update_blocks(
@@ -367,14 +372,14 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     statistical.update_alarm(
         detector.alarm, tests, blocks, parity_views, force_record, gust, t, is_error_mapped
     )
-    form_innovation(prediction, measured.x, dt)
+    form_innovation_after_known_faults(prediction, measured.x, dt)
     statistical.filter_innovation_after_known_faults(
         blocks, gust, prediction.innovation_after_known_faults, dt
     )
 
 
 @apart
-def prepare_statistical(fdi, prediction, measured, k):
+def prepare_statistical_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     detector, dt = fdi.statistical, fdi.config.dt
     tests, noise, gust = detector.test_config, detector.noise, detector.gust
@@ -385,7 +390,7 @@ def prepare_statistical(fdi, prediction, measured, k):
 
 
 @apart
-def accumulate_statistical(fdi, prediction, measured):
+def add_instant_to_statistical_tests(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
     detector, dt = fdi.statistical, prediction.frame_share_per_instant * fdi.config.dt
     tests, noise, gust = detector.test_config, detector.noise, detector.gust
@@ -397,7 +402,7 @@ def accumulate_statistical(fdi, prediction, measured):
 @kernel
 def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
-    if gust.output.is_turbulent:
+    if gust.output.accounts_for_gusts:
         gusts.set_gust_drift_intensity(gust, measured.altitude)
         gusts.update_gust_estimate(
             gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
@@ -414,7 +419,7 @@ def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt)
 def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_all_force_innovations(force_record, gust, measured, prediction.u, dt)
-    if inertial_gust.output.is_turbulent:
+    if inertial_gust.output.accounts_for_gusts:
         forces.fill_readings_without_vanes(
             force_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
         )
@@ -428,14 +433,14 @@ def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measure
 
 
 @apart
-def begin(fdi, prediction, measured):
+def begin_scheme(fdi, prediction, measured):
     """Begin the filters, and fix the parity direction of each fault (CompiledScheme)."""
-    begin_filters(fdi, measured.x)
+    start_detection_filters(fdi, measured.x)
     filters.set_parity_directions(fdi.isolation, prediction.G)
 
 
 @apart
-def predict(fdi, prediction, measured, k, t):
+def advance_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     conclusion_record, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
     filters.update_bank(
@@ -443,7 +448,7 @@ def predict(fdi, prediction, measured, k, t):
     )
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
-    update_estimators(fdi, prediction)
+    update_isolation_estimators(fdi, prediction)
     observe_in_isolation_variant(fdi.config.isolation_variant, fdi, prediction)
     network_leaks = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
     filters.predict_fdae(
@@ -458,13 +463,13 @@ def predict(fdi, prediction, measured, k, t):
 
 
 @apart
-def conclude(fdi, prediction, measured, t):
+def update_verdict(fdi, prediction, measured, t):
     """From residuals to the alarm and a verdict, unless a sensor is at fault (CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
-    axis = alarm_axis_or_engine_failure(fdi, measured.y, t)
+    axis = detect_alarm_axis_or_engine_failure(fdi, measured.y, t)
     if axis >= 0:
         conclusion.latch_alarm(conclusion_record, axis, t)
     if conclusion_record.detected:
@@ -473,7 +478,7 @@ def conclude(fdi, prediction, measured, t):
 
 
 @kernel
-def alarm_axis_or_engine_failure(fdi, y, t):
+def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
     engine_asymmetry_bound, conclusion_record = (
@@ -489,24 +494,26 @@ def alarm_axis_or_engine_failure(fdi, y, t):
 
 
 @apart
-def prepare(fdi, prediction, measured, k):
+def prepare_next_frame(fdi, prediction, measured, k):
     """Prepare the statistical detector, where it is declared (CompiledScheme)."""
     if fdi.statistical.test_config.enabled:
-        prepare_statistical(fdi, prediction, measured, k)
+        prepare_statistical_tests(fdi, prediction, measured, k)
 
 
 @apart
-def accumulate(fdi, prediction, measured):
+def accumulate_substep(fdi, prediction, measured):
     """The same for an instant inside the frame (CompiledScheme)."""
     if fdi.statistical.test_config.enabled:
-        accumulate_statistical(fdi, prediction, measured)
+        add_instant_to_statistical_tests(fdi, prediction, measured)
 
 
-SCHEME = CompiledScheme(begin, predict, conclude, prepare, accumulate)
+SCHEME = CompiledScheme(
+    begin_scheme, advance_to_frame, update_verdict, prepare_next_frame, accumulate_substep
+)
 
 
 @apart
-def conclude_plugin(fdi, prediction, measured, t):
+def take_plugin_verdict(fdi, prediction, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
     filters.form_fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
@@ -515,4 +522,6 @@ def conclude_plugin(fdi, prediction, measured, t):
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
-PYTHON_PLUGIN = CompiledScheme(begin_without_diagnosis, predict, conclude_plugin, prepare, accumulate)
+PYTHON_PLUGIN = CompiledScheme(
+    begin_without_diagnosis, advance_to_frame, take_plugin_verdict, prepare_next_frame, accumulate_substep
+)

@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis.detection import filters
 from beaver_ftc.diagnosis.detection.filters import fill_gaussians, replace_network_output
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin_scheme
 from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.schema import Scenario
@@ -35,13 +35,15 @@ from beaver_ftc.scenario.schema import Scenario
 ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
 RATE_CENTRES, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
 N_CENTRES_PER_INPUT = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES), len(TRAVEL_SHARE_CENTRES))
-N_NODES = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
+N_NETWORK_NODES = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
 
 # first_centre, centre_spacing: of the centres, by axis and input. weight_limit: of a weight, projection P;
 # infinite without one. output: fhat, rad/s2.
 STATE_NETWORK_RECORD = record(
     config=record(gain=float, weight_limit=float, first_centre=(3, 3), centre_spacing=(3, 3)),
-    memory=record(input_basis=(3, N_CENTRES_PER_INPUT[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
+    memory=record(
+        input_basis=(3, N_CENTRES_PER_INPUT[0]), weights=(3, N_NETWORK_NODES), basis=(3, N_NETWORK_NODES)
+    ),
     output=3,
 )
 
@@ -51,7 +53,7 @@ PUBLISHED_CONFIG_RECORD = record(uses_dead_zone=int, constant_threshold=float)
 PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_RECORD)
 
 
-def configure_network(network: np.void, gain: float, weight_limit: float, travel: np.ndarray) -> None:
+def configure_state_network(network: np.void, gain: float, weight_limit: float, travel: np.ndarray) -> None:
     """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
     network["config"]["gain"], network["config"]["weight_limit"] = gain, weight_limit
     for i in range(3):
@@ -75,7 +77,7 @@ def configure_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) ->
     options, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
     published["config"]["uses_dead_zone"] = options["dead_zone"]
     weight_limit = options["network_limit_rad_s2"] if options["projection"] else np.inf
-    configure_network(
+    configure_state_network(
         published["network"], options["network_gain"], weight_limit, travel[:, fdi["layout"]["main"]]
     )
     fdi["fdae"]["config"]["decay_factor"] = fdi["bank"]["config"]["decay_factor"][0] = euler_decay(
@@ -149,7 +151,7 @@ def train_state_network(network, training_signal, dt):
     """th' = P{Gamma Z^T training_signal}, by a step of dt s; training_signal (3,), Z: the basis as it was
     evaluated."""
     for i in range(3):
-        for j in range(N_NODES):
+        for j in range(N_NETWORK_NODES):
             weight = (
                 network.memory.weights[i, j]
                 + dt * network.config.gain * network.memory.basis[i, j] * training_signal[i]
@@ -173,7 +175,7 @@ def train_fdae_network(published, fdae, detected, dt):
 
 
 @kernel
-def update_fdae_output(published, fdae, main_surfaces, x, y, u):
+def update_fdae_network_output(published, fdae, main_surfaces, x, y, u):
     """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
     evaluate_state_network(published.network, main_surfaces, x, y, u)
     replace_network_output(fdae.network, published.network.output)
@@ -189,13 +191,13 @@ def fdae_alarm_axis(fdae):
 
 
 @apart
-def predict(fdi, prediction, measured, k, t):
+def advance_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published, bound, dt = fdi.published, fdi.bound, fdi.config.dt
     filters.update_bank(
         fdi.bank, bound, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
     )
-    adaptive_estimators.update_estimators(fdi, prediction)
+    adaptive_estimators.update_isolation_estimators(fdi, prediction)
     train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
     filters.predict_fdae(
         fdi.fdae, bound, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
@@ -213,14 +215,14 @@ def set_all_constant_thresholds(fdi, constant_threshold):
 
 
 @apart
-def conclude(fdi, prediction, measured, t):
+def update_verdict(fdi, prediction, measured, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
     axis = fdae_alarm_axis(fdi.fdae)
-    update_fdae_output(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
+    update_fdae_network_output(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
     if axis >= 0:
         conclusion.latch_alarm(conclusion_record, axis, t)
     if conclusion_record.detected:
@@ -228,5 +230,9 @@ def conclude(fdi, prediction, measured, t):
 
 
 SCHEME = CompiledScheme(
-    begin, predict, conclude, adaptive_estimators.prepare_nothing, adaptive_estimators.accumulate_nothing
+    begin_scheme,
+    advance_to_frame,
+    update_verdict,
+    adaptive_estimators.skip_prepare_next_frame,
+    adaptive_estimators.skip_accumulate_substep,
 )

@@ -322,11 +322,11 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     """Find where a surface can have been: what agrees with the innovation (3,) within innovation_bound (3,).
 
     fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
-    of the same frame or block, dtype EFFECT_RECORD.
+    of the same frame or block, dtype FAULT_EFFECT_RECORD.
     """
     observation, commands = surface.last_observation, surface.commands
     observation.healthy_position = (
-        -hypothesis_effect.base_acceleration[axis] / hypothesis_effect.regressor[axis]
+        -hypothesis_effect.acceleration_at_zero_theta[axis] / hypothesis_effect.regressor[axis]
     )
     observation.weighted_mean_error_per_position_range = (
         0.25
@@ -337,7 +337,7 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     for i in range(3):
         if config.frames_per_block > 1 and i != axis and hypothesis_effect.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
-        low, high = isolation.consistent_parameters_on_axis(
+        low, high = isolation.consistent_theta_interval_on_axis(
             innovation, innovation_bound, fie, hypothesis_effect, i
         )
         observation.position_low, observation.position_high = (

@@ -425,7 +425,7 @@ def infer_surface_positions(types, layout, estimators, innovation, innovation_bo
 
     innovation_bound (3,): on its innovation (3,) without a fault, rad/s2.
     """
-    is_anomalous = not isolation.is_healthy(innovation, innovation_bound)
+    is_anomalous = not isolation.uncertainty_explains_innovation(innovation, innovation_bound)
     for s, surface in enumerate(types.surface):
         shift_observations(surface)
         set_is_anomalous(surface, is_anomalous)

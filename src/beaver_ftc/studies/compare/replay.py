@@ -141,7 +141,7 @@ def aware_of_the_air(recording: Recording) -> Recording:
         (measured._replace(acceleration=measured.acceleration + air), command)
         for (measured, command), air in zip(recording.seen, recording.air, strict=True)
     ]
-    context = informed_test.with_measured_gust(recording.context, recording.air_noise)
+    context = informed_test.context_with_measured_gust(recording.context, recording.air_noise)
     return replace(recording, context=context, seen=seen)
 
 

@@ -13,10 +13,10 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis.informed_test import (
     WhiteningFilter,
+    context_with_measured_gust,
     detection_probability,
     healthy_surface_positions,
     unit_term_acceleration,
-    with_measured_gust,
 )
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
@@ -70,6 +70,6 @@ def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
     context = context_of(loop.frames, exact, loop.start, {})
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if diagnosis.gust.is_gust_measured:
-        context = with_measured_gust(context, np.sqrt(diagnosis.input_noise_variance))
+        context = context_with_measured_gust(context, np.sqrt(diagnosis.input_noise_variance))
     loop.release()
     return context, coefficients

@@ -42,7 +42,7 @@ from beaver_ftc.diagnosis.types import (
 def consistent_effectiveness_interval(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
     low, high = surface.judged_observation.position_low, surface.judged_observation.position_high
-    return isolation.consistent_parameters(
+    return isolation.consistent_theta_interval(
         0.5 * (low + high), 0.5 * (high - low), surface.judged_observation.healthy_position, 0.0, 1.0
     )
 

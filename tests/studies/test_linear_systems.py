@@ -132,3 +132,12 @@ def test_the_flow_turns_as_its_components_do(monkeypatch):
     assert found[:3] == pytest.approx((flow(1e-5) - flow(-1e-5)) / 2e-5, rel=1e-6)
     assert found[3:9] == pytest.approx([*of.values()][:6])
     assert found[9] == pytest.approx(of["velocities/h-dot-fps"] * M_PER_FT)
+
+
+def test_zeros_stand_by_size_and_of_a_pair_the_upper_one_first():
+    """Zeros at -3, -1 +- 2j and 0.5, over (s + 1)^5."""
+    wanted = np.array([0.5, -1.0 + 2.0j, -1.0 - 2.0j, -3.0])
+    numerator, denominator = np.real(np.poly(wanted)), np.poly([-1.0] * 5)
+    A = np.zeros((5, 5))  # the observer's form, whose first state is the output
+    A[:, 0], A[range(4), range(1, 5)] = -denominator[1:], 1.0
+    np.testing.assert_allclose(zeros(A, numerator, 0), wanted, atol=1e-6)

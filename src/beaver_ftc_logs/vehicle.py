@@ -177,7 +177,8 @@ class Vehicle(Section):
     )
     acceleration: LoggedQuantity | None = Field(
         default=None,
-        description="column of the acceleration along the z axis, whose mean is 1 g, m/s2",
+        description="column of the specific force along the z axis, in either sign. The median of its "
+        "magnitude is about 1 g, m/s2",
         examples=["az_m_s2"],
     )
     airspeed: LoggedQuantity | None = Field(
@@ -220,8 +221,8 @@ class Vehicle(Section):
     )
     outputs: dict[str, LoggedQuantity] = Field(
         default={},
-        description="columns of the servo outputs. Only one published method in `compare --flights` uses "
-        "them",
+        description="columns of the servo outputs. Only the freeze rule, a published detector in "
+        "`compare --flights`, uses them",
         examples=[{"left": "left_pwm"}],
     )
     false_alarms_per_hour: Number | None = number(
@@ -257,7 +258,8 @@ class Vehicle(Section):
         gt=0,
         le=1000,
         unit="Hz",
-        says="a log with a higher rate is averaged to this rate; left out: 100, or 20 in still air",
+        says="a log with a higher rate is averaged to this rate; left out: 100 with `moving_air`, otherwise "
+        "20",
         examples=[50],
     )
 

@@ -44,7 +44,11 @@ How to read the tables:
   speed in rpm, pz the manifold pressure in inHg. P is the power in kW, V the airspeed in m/s, rho the
   density in kg/m3. Ix, Iy, Iz and Jxz are the [moments of inertia](reference/beaver.md), and a name with
   `dot` is a derivative with respect to time.
+- The *command* is the position that law or pilot want. The *demand* is the command after it is limited to the
+  stops: the input of the actuator.
 - A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
+_TILTED = "aero/coefficient/CY_betadot-tilted"
+_PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))
 _SOURCE = "[TM88] "  # of every term
 _TERMS = """Each coefficient is the sum of its terms. A term is the product of three factors: its value, the
 quantities in the column "times", and its scale `uncertainty/<term>-scale`. The scale is 1 by default and
@@ -149,11 +153,14 @@ def meaning_of(name: str) -> str:
 
 def _output_rows(elements: Sequence[Element]) -> list[tuple[str, ...]]:
     rows = {_shared(e.get("name", "")): _description(e) for e in elements}
-    return [(f"`{name}`", texts()["read"].get(name, meaning)) for name, meaning in rows.items()]
+    first = list(rows).index(_TILTED)  # the parts of one correction stand together
+    names = sorted(rows, key=lambda name: first if name in _PARTS else list(rows).index(name))
+    return [(f"`{name}`", texts()["read"].get(name, rows[name])) for name in names]
 
 
 def _term_row(element: Element) -> tuple[str, ...]:
     meaning = _description(element).removeprefix(_SOURCE)
+    meaning = meaning.replace(", growing with angle of attack", " times angle of attack")
     return f"`{element.get('name')}`", _value(element), ", ".join(_factors(element)), meaning
 
 

@@ -155,7 +155,8 @@ class SignalSection(Section):
     property: Property = Field(description="property with the value of the signal", examples=["aero/dpt"])
     sensed: Literal[True] = Field(
         default=True,
-        description="true: an instrument measures the signal. Only true is allowed",
+        description="true: an instrument measures the signal. Only true is allowed, because the diagnosis "
+        "needs every signal",
         examples=[True],
     )
 
@@ -164,7 +165,9 @@ class MassSection(Section):
     """Mass, and inertia about the centre of gravity in body axes. Jxz enters the inertia tensor with a minus
     sign."""
 
-    mass_kg: Number | None = number(None, unit="kg", says="mass", gt=0, le=1e7, examples=[2288.231])
+    mass_kg: Number | None = number(
+        None, unit="kg", says="mass. `engine.thrust` requires it", gt=0, le=1e7, examples=[2288.231]
+    )
     Ix_kgm2: Number = number(..., unit="kg m2", says="roll inertia", gt=0, le=1e9, examples=[5368.39])
     Iy_kgm2: Number = number(..., unit="kg m2", says="pitch inertia", gt=0, le=1e9, examples=[6928.93])
     Iz_kgm2: Number = number(..., unit="kg m2", says="yaw inertia", gt=0, le=1e9, examples=[11158.75])
@@ -283,7 +286,7 @@ class LimitSection(Section):
     property: Property = entry(..., examples=["engine/power-kw"])
     says: Text = entry("", examples=["engine power"])
     unit: Text = entry("", examples=["kW"])
-    range: Interval = number(..., "as said", range="rising", examples=[[-40, 400]])
+    range: Interval = number(..., "the unit in `unit`", range="rising", examples=[[-40, 400]])
 
 
 class SettingSection(LimitSection):
@@ -292,7 +295,7 @@ class SettingSection(LimitSection):
     default: value if the scenario has none
     """
 
-    default: Number = number(..., "as said", range="in `range`", examples=[100])
+    default: Number = number(..., "the unit in `unit`", range="in `range`", examples=[100])
 
     @model_validator(mode="after")
     def _default_is_in_range(self) -> Self:
@@ -328,7 +331,11 @@ class ThrustSection(Section):
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
     setting: Steps = entry(..., unit="as the setting has it", examples=[[10, 20, 30]])
     force_n: tuple[_Forces, ...] = number(
-        ..., "N", range="in order", max_length=MAX_THRUST, examples=[[[-100, 900, 2000], [-300, 500, 1500]]]
+        ...,
+        "N",
+        range="not falling in a row",
+        max_length=MAX_THRUST,
+        examples=[[[-100, 900, 2000], [-300, 500, 1500]]],
     )
     lag_s: Number = entry(0.0, unit="s", ge=0, le=60, examples=[0.8])
 
@@ -382,7 +389,9 @@ class ModelErrorSection(Section):
 
 
 Range = Annotated[
-    tuple[Number, Number], AfterValidator(_not_reversed), Field(json_schema_extra={"range": "in order"})
+    tuple[Number, Number],
+    AfterValidator(_not_reversed),
+    Field(json_schema_extra={"range": "lowest, highest"}),
 ]
 Shares = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_LEVELS)]
 Ages = Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_AGES)]
@@ -404,8 +413,8 @@ class ErrorBox(Section):
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: largest Cn of the engines with equal levers, without the Cn of their thrust; left out:
-    unknown
+    engines_apart: largest magnitude of the yawing moment coefficient Cn that running engines with equal
+    levers cause, apart from the moment of their thrust; left out: unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -414,8 +423,8 @@ class ErrorBox(Section):
     p_rad_s: Range = entry(..., examples=[[-0.2, 0.2]])
     q_rad_s: Range = entry(..., examples=[[-0.1, 0.1]])
     r_rad_s: Range = entry(..., examples=[[-0.1, 0.1]])
-    density_kg_m3: Range = number(..., "kg/m3", range="in order", examples=[[0.9, 1.1]])
-    signals: dict[Name, Range] = number(dict, "1", range="in order", examples=[{"dpt": [0, 1]}])
+    density_kg_m3: Range = number(..., "kg/m3", range="lowest, highest", examples=[[0.9, 1.1]])
+    signals: dict[Name, Range] = number(dict, "1", range="lowest, highest", examples=[{"dpt": [0, 1]}])
     error_p_rad_s2: Errors = entry(..., examples=[[[0.01]]])
     error_q_rad_s2: Errors = entry(..., examples=[[[0.01]]])
     error_r_rad_s2: Errors = entry(..., examples=[[[0.01]]])

@@ -65,7 +65,7 @@ class Variation(Section):
     loguniform: [lowest, highest]. All logarithms between are equally likely
     normal: [mean, standard deviation]
     within: [lowest, highest] limits of the values of `normal`. Only with `normal`
-    linspace: [first, last, count]. This is a number `count` of evenly spaced values, which are flown in order
+    linspace: [first, last, count]. `count` evenly spaced values from first to last, which are flown in order
     choice: list of values. All are equally likely
     """
 

@@ -111,7 +111,12 @@ def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
 
 def _called_file(section: Section) -> str:
     heading = _heading(section)
+    if section.title in _HEADINGS:
+        return heading[0].lower() + heading[1:]
     return "the top of the file" if heading == "The file" else heading
+
+
+_HEADINGS = {"Quantity": "A column (`rates.p`, `commands[]`, `labels.NAME`, ...)"}
 
 
 def _anchor(title: str) -> str:
@@ -122,6 +127,8 @@ def _heading(section: Section) -> str:
     first = section.places[0].path
     if not first:
         return "The file"
+    if section.title in _HEADINGS:
+        return _HEADINGS[section.title]
     beside = [place.path for place in section.places if place.path[:-1] == first[:-1]]
     kind = next((key.choices[0] for key in section.keys if key.name == "type"), "")
     of = " of a sensor" if any(key.name == "sensor" for key in section.keys) else ""
@@ -210,7 +217,9 @@ def _range(key: Key) -> str:
             said.append(f"up to {form['maxLength']} characters")
         of = "Items" if form.get("type") == "array" else "Properties"
         if f"max{of}" in form and "prefixItems" not in form:
-            said.append(f"{form.get(f'min{of}', 0)} to {form[f'max{of}']} of them")
+            rows = any(one.get("type") == "array" for one in form.get("items", {}).get("anyOf", ()))
+            what = "rows" if rows else "of them"
+            said.append(f"{form.get(f'min{of}', 0)} to {form[f'max{of}']} {what}")
     return ", ".join(said)
 
 

@@ -85,9 +85,9 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
     ]
     return (
         "*Table 3. All aircraft together; columns as explained above.*\n\n"
-        f"{markdown_table(BESIDE, together)}\n\n"
+        f"{markdown_table(BESIDE, together)}\n\n{_read_beside(*together[-1])}\n\n"
         "*Table 4. Each aircraft at 0.001 false alarms an hour, the default: share of the losses that each "
-        f"test finds within 1 s, %.*\n\n{markdown_table(head, each)}\n\n{_read_beside(*together[-1])}"
+        f"test finds within 1 s, %.*\n\n{markdown_table(head, each)}"
     )
 
 

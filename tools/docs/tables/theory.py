@@ -33,7 +33,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "number of onsets that are tested together", likelihood, "N_ONSET_SLOTS", ""),
     (
         7,
-        "factor in room, because a transient swings below zero",
+        "room (largest effect of bounded model error): factor for overshoot",
         likelihood,
         "RINGING_FACTOR",
         "",
@@ -48,7 +48,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "rate of the signature of a growing loss", statistical, "LOSS_GROWTH_RATE_PER_S", "1/s"),
     (
         7,
-        "share of the best ratio, below which a loss may be excluded",
+        "a loss may be excluded if its likelihood ratio is below this share of the best one",
         statistical,
         "MIN_LLR_SHARE_OF_CONSTANT_LOSS",
         "",
@@ -57,7 +57,13 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "range of these frequencies", parity, "TONE_FREQUENCIES_RAD_S", "rad/s"),
     (7, "memory of the oscillation tests", parity, "TONE_MEMORY_S", "s"),
     (9, "poles of the filters", redundancy, "FILTER_POLES_PER_S", "1/s"),
-    (9, "rotation and curvature of the Earth", redundancy, "EARTH_RATE_BOUND_RAD_S", "rad/s"),
+    (
+        9,
+        "turn of the level over the round Earth (rates are against the rotating Earth)",
+        redundancy,
+        "EARTH_RATE_BOUND_RAD_S",
+        "rad/s",
+    ),
     (
         9,
         "Coriolis and centrifugal acceleration, change of gravity",

@@ -311,7 +311,7 @@ def sensor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     return finding
 
 
-# The rates contain the Earth's, and the level turns as the aircraft flies over the round Earth.
+# The rates are against the rotating Earth; the level turns as the aircraft flies over the round Earth.
 EARTH_RATE_BOUND_RAD_S = 4e-5
 EARTH_ACCELERATION_BOUND_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
 DENSITY_SCALE_HEIGHT_M = 6300.0  # over which the density falls by a factor e at most: in the stratosphere

@@ -144,7 +144,7 @@ def _no_more_than_there_are(given: Any) -> Any:
 
 Actuator = Annotated[str, among(lambda: checked_aircraft().surfaces), Field(json_schema_extra=_examples)]
 TermName = Annotated[str, among(lambda: checked_aircraft().terms, "unknown aerodynamic term")]
-Ratio = Annotated[Number, Field(ge=-10, le=10, json_schema_extra={"unit": "share of 1"})]
+Ratio = Annotated[Number, Field(ge=-10, le=10, json_schema_extra={"unit": "1"})]
 Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_are)]
 
 

@@ -187,8 +187,7 @@ class Probing(Section):
 
 class Sharpen(Section, strict=True):
     """Steps that make the published tests more sensitive. Each step keeps the guarantees G1 (no false alarm)
-    and G2 (no exclusion of the true fault). The page on assumptions (docs/explanation/assumptions.md) states
-    both."""
+    and G2 (no exclusion of the true fault)."""
 
     pole_bank: bool = entry(
         True,
@@ -238,7 +237,7 @@ class FdiConfig(Section, strict=True):
     authority: detector whose alarms and exclusions count, if the statistical detector is on
     thresholds: bound of the isolation tests. `interval`: an interval with a lower and an upper end.
     `published`: the norm of the published study
-    detection_pole_per_s: pole of the detection filter of the published study, 1/s
+    detection_pole_per_s: pole of the first detection filter, the only filter of the published study, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant with which the estimates forget old data. It should exceed one period of
     the reference, s
@@ -357,8 +356,7 @@ Law = Annotated[str, named(partial(refusal, LAWS))]
 
 class EnginePower(Section, strict=True):
     """Control of pitch by engine power, if elevator and flap are both lost. It requires the law
-    `fault-tolerant` with `fault_class: all`, or the law `oracle`. The page on fault types
-    (docs/explanation/fault-types.md) explains the design.
+    `fault-tolerant` with `fault_class: all`, or the law `oracle`.
 
     enabled: false: the engine keeps its trim setting
     speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This

@@ -238,7 +238,7 @@ class InertiaScale(Section):
     Ix: Scale = number(1.0, "share of 1", "roll inertia")
     Iy: Scale = number(1.0, "share of 1", "pitch inertia")
     Iz: Scale = number(1.0, "share of 1", "yaw inertia")
-    Jxz: Ratio = number(1.0, "share of 1", "product of inertia")
+    Jxz: Ratio = number(1.0, "1", "product of inertia")
 
 
 class DesignModel(Section):

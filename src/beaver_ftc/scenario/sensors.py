@@ -318,7 +318,12 @@ SensorName = Annotated[
     str,
     BeforeValidator(_in_short),
     among(sensors_there, "{!r} is no sensor"),
-    entry(..., "instrument that fails, named as in `sensors`", json_schema_extra=_examples),
+    entry(
+        ...,
+        "instrument that fails: the name of one of the instruments in `sensors`, such as `p`, `alpha` or "
+        "`altitude`",
+        json_schema_extra=_examples,
+    ),
 ]
 
 

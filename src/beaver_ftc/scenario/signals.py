@@ -336,13 +336,13 @@ class Signal(Section):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    sine: Sine | None = None
-    doublet: Doublet | None = None
-    step: Step | None = None
-    square: Square | None = None
-    ramp: Ramp | None = None
-    chirp: Chirp | None = None
-    csv: Csv | None = None
+    sine: Sine | None = entry(None, "sine")
+    doublet: Doublet | None = entry(None, "two opposite pulses")
+    step: Step | None = entry(None, "constant")
+    square: Square | None = entry(None, "square wave")
+    ramp: Ramp | None = entry(None, "straight line, then constant")
+    chirp: Chirp | None = entry(None, "sine with changing frequency")
+    csv: Csv | None = entry(None, "table from a CSV file")
 
     @model_validator(mode="after")
     def _exactly_one_kind(self) -> Self:

@@ -147,7 +147,17 @@ class Level(Section):
 
 
 class QuantileLevel(Level):
-    """A limit for a quantile over the flights."""
+    """A limit for a quantile over the flights.
+
+    at_most: largest allowed value
+    confidence: confidence of the one-sided bound that is compared with the limit; left out: the estimate is
+    compared with the limit
+    """
+
+    at_most: Number | None = entry(None, range="any", examples=[1])
+    confidence: Number | None = number(
+        None, "share of 1", ge=0.5, lt=1, needs={"at_most": 1}, examples=[0.95]
+    )
 
     quantile: Number = number(
         0.95,
@@ -205,10 +215,11 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     scenario
     set: new values of keys of the base, for all flights. A key is written with dots, e.g.
     `initial.airspeed_mps`
-    runs: number of flights; left out: one flight for each point of the grid
+    runs: number of flights. Fewer flights than points of the grid fly its first points; more flights begin
+    the grid again; left out: one flight for each point of the grid
     seed: seed of the drawn values and of the flights
     sampling: how the values of a key are chosen: at random, every point of a grid, by a Latin hypercube or by
-    a Sobol sequence. `linspace` always takes its values in order
+    a Sobol sequence. A grid accepts only `linspace` and `choice`. `linspace` always takes its values in order
     vary: keys of the base that vary, written with dots, and how each key varies
     expect: conditions that the statistics must meet
     """

@@ -17,6 +17,7 @@ from beaver_ftc.studies import detectability
 from beaver_ftc.studies.mismatch import split, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.power.shown import rows_as_parquet
+from beaver_ftc.studies.power.survey import WITHIN_S
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
 from beaver_ftc.studies.sweep.one_flight import FIXED
@@ -111,19 +112,31 @@ evaluate results with their own program.
 | SURFACE | the name of each control surface, for example `elevator` |
 | ESTIMATOR | the name of each isolation estimator, i.e. of its surface, or of its surface and fault type |
 | SIGNAL | the name of each signal that the aircraft file declares, for example `dpt` |
-| SOURCE | the name of each source of the mismatch |
-| WITHIN | a number of seconds |"""
+| SOURCE | each source of the mismatch: {sources} |
+| WITHIN | a number of seconds: {within} |"""
 _NEXT = """## Next
 
 [Open a flight in other tools](how-to/other-tools.md) shows how to read the files. The
 [nomenclature](reference/nomenclature.md) has the symbol of each quantity."""
 
 
+_LOSS_OR_ANGLE = (
+    "isolation.estimate", "isolation.estimate_interval.low", "isolation.estimate_interval.high",
+)  # fmt: skip
+
+
 def page() -> str:
     """The page."""
     texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
     tables = [_table(number, name, texts[name]) for number, name in enumerate(TABLES, 3)]
-    return "\n\n".join(["# Columns", _SAYS, _contents(texts), *tables, _NEXT]) + "\n"
+    return "\n\n".join(["# Columns", _said(), _contents(texts), *tables, _NEXT]) + "\n"
+
+
+def _said() -> str:
+    sources, within = (
+        ", ".join(f"`{name}`" for name in names) for names in (SOURCES, (f"{s:g}" for s in WITHIN_S))
+    )
+    return _SAYS.replace("{sources}", sources).replace("{within}", within)
 
 
 def _contents(texts: Mapping[str, Mapping[str, str]]) -> str:
@@ -153,6 +166,10 @@ def _table(number: int, name: str, text: Mapping[str, str]) -> str:
     return f"## {text['title']}\n\n{text['says']}\n\n{caption}\n\n{rows}"
 
 
+def _unit(pattern: str, name: str) -> str:
+    return "1 or rad" if pattern in _LOSS_OR_ANGLE else unit_of(name)
+
+
 def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
     """A row a pattern, where the first column of it stands."""
     done = set()
@@ -160,7 +177,7 @@ def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
         pattern = pattern_of(name, meanings)
         if pattern not in done:
             done.add(pattern)
-            yield f"`{pattern}`", kind, unit_of(name) if kind == NUMBER else "", meanings[pattern]
+            yield f"`{pattern}`", kind, _unit(pattern, name) if kind == NUMBER else "", meanings[pattern]
 
 
 def pattern_of(name: str, patterns: Iterable[str]) -> str:

@@ -139,8 +139,9 @@ _CAPTION = """*Table 1. Exit statuses. "exception": the exception that the same 
 _NOTES = """Status 1 has three possible reasons:
 
 - An expectation of a scenario, of a sweep or of a plan is not met.
-- A check found a violation. `verify` checks guarantees, `check` a certificate, and `matrix` names and false
-  alarms. `beaver-ftc COMMAND --help` states the condition of each command.
+- A check found a violation. `verify` checks guarantees, `check` a certificate, `matrix` names and false
+  alarms, `reproduce` statements of the paper, `mechanisms` false alarms, and `separate` whether the doublet
+  distinguished the candidates. `beaver-ftc COMMAND --help` states the condition of each command.
 - Ctrl-C interrupted a flight of `sitl`. The results are written, with the verdict INTERRUPTED. Other commands
   that are interrupted end with status 130.
 
@@ -178,7 +179,7 @@ def statuses_page() -> str:
         (
             "`128 + N`",
             "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2); each "
-            " result file is complete or absent",
+            "result file is complete or absent",
             "",
         )
     )

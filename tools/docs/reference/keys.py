@@ -14,8 +14,9 @@ from beaver_ftc.scenario.sweeps import sweep_json_schema
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_assurance.evidence.plan import plan_json_schema
 from beaver_ftc_logs.vehicle import Vehicle
-from tools.docs.reference.schema import Key, Node, Path, Place, Section, Sections, dotted
+from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Place, Section, Sections, dotted
 
+_PARTS = ("p", "q", "r", ITEM, NAME)  # of a path: below the key that they are parts of
 HEAD = ("key", "what it is", "type", "unit", "range", "default", "example")
 _TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number", "number": "number"}
 _PLURALS = {one: f"{one}s" for one in ("text", "choice", "whole number", "number", "value", "section")}
@@ -98,7 +99,9 @@ def _captioned(parts: Iterable[str], number: int) -> Iterator[str]:
 
 def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
     parts = [f'<a id="{_anchor(section.title)}"></a>\n\n## {_heading(section)}']
-    if elsewhere := _elsewhere(section):
+    if _is_also_a_list(section):
+        parts.append("The value is one such mapping, or a list of them.")
+    elif elsewhere := _elsewhere(section):
         parts.append(f"The same keys are also allowed {elsewhere}.")
     if section.says:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
@@ -143,6 +146,12 @@ def _named(beside: list[Path]) -> str:
     return f"`{dotted(above)}`: " + ", ".join(f"`{path[-1]}`" for path in beside)
 
 
+def _is_also_a_list(section: Section) -> bool:
+    """Whether it stands at one place only, by itself or as an item of a list."""
+    paths = {place.path for place in section.places}
+    return len(paths) == 2 and (*section.places[0].path, ITEM) in paths
+
+
 def _elsewhere(section: Section) -> str:
     """Where else it stands."""
     first = section.places[0].path[:-1]
@@ -157,8 +166,23 @@ def _row(key: Key, places: list[Place]) -> tuple[str, ...]:
     wanted = ", ".join(f"`{name}: {in_a_line(value)}`" for name, value in key.needs.items())
     says = _without_unit(key.says, units) + (f"; the example also needs {wanted}" if wanted else "")
     example = "" if key.example is None else f"`{key.name}: {in_a_line(key.example)}`"
-    unit = ", ".join(filter(None, units)) or ("1" if key.number else "")
+    unit = _unit(key, places) if key.number else ""
     return f"`{key.name}`", says, _type(key), unit, _range(key), _default(key), example
+
+
+def _unit(key: Key, places: list[Place]) -> str:
+    """The unit of a key; of several, each with the names of what has it, the commonest one last."""
+    names: dict[str, dict[str, None]] = {}
+    for place in places:
+        of = next((part for part in reversed(place.path) if part not in _PARTS), "")
+        names.setdefault(key.unit(place) or "1", {})[of] = None
+    usual = max(names, key=lambda unit: len(names[unit]))
+    others = [
+        f"{unit} for {' and '.join(f'`{name}`' for name in of)}"
+        for unit, of in names.items()
+        if unit != usual
+    ]
+    return ", ".join([*others, f"otherwise {usual}"]) if others else usual
 
 
 def _without_unit(says: str, units: list[str]) -> str:
@@ -251,14 +275,17 @@ def _short(value: Any) -> Any:
         return {name: _short(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
         return [_short(one) for one in value]
-    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e6 else value
+    return int(value) if isinstance(value, float) and value.is_integer() and abs(value) <= 1e6 else value
 
 
 def _of_scenarios() -> Iterator[str]:
     """What a scenario may name: schemes and laws with their options, presets."""
     for group, what, where in ((DETECTORS, "schemes", "fdi"), (LAWS, "laws", "control")):
         yield f"## {what.capitalize()}, and their `{where}.options`"
-        yield f"`{where}.{what[:-1]}` has one of these names, and `{where}.options` sets the options below."
+        yield (
+            f"`{where}.{what[:-1]}` has one of these names, and `{where}.options` sets the options below. "
+            f"{what.capitalize()} that are not in the table of options have no options."
+        )
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
         yield markdown_table(
             (what[:-1], "what it is"), [(f"`{one.name}`", one.description()) for one in entries]
@@ -311,8 +338,8 @@ _LINKS = {
     "fdi.statistical": "[statistical detector](explanation/statistical.md)",
     "fdi.bounds": "[bound on the model error](explanation/detection.md#the-bound-on-the-model-error), "
     "[declare errors](how-to/declare-errors.md)",
-    "fdi.sharpen": "[bank of poles](explanation/detection.md#a-bank-of-poles), "
-    "[isolation tests](explanation/isolation.md)",
+    "fdi.sharpen": "[guarantees](explanation/assumptions.md), "
+    "[bank of poles](explanation/detection.md#a-bank-of-poles), [isolation tests](explanation/isolation.md)",
     "control": "[control laws](explanation/laws.md)",
     "control.power": "[if elevator and flap are both lost]"
     "(explanation/laws.md#if-elevator-and-flap-are-both-lost)",
@@ -347,6 +374,7 @@ KINDS = {
         "requirements are met. A plan lists requirements and the flights that test them "
         f"([how to write one](how-to/evidence.md)). {_AS_SCHEMA.format(' --plan')}",
         "[Write evidence](how-to/evidence.md) explains the verdicts of a plan with an example.",
+        links={"requirements[]": "[tests of a requirement, operators of a formula](how-to/evidence.md)"},
     ),
     "aircraft-keys": Kind(
         AircraftFile.model_json_schema,

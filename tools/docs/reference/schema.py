@@ -1,7 +1,8 @@
 """The keys of a kind of file, read from the JSON Schema of what loads it: sections, and in each its keys."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import ceil, floor
 from typing import Any
 
 from beaver_ftc.results.log import unit_of
@@ -183,9 +184,16 @@ def limits(node: Node) -> str:
     least, most = (node.get(name, node.get(short)) for name, short in (("minimum", "ge"), ("maximum", "le")))
     above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
     if least is not None and most is not None:
-        return f"{shown(least)} to {shown(most)}"
+        return f"{_inward(least, ceil)} to {_inward(most, floor)}"
     words = ((least, "{} or more"), (above, "above {}"), (most, "{} or less"), (below, "below {}"))
     return ", ".join(text.format(shown(value)) for value, text in words if value is not None)
+
+
+def _inward(limit: float, towards: Callable[[float], int]) -> str:
+    """A limit that was converted to another unit is rounded towards the inside of the range."""
+    text = shown(limit)
+    many = len(text.lstrip("-").replace(".", "")) > 5 and "." in text and "e" not in text
+    return shown(towards(limit * 100.0) / 100.0) if many else text
 
 
 def shown(value: float) -> str:

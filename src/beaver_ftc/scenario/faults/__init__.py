@@ -28,6 +28,11 @@ Properties = dict[str, float]  # failure properties of one surface
 InWords = Mapping[str, Callable[[Any], str]]  # of each parameter, its value in words
 
 
+SURFACE_SAYS = (
+    "surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the Beaver"
+)
+
+
 class Button(NamedTuple):
     """Of the live page: its place among the others, what it says, and the fault it makes."""
 
@@ -185,7 +190,8 @@ class Damage(Switched):
 class LossOfEffectiveness(Gradual):
     """The surface gives the share 1 - magnitude of its healthy moment.
 
-    actuator: surface that fails
+    actuator: surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the
+    Beaver
     magnitude: lost share of the effectiveness, from 0 (healthy) to 1 (no moment), share of 1
     """
 
@@ -215,7 +221,8 @@ class LossOfEffectiveness(Gradual):
 class Stuck(Switched):
     """The surface jams.
 
-    actuator: surface that fails
+    actuator: surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the
+    Beaver
     position_deg: position at which the surface jams, between its stops; left out: the position at the start
     of the fault, deg
     """
@@ -257,7 +264,7 @@ class Hardover(Switched):
     mavlink = 4, {"direction": 1}
 
     type: Literal["hardover"]
-    actuator: Actuator = entry(..., "surface that fails")
+    actuator: Actuator = entry(..., SURFACE_SAYS)
     direction: Literal[1, -1] = entry(1, "stop to which the surface runs. 1: upper stop. -1: lower stop")
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
@@ -272,7 +279,7 @@ class Float(Switched):
     button, mavlink = Button(3, "float", {}), (1, {})
 
     type: Literal["float"]
-    actuator: Actuator = entry(..., "surface that fails")
+    actuator: Actuator = entry(..., SURFACE_SAYS)
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["float"] = 1.0
@@ -288,7 +295,7 @@ class Bias(Gradual):
     button = Button(6, "bias", {"bias_deg": 3})
 
     type: Literal["bias"]
-    actuator: Actuator = entry(..., "surface that fails")
+    actuator: Actuator = entry(..., SURFACE_SAYS)
     bias_deg: Number = number(
         ..., "deg", "angle added to the position of the actuator", ge=-90, le=90, examples=[2]
     )
@@ -306,7 +313,7 @@ class RateLimit(Gradual):
     button, mavlink = Button(7, "rate limit", {"scale": 0.05}), (5, {"scale": 0.1})
 
     type: Literal["rate_limit"]
-    actuator: Actuator = entry(..., "surface that fails")
+    actuator: Actuator = entry(..., SURFACE_SAYS)
     scale: Number = number(
         ..., "share of 1", "remaining share of the rate limit", ge=0, le=1, examples=[0.05]
     )
@@ -330,7 +337,7 @@ class Oscillatory(Gradual):
     mavlink = 3, {"amplitude_deg": 3.0, "frequency_rad_s": 10.0}
 
     type: Literal["oscillatory"]
-    actuator: Actuator = entry(..., "surface that fails")
+    actuator: Actuator = entry(..., SURFACE_SAYS)
     amplitude_deg: Number = number(..., "deg", "amplitude of the oscillation", gt=0, le=90, examples=[2])
     frequency_rad_s: Number = number(
         ..., "rad/s", "angular frequency of the oscillation", gt=0, le=1000, examples=[5]

@@ -57,6 +57,13 @@ TABLE = (
         "into a folder of its own, not into the environment that all tests share",
         r"python -m pip install -q --no-deps --no-build-isolation --no-index --target plugins \1",
     ),
+    Exempt(
+        r"(beaver-ftc sweep losses-and-laws\.yaml --search false_alarm)( --replay 51)",
+        "flies again what the search before it has found: with the script that reads the same search",
+        r"\1 --no-report && \1\2 --no-report && python worst-so-far.py",
+    ),
+    Exempt(r"python worst-so-far\.py", "reads a search: runs with the replay of its worst flight"),
+    Exempt(r"\. \.venv/bin/activate", "in a checkout, after make demo has made the environment"),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
     Exempt(r"python (-m )?benchmarks[/.].*", "a measurement of minutes to hours, from a checkout"),

@@ -191,6 +191,25 @@ def test_why_a_surface_that_is_named_is_kept_in_use_is_said(beaver):
     assert not any("was reallocated" in hint for hint in at_once.metrics["hints"])
 
 
+def test_of_two_faults_the_one_named_first_is_not_said_to_be_reallocated():
+    """The flap takes over from the elevator; the rudder, named long before, goes on."""
+    two = {
+        "name": "two",
+        "duration_s": 18,
+        "reference": {axis: [{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.25}}] for axis in "pqr"},
+        "faults": [
+            {"actuator": "rudder", "type": "loss_of_effectiveness", "magnitude": 0.6, "at_s": 5},
+            {"actuator": "elevator", "type": "stuck", "at_s": 12},
+        ],
+        "fdi": {"fault_class": "all", "pairs": True},
+    }
+    flight = bf.fly(bf.load(two), log=False)
+    (taken_s,) = (change.time_s for change in flight.supervisor if change.mode == "reallocated")
+    assert flight.isolation.time_s < 6.0 < taken_s - 6.0
+    assert [one.fault for one in flight.isolation.faults] == ["rudder", "elevator"]
+    assert not any("was reallocated" in hint for hint in flight.metrics["hints"])
+
+
 @needs.command("identify")
 def test_a_table_with_a_column_twice_is_bad_input(beaver):
     Path("twice.csv").write_text("t_s,p_rad_s,p_rad_s\n0,0,0\n1,0,0\n")

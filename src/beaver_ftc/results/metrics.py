@@ -644,10 +644,13 @@ def _on_the_bound(flight: "Landing") -> str:
 
 def _waited(found: Metrics) -> str:
     """Why the law goes on with a surface that has been named long since: another takes over only where it is
-    weak or stuck, which the name alone does not say."""
+    weak or stuck, which the name alone does not say. Nothing of several faults: which of them another surface
+    took over is not known here."""
     isolation = found.isolation
     taken_s = [change.time_s for change in found.supervisor if change.mode == TAKEN_OVER]
     if not taken_s or isolation.time_s is None or taken_s[0] - isolation.time_s < LONG_S:
+        return ""
+    if isolation.faults:
         return ""
     return (
         f"{isolation.fault} was named at {isolation.time_s:.2f} s; its demand was reallocated at "

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.diagnosis.monitors.redundancy import sensor_finding
+from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import load
@@ -93,7 +93,7 @@ def fly(words: dict[str, Any], last: bool = False) -> tuple[str, bool]:
     for _ in loop.chunks():
         pass
     frame = loop.frames[0]
-    said = sensor_finding(frame["fdi"]["sensor_monitor"], float(frame["t"]))
+    said = sensor_monitor_finding(frame["fdi"]["sensor_monitor"], float(frame["t"]))
     lost = bool(frame["departed"])
     if frame["fdi"]["verdict"]["isolated_estimator"] >= 0 or (
         frame["fdi"]["sensor_monitor"]["output"]["surface_was_isolated"] and not last

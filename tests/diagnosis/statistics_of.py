@@ -141,7 +141,7 @@ class Across:
 
     @staticmethod
     def alarm(record, view):
-        return parity.alarm_score(
+        return parity.view_alarm_score(
             view, views_of(record), record["test_config"], record["forces"], record["gust"]
         )
 

@@ -191,7 +191,7 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
         reckoned = (
             long["drift_intensity_scale"]
             * gusts.low_frequency_power_ratio(record, g)
-            / (1.0 / long["correlation_length"] ** 2 + omega**2)
+            / (1.0 / long["drift_correlation_length_m"] ** 2 + omega**2)
         )
         assert (reckoned >= true * (1.0 - 1e-9)).all()
         assert reckoned[0] == pytest.approx(true[0], rel=1e-3)

@@ -293,7 +293,7 @@ def new_detector(**fields):
     )
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
         block["n_axes"], block["axis"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
-    record["block"][2]["drift_intensity_scale"], record["block"][2]["correlation_length"] = 4.0, 90.0
+    record["block"][2]["drift_intensity_scale"], record["block"][2]["drift_correlation_length_m"] = 4.0, 90.0
     put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
 

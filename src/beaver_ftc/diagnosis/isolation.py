@@ -280,7 +280,7 @@ def add_to_mean_effect(mean, effect, frame_share):
 # Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
 FAULT_EFFECT_RECORD = record(acceleration_at_zero_theta=3, regressor=3, error_bound=3)
 
-ESTIMATOR_RECORD = record(
+ISOLATION_ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
     excluded=int, excluded_at_s=float, ignored_axes=(int, 3), xhat=3, residual=3,
@@ -309,7 +309,7 @@ def isolation_dtype(surfaces: int) -> np.dtype:
         adapts_by_gradient=int, gradient_gain=float, projection_disabled=int, isolation_hold_off_s=float,
         can_be_lost_by_damage=(int, surfaces),
     )  # fmt: skip
-    return record(config=config, estimator=(ESTIMATOR_RECORD, 2 * surfaces))
+    return record(config=config, estimator=(ISOLATION_ESTIMATOR_RECORD, 2 * surfaces))
 
 
 DAMAGE_ISOLATION_HOLD_OFF_S = (

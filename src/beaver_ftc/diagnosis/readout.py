@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis.detection.likelihood import N_ONSET_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
 
 
-class Estimator(NamedTuple):
+class IsolationEstimator(NamedTuple):
     """An isolation estimator, of the hypothesis that one surface has lost effectiveness (kind LOSS) or is at
     a position (kind POSITION).
 
@@ -29,7 +29,7 @@ class Estimator(NamedTuple):
     parity_direction: np.ndarray
 
 
-class Layout(NamedTuple):
+class SurfaceLayout(NamedTuple):
     """Layout of the surfaces: the axis that each turns most, and the number of the estimator of its loss and
     of its position, -1 where there is none."""
 
@@ -140,13 +140,13 @@ class OnsetTests(NamedTuple):
 class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
-    axis_indices: of its states. correlation_length: of the drift, m; 0 for none. drift_intensity_scale:
-    factor on the variance of a gust seen roughly. regressor_tolerance (regressors,): of the constants that
-    are not known, 0 for one not used.
+    axis_indices: of its states. drift_correlation_length_m: of the drift, m; 0 for none.
+    drift_intensity_scale: factor on the variance of a gust seen roughly. regressor_tolerance (regressors,):
+    of the constants that are not known, 0 for one not used.
     """
 
     axis_indices: tuple[int, ...]
-    correlation_length: float
+    drift_correlation_length_m: float
     drift_intensity_scale: float
     regressor_tolerance: np.ndarray
     hypotheses: tuple[StatisticalHypothesis, ...]
@@ -176,7 +176,8 @@ class SensorMonitor(NamedTuple):
     test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced (sensors,): whether a
     reading is not used any more. sample_time_s: between two samples. gust_change_bound_mps (poles,): bound on
     the changes of a gust through the filters. predicted_reading, reading_error_bound (sensors,): SI.
-    engine_command (2,): engine speed rpm, manifold pressure inHg, which the engine's sensors should read.
+    commanded_engine_readings (2,): engine speed rpm, manifold pressure inHg, which the engine's sensors
+    should read.
     """
 
     enabled: bool
@@ -190,7 +191,7 @@ class SensorMonitor(NamedTuple):
     gust_change_bound_mps: np.ndarray
     predicted_reading: np.ndarray
     reading_error_bound: np.ndarray
-    engine_command: np.ndarray
+    commanded_engine_readings: np.ndarray
 
 
 class DiagnosisReadout:
@@ -230,9 +231,9 @@ class DiagnosisReadout:
         return int(self._fdi["verdict"]["isolated_estimator"])
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> SurfaceLayout:
         """Axes and estimators of the surfaces."""
-        return Layout(*(tuple(self._fdi["layout"][name].tolist()) for name in Layout._fields))
+        return SurfaceLayout(*(tuple(self._fdi["layout"][name].tolist()) for name in SurfaceLayout._fields))
 
     @cached_property
     def is_estimator_excluded(self) -> np.ndarray:
@@ -240,7 +241,7 @@ class DiagnosisReadout:
         return estimator_records(self._fdi)["excluded"].astype(bool)
 
     @cached_property
-    def estimators(self) -> tuple[Estimator, ...]:
+    def estimators(self) -> tuple[IsolationEstimator, ...]:
         """The isolation estimators, in the bank's order; none where another scheme isolates."""
         return tuple(map(_read_estimator, estimator_records(self._fdi)))
 
@@ -402,10 +403,10 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
-def _read_estimator(fie: np.void) -> Estimator:
+def _read_estimator(fie: np.void) -> IsolationEstimator:
     active_axes = tuple(np.flatnonzero(fie["ignored_axes"] == 0).tolist())
     theta_range = float(fie["theta_min"]), float(fie["theta_max"])
-    return Estimator(
+    return IsolationEstimator(
         int(fie["hypothesis_kind"]),
         *theta_range,
         bool(fie["excluded"]),
@@ -435,7 +436,7 @@ def _read_block(block: np.void) -> StatisticalBlock:
     )
     return StatisticalBlock(
         tuple(block["axis"][: block["n_axes"]].tolist()),
-        float(block["correlation_length"]), float(block["drift_intensity_scale"]),
+        float(block["drift_correlation_length_m"]), float(block["drift_intensity_scale"]),
         block["regressor_tolerance"][: block["n_regressors"]].copy(), hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip
 
@@ -463,5 +464,5 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
         float(output["worst_test_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
         output["is_replaced"].astype(bool), float(config["sample_time_s"]),
         config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
-        memory["reading_error_bound"].copy(), memory["engine_command"].copy(),
+        memory["reading_error_bound"].copy(), memory["commanded_engine_readings"].copy(),
     )  # fmt: skip

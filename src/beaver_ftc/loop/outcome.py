@@ -30,7 +30,7 @@ from beaver_ftc.control.autopilot import (
 from beaver_ftc.design import altitude_of
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis import Verdict
-from beaver_ftc.diagnosis.monitors.redundancy import sensor_finding
+from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.verdict import estimate_fault_size, fault_findings
 from beaver_ftc.loop.frame import estimated_theta_of_isolated_loss
@@ -368,7 +368,7 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
 def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
     """What `_alarm` and `_isolation` have, of surfaces or of an instrument."""
     fdi = frame["fdi"]
-    broken = sensor_finding(fdi["sensor_monitor"], float(frame["t"]))
+    broken = sensor_monitor_finding(fdi["sensor_monitor"], float(frame["t"]))
     if broken is not None:
         return {"detection_axis": None, **broken, "so_far": False if broken["isolated"] else None}
     said = _alarm(fdi) | _isolation(fdi, surfaces)

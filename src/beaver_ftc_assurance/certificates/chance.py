@@ -192,7 +192,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         "drift": drift, "bounded": tape.filters["bounded"][here][:-1][:, axes],
         "pace": then["uncertainty_change_per_frame"],
     }  # fmt: skip
-    if block.correlation_length > 0.0:
+    if block.drift_correlation_length_m > 0.0:
         its["keep"] = then["drift_decay_factor"]
     if known:
         its["known"] = (response - before[..., :n]) / dt + before[..., n:]  # that gave this response

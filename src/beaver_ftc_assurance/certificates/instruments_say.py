@@ -59,7 +59,7 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     last sample; then what the filter and its bound keep of all samples before."""
     test, number = monitor.test, monitor.worst_test
     if number >= RPM_TEST:
-        predicted = float(monitor.engine_command[number - RPM_TEST])
+        predicted = float(monitor.commanded_engine_readings[number - RPM_TEST])
         bound = float(monitor.reading_error_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING
         yield [predicted + test.residual, predicted, bound]
         return

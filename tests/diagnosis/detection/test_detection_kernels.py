@@ -9,15 +9,15 @@ from beaver_ftc.diagnosis.detection import filters as detection_filters
 from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
     BETA_CENTRES_RAD,
+    FDAE_NETWORK_RECORD,
     N_BASIS_FUNCTIONS,
-    NETWORK_RECORD,
 )
 from beaver_ftc.diagnosis.state import EITHER_DETECTOR, STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.schema import Scenario
 
 
 def new_network(**fields):
-    return fill(np.zeros(1, NETWORK_RECORD).view(np.recarray)[0], **fields)
+    return fill(np.zeros(1, FDAE_NETWORK_RECORD).view(np.recarray)[0], **fields)
 
 
 @pytest.mark.parametrize("alpha", [-0.3, -0.1, 0.0, 0.13, 0.5, 0.9])

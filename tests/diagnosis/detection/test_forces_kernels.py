@@ -620,7 +620,9 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
         update_all_force_innovations(statistical["forces"], statistical["gust"], swinging, U, DT)
         assert statistical["forces"]["n_updates"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
-        active = [v for v in statistical["views"] if parity.uses_force(v) and parity.max_test_score(v) > 0.0]
+        active = [
+            v for v in statistical["views"] if parity.uses_force(v) and parity.max_test_score_of_view(v) > 0.0
+        ]
         assert bool(active) == (looks == 2)
 
 

@@ -192,10 +192,10 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     air, last = alone.detector["gust"], alone.blocks[-1]
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
     assert air["config"]["rolling_gust_correlation_length"] == pytest.approx(rolling)
-    assert last["correlation_length"] == pytest.approx(
+    assert last["drift_correlation_length_m"] == pytest.approx(
         statistical.drift_correlation_length(alone.detector, V, 50.0, rolling)
     )
-    assert last["drift_intensity_scale"] == pytest.approx((rolling / last["correlation_length"]) ** 2)
+    assert last["drift_intensity_scale"] == pytest.approx((rolling / last["drift_correlation_length_m"]) ** 2)
     assert [float(block["drift_intensity_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
     assert air["output"]["accounts_for_gusts"] == 1
     assert air["config"]["wing_area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)

@@ -328,7 +328,7 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
     relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
     relations["config"]["filter_decay"] = [0.0, 0.8, 0.97]
     (
-        relations["memory"]["engine_command"],
+        relations["memory"]["commanded_engine_readings"],
         relations["config"]["error_offset"][ENGINE_SPEED],
         relations["config"]["error_offset"][MANIFOLD],
     ) = (
@@ -430,7 +430,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         np.abs(bias),
         np.abs(slope),
     )
-    relations["config"]["attitude_drift_rad_s"], relations["memory"]["engine_command"] = (
+    relations["config"]["attitude_drift_rad_s"], relations["memory"]["commanded_engine_readings"] = (
         np.abs(drift).max(),
         (1800.0, 20.0),
     )

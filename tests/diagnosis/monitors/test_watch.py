@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.diagnosis.monitors.redundancy import (
     ISOLATION_TIME_LIMIT_S,
     SENSOR_MONITOR_RECORD,
-    sensor_finding,
+    sensor_monitor_finding,
 )
 from beaver_ftc.plant.instruments import SENSORS
 from beaver_ftc.scenario.sensors import sensor_words
@@ -23,20 +23,20 @@ def monitor():
 
 def test_nothing_is_said_without_an_alarm_or_beside_a_surfaces(monitor):
     monitor["output"]["keeps_isolated_surface"] = 1
-    assert sensor_finding(monitor, 4.5) is None
+    assert sensor_monitor_finding(monitor, 4.5) is None
     monitor["output"]["keeps_isolated_surface"] = monitor["output"]["alarmed"] = 0
-    assert sensor_finding(monitor, 4.5) is None
+    assert sensor_monitor_finding(monitor, 4.5) is None
 
 
 @pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + ISOLATION_TIME_LIMIT_S])
 def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
-    said = sensor_finding(monitor, t_s)
+    said = sensor_monitor_finding(monitor, t_s)
     assert said["candidates"] == (sensor_words(SENSORS[0]), sensor_words(SENSORS[2]))
     assert (said["detection_time_s"], said["isolation_time_s"], said["isolated"]) == (4.0, None, None)
 
 
 def test_what_cannot_be_named_by_then_is_unanticipated(monitor):
-    said = sensor_finding(monitor, 4.01 + ISOLATION_TIME_LIMIT_S)
+    said = sensor_monitor_finding(monitor, 4.01 + ISOLATION_TIME_LIMIT_S)
     assert said["isolated"] == said["isolation_type"] == "unanticipated"
     assert said["isolation_time_s"] == 4.0 + ISOLATION_TIME_LIMIT_S
     assert said["candidates"] == ()
@@ -45,6 +45,6 @@ def test_what_cannot_be_named_by_then_is_unanticipated(monitor):
 @pytest.mark.parametrize("named", [0, 1])
 def test_the_instrument_that_is_named_is_said_with_its_instant(monitor, named):
     monitor["output"]["isolated_sensor"], monitor["output"]["isolated_at_s"] = named, 4.25
-    said = sensor_finding(monitor, 9.0)
+    said = sensor_monitor_finding(monitor, 9.0)
     assert (said["isolated"], said["isolation_time_s"]) == (sensor_words(SENSORS[named]), 4.25)
     assert said["isolation_type"] is None

@@ -592,7 +592,7 @@ def stood_in(i, signal=(), **fields):
     monitor = new_watch(**fields)
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
     relations = monitor["redundancy"]
-    relations["memory"]["predicted_reading"], relations["memory"]["engine_command"] = (
+    relations["memory"]["predicted_reading"], relations["memory"]["commanded_engine_readings"] = (
         np.arange(N_SENSORS) / 10.0,
         (1800.0, 20.0),
     )
@@ -730,7 +730,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
     (
         monitor["redundancy"]["memory"]["predicted_reading"],
-        monitor["redundancy"]["memory"]["engine_command"],
+        monitor["redundancy"]["memory"]["commanded_engine_readings"],
     ) = 0.1, (1800.0, 20.0)
     monitor["redundancy"]["memory"]["previous_reading"][[QDYN, AIRSPEED]] = 1000.0, 44.0
     measured["signal"], measured["y"], measured["attitude"] = 0.3, 9.0, 9.0

@@ -319,7 +319,7 @@ def are_residuals_reachable(bank, fie, axes_share_theta):
 ALPHA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9)
 BETA_CENTRES_RAD = np.linspace(-0.3, 0.3, 5)
 N_BASIS_FUNCTIONS = len(ALPHA_CENTRES_RAD) + len(BETA_CENTRES_RAD)
-NETWORK_RECORD = record(
+FDAE_NETWORK_RECORD = record(
     config=record(learning_gain=float, leak_per_s=float, weight_limit=float),
     memory=record(weights=(3, N_BASIS_FUNCTIONS), basis_values=N_BASIS_FUNCTIONS),
     output=3,
@@ -331,7 +331,10 @@ FDAE_CONFIG_RECORD = record(pole_per_s=3, decay_factor=3)
 FDAE_MEMORY_RECORD = record(xhat=3, threshold_uncertainty_part=3, threshold_gyro_error_part=3)
 FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
 FDAE_RECORD = record(
-    config=FDAE_CONFIG_RECORD, memory=FDAE_MEMORY_RECORD, output=FDAE_OUTPUT_RECORD, network=NETWORK_RECORD
+    config=FDAE_CONFIG_RECORD,
+    memory=FDAE_MEMORY_RECORD,
+    output=FDAE_OUTPUT_RECORD,
+    network=FDAE_NETWORK_RECORD,
 )
 
 _CHANGE_OF_GAUSSIAN_RATIO = np.exp(-1.0)

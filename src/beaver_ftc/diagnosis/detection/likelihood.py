@@ -169,7 +169,7 @@ def block_dtype(capacity: BlockCapacity) -> np.dtype:
     return record(
         axis=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
-        correlation_length=float, drift_intensity_scale=float, residual_filter_state=4,
+        drift_correlation_length_m=float, drift_intensity_scale=float, residual_filter_state=4,
         frame_innovation=2,  # rad/s2
         # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
         no_gust_filter=FILTER_RECORD, calm_air_prediction=2, calm_air_cross_correlation=float,

@@ -644,7 +644,7 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame, is_alarm_la
         view.decaying_peak_score = max(
             (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_MEMORY_RATIO)
             * view.decaying_peak_score,
-            max_test_score(view),
+            max_test_score_of_view(view),
         )
 
 
@@ -663,7 +663,7 @@ def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
 
 
 @kernel
-def max_test_score(view):
+def max_test_score_of_view(view):
     """The largest score of the tests of a view."""
     largest = view.tone_tests.score
     for h in range(view.block.n_hypotheses):
@@ -682,7 +682,7 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
     if uses_force(view) and not forces.in_use:
         return 0.0
     if view.is_immune_to_vane_error or not (uses_force(view) or subtracts_gust_estimate(view, gust)):
-        return max_test_score(view)
+        return max_test_score_of_view(view)
     confirming_score = 0.0
     for other in views:
         if other.is_immune_to_vane_error and other.plane_axes[1] == view.confirming_force:
@@ -694,7 +694,7 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
 
 
 @kernel
-def alarm_score(view, views, test_config, forces, gust):
+def view_alarm_score(view, views, test_config, forces, gust):
     """The score with which a view raises the alarm, 0 if it raises none.
 
     Views raise it only where no block of the rates test_config: for an oscillation about an axis, and for a

@@ -244,7 +244,7 @@ def configure_statistical_detector(
         if gust["config"]["only_coarse_estimate"]
         else [rolling_gust_length_m]
     )
-    mean_reverting_block["correlation_length"] = drift_correlation_length(
+    mean_reverting_block["drift_correlation_length_m"] = drift_correlation_length(
         statistical, airspeed_mps, rate_hz, float(min(gust_lengths_m))
     )
     if gust["output"]["accounts_for_gusts"]:
@@ -252,15 +252,15 @@ def configure_statistical_detector(
         for name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
         mean_reverting_block["drift_intensity_scale"] = (
-            rolling_gust_length_m / mean_reverting_block["correlation_length"]
+            rolling_gust_length_m / mean_reverting_block["drift_correlation_length_m"]
         ) ** 2
         if not gust["output"]["is_gust_measured"]:
             pitching_gust_length_m = float(rotation_lengths(gust["config"]["wing_span"])[1])
-            pitch_block["correlation_length"] = drift_correlation_length(
+            pitch_block["drift_correlation_length_m"] = drift_correlation_length(
                 statistical, airspeed_mps, rate_hz, pitching_gust_length_m
             )
             pitch_block["drift_intensity_scale"] = (
-                pitching_gust_length_m / pitch_block["correlation_length"]
+                pitching_gust_length_m / pitch_block["drift_correlation_length_m"]
             ) ** 2
         add_gust_estimate_noise(statistical, errors, design, *trim[1:], dt_s)
 
@@ -636,7 +636,7 @@ def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_er
         keep_largest_alarm_score(
             alarm,
             test_config.alarm_level,
-            parity.alarm_score(view, views, test_config, forces, gust),
+            parity.view_alarm_score(view, views, test_config, forces, gust),
             view.alarm_axis,
         )
     if alarm.score_over_alarm_level > 1.0 and alarm.detected_at_s < 0.0:
@@ -644,7 +644,7 @@ def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_er
 
 
 @kernel
-def update_max_score(alarm):
+def update_max_alarm_score(alarm):
     """Keep the largest score over the alarm level so far."""
     alarm.max_score_over_alarm_level = max(alarm.max_score_over_alarm_level, alarm.score_over_alarm_level)
 
@@ -673,7 +673,8 @@ def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
     for view in views:
         column = row.size - 3 + view.alarm_axis
         row[column] = max(
-            row[column], parity.alarm_score(view, views, test_config, forces, gust) / test_config.alarm_level
+            row[column],
+            parity.view_alarm_score(view, views, test_config, forces, gust) / test_config.alarm_level,
         )
 
 
@@ -906,7 +907,9 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
                 noise_model.input_noise_variance[axis]
             )
         block.drift_decay_factor = (
-            np.exp(-dt * V / block.correlation_length) if block.correlation_length > 0.0 else 1.0
+            np.exp(-dt * V / block.drift_correlation_length_m)
+            if block.drift_correlation_length_m > 0.0
+            else 1.0
         )
 
 

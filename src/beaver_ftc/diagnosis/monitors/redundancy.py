@@ -139,7 +139,7 @@ REDUNDANCY_RECORD = record(
         previous_acceleration_magnitude=float,
         first_acceleration_error_bound=float,  # m/s2, in the first step only: no sample precedes it
         predicted_reading=N_SENSORS, scratch=4, predicted_quaternion=4,
-        engine_command=2,  # engine speed rpm, manifold pressure inHg
+        commanded_engine_readings=2,  # engine speed rpm, manifold pressure inHg
     ),
     test=(TEST_RECORD, N_TESTS),
 )  # fmt: skip
@@ -229,7 +229,10 @@ def configure_sensor_monitor(
     config["rate_damping_per_s"] = acceleration_per_air_rotation(DesignFunctions(np.array([design])), y)
     monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine_sensors"]:
-        monitor["redundancy"]["memory"]["engine_command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+        monitor["redundancy"]["memory"]["commanded_engine_readings"] = (
+            initial.engine_rpm,
+            initial.manifold_pressure_inhg,
+        )
     configure_redundancy_tests(monitor["redundancy"]["config"], declared, scenario)
     configure_declared_errors(monitor, declared, monitor["redundancy"]["config"]["sample_time_s"])
 
@@ -290,7 +293,7 @@ def gust_bounds(air: Dryden, airspeed_mps: float, sample_time_s: float) -> tuple
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
 
 
-def sensor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
+def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
     output = monitor["output"]
     if not output["alarmed"] or output["keeps_isolated_surface"]:
@@ -766,8 +769,8 @@ def restart_test(test):
 def compare_engine_sensors(redundancy, signal):
     """Compare the engine's readings with the command. There is no filter: each sample is judged alone."""
     memory = redundancy.memory
-    redundancy.test[RPM_TEST].residual = signal[ENGINE_SPEED] - memory.engine_command[0]
-    redundancy.test[RPM_TEST + 1].residual = signal[MANIFOLD] - memory.engine_command[1]
+    redundancy.test[RPM_TEST].residual = signal[ENGINE_SPEED] - memory.commanded_engine_readings[0]
+    redundancy.test[RPM_TEST + 1].residual = signal[MANIFOLD] - memory.commanded_engine_readings[1]
     for i in range(2):
         bound = memory.reading_error_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
         redundancy.test[RPM_TEST + i].residual_bound_ratio = (

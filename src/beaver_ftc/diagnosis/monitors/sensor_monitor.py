@@ -424,7 +424,7 @@ def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, 
 @kernel
 def set_expected_manifold_pressure(monitor, manifold_pressure_inhg):
     """Predict the engine's manifold pressure from the command of the law in charge of the engine."""
-    monitor.redundancy.memory.engine_command[1] = manifold_pressure_inhg
+    monitor.redundancy.memory.commanded_engine_readings[1] = manifold_pressure_inhg
 
 
 @kernel
@@ -959,7 +959,7 @@ def estimate_reading(monitor, prediction, signal, sensor):
     if sensor == QDYN:
         return 0.5 * density * signal[AIRSPEED] ** 2
     if sensor >= ENGINE_SPEED:
-        return memory.engine_command[sensor - ENGINE_SPEED]
+        return memory.commanded_engine_readings[sensor - ENGINE_SPEED]
     return memory.predicted_reading[sensor]
 
 

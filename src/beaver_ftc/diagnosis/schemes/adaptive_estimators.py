@@ -222,7 +222,7 @@ def isolate_loss(fdi, measured, t, isolation_has_run):
 
 
 @apart
-def isolate_loss_by_either(fdi, measured, t, isolation_has_run):
+def isolate_loss_by_either_detector(fdi, measured, t, isolation_has_run):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         if not update_and_test_if_possible_in_worst_case(
@@ -250,7 +250,7 @@ def isolate_fault_type(fdi, measured, t, isolation_has_run):
 
 
 @apart
-def isolate_fault_type_by_either(fdi, measured, t, isolation_has_run):
+def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_has_run):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         if not update_and_test_if_possible_in_worst_case(
@@ -306,7 +306,7 @@ ISOLATION_VARIANTS = {
         begin_loss_isolation, observe_nothing_for_losses, isolate_loss
     ),
     ("published", "either"): IsolationVariant(
-        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_either
+        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_either_detector
     ),
     ("published", "statistical"): IsolationVariant(
         begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_statistics
@@ -315,7 +315,7 @@ ISOLATION_VARIANTS = {
         begin_fault_type_isolation, observe_surface_commands, isolate_fault_type
     ),
     ("all", "either"): IsolationVariant(
-        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type_by_either
+        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type_by_either_detector
     ),
 }
 PUBLISHED_WORST_CASE_VARIANT = 0  # the place of the published class without statistics

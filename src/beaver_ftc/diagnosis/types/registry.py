@@ -77,7 +77,7 @@ FIRST_TYPE_WITH_SAME_NAME = tuple(
 )  # the first type of the same name
 
 
-def _type_column(name: str) -> np.ndarray:
+def _column_of_types(name: str) -> np.ndarray:
     """A column of whole numbers or flags of the table, by type."""
     return np.array([int(getattr(row, name)) for row in TYPES])
 
@@ -94,13 +94,13 @@ def _looks_like(fault_type: FaultType, other_type: FaultType) -> bool:
 
 # The columns that verdict.py reads; `FaultType` says what they are.
 ACCOMMODATION_MODES, STOP_DIRECTIONS, EVIDENCE_AT_REST = (
-    _type_column(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
+    _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
 SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
-    _type_column("shows_within_half_cycles"),
-    _type_column("half_cycles_before_isolating_others"),
+    _column_of_types("shows_within_half_cycles"),
+    _column_of_types("half_cycles_before_isolating_others"),
 )
-ERROR_DEPENDS_ON_COMMAND = _type_column("error_depends_on_command")
+ERROR_DEPENDS_ON_COMMAND = _column_of_types("error_depends_on_command")
 MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
 CAN_LOOK_LIKE = np.array(
     [[_looks_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]

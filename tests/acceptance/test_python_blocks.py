@@ -2,12 +2,17 @@
 
 import pytest
 
-from .documents import PAGES, python_blocks
+from .documents import PAGES, files_of_pages, python_blocks
+from .exceptions import instead
 
 OVERVIEW = "## At a glance"  # its texts belong together: tests/test_interface.py runs them
 # A tutorial's Python needs the files before it (test_tutorials.py).
 ALONE = [page for page in PAGES if page.parent.name != "tutorials"]
-BLOCKS = [block for page in ALONE for block in python_blocks(page, without=OVERVIEW)]
+# A script that needs the command before it runs with that command (test_documents.py).
+NOT_ALONE = {text for name, text in files_of_pages().items() if instead(f"python {name}") is None}
+BLOCKS = [
+    block for page in ALONE for block in python_blocks(page, without=OVERVIEW) if block not in NOT_ALONE
+]
 
 
 def test_the_pages_show_flights_plug_ins_and_environments():

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_hypothesis_bank
-from beaver_ftc_logs.filtering import fault_evidence_increments, hypothesis_posterior, page_cusum
+from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import group_values_by_surface, unexplained_rates_and_responses
@@ -252,7 +252,7 @@ def rows_of_posterior(
     )
     is_healthier = posterior[:, 0] + no_response_probability > 0.5
     threshold = model.settings.alarm_threshold
-    evidence_increments = fault_evidence_increments(posterior, bank)
+    evidence_increments = any_fault_log_odds_gains(posterior, bank)
     evidence = page_cusum(evidence_increments, threshold or np.inf)
     is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
         probability >= model.settings.alarm_probability, model

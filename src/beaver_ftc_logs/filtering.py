@@ -127,7 +127,7 @@ def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: Nois
     return np.where(is_predictable, model.settings.effective_sample_share * log_likelihood, 0.0)
 
 
-def fault_evidence_increments(posterior: Floats, bank: HypothesisBank) -> Floats:
+def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
     """Return the gain of each sample in the log odds of a fault, beyond that of a random change, (n,): the
     sum of it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the
     mean."""

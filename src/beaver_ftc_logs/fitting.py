@@ -20,7 +20,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_trim_and_gain_state_model
 from beaver_ftc_logs.diagnose import DiagnosisRows, rows_of_posterior
-from beaver_ftc_logs.filtering import fault_evidence_increments, hypothesis_posterior, page_cusum
+from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import Samples, constant_stretches
@@ -809,7 +809,7 @@ def _healthy_alarm_statistics(model: Model, held_out: Stretch) -> tuple[float, e
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
     posterior, _, noise_scale = hypothesis_posterior(held_out.samples, model, bank)
-    evidence_increments, labels = fault_evidence_increments(posterior, bank), held_out.samples.labels
+    evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
     is_healthy = (
         held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
     )

@@ -306,7 +306,7 @@ class Model(Section):
         conflicts: list[Conflict] = [(("past",), says)] * (len(self.past_coefficients) != rows)
         conflicts += [*self._group_conflicts(), *self._shape_conflicts(len(self.past_coefficients))]
         refuse(conflicts)  # before any of it is computed with
-        refuse(self._noise_conflicts())
+        refuse(self._invalid_covariances_or_errors())
         return self
 
     def _group_conflicts(self) -> Iterator[Conflict]:
@@ -360,7 +360,7 @@ class Model(Section):
                 size = " x ".join(map(str, shape))
                 yield where, f"has another shape, allowed: {size} numbers"
 
-    def _noise_conflicts(self) -> Iterator[Conflict]:
+    def _invalid_covariances_or_errors(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
         covariances: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
         covariances += [

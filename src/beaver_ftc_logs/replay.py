@@ -74,7 +74,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log["t_s"]
     detection_times_s = [float(row_t_s) for row_t_s, one in zip(t_s, verdicts, strict=True) if one.detected]
-    isolation_s, name = _isolation_time_and_name(t_s, verdicts)
+    isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
     logged_and_replayed = zip(log.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
@@ -93,7 +93,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
 
 
-def _isolation_time_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
+def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
     """Since when what is named at last has been named: what was withdrawn before does not count."""
     since_s, name = None, None
     for row_t_s, one in zip(t_s, verdicts, strict=True):

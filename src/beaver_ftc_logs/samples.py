@@ -50,7 +50,7 @@ class Samples:
     t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
     signals (n, X); labels (n, S) effectiveness, nan where unknown; stretch_number (n,) of the gap-free
     stretch; held_column_mean_age_s: mean age of each; log_stamps_s (m,) the log's own time stamps, s; notes:
-    what is said of the reading; airspeed (n,) m/s, nan where unknown; unchanged_time_s: for how long each
+    what is said of the reading; airspeed (n,) m/s, nan where unknown; time_since_change_s: for how long each
     column of rates, commands and signals has been the same, (n,) s; is_rate_clipped (n,);
     energy_height_rate_mps (n,): rate of the energy height over the last seconds, None where it is not logged;
     noise_ma_coefficients: the moving average of the noise, that rates, commands and signals are whitened by,
@@ -71,7 +71,7 @@ class Samples:
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
     airspeed: Floats | None = None
-    unchanged_time_s: Mapping[str, Floats] = field(default_factory=dict)
+    time_since_change_s: Mapping[str, Floats] = field(default_factory=dict)
     is_rate_clipped: NDArray[np.bool_] | None = None
     energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
@@ -113,7 +113,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         rates=stacked_columns(rate_columns),
         commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_columns), mixer_matrix(vehicle)),
         signals=stacked_columns(vehicle.signal_columns),
-        labels=_sampled_labels(recording, vehicle, t_s),
+        labels=_labelled_effectiveness_by_surface(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
         held_column_mean_age_s={
@@ -126,7 +126,9 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
             *dict.fromkeys(_used_column_defect_texts(recording, used_columns, rate_columns)),
         ),
         airspeed=_sampled_airspeed(recording, vehicle, t_s, step_s),
-        unchanged_time_s={name: _unchanged_time_s(recording.columns[name], t_s) for name in used_columns},
+        time_since_change_s={
+            name: _time_since_change_s(recording.columns[name], t_s) for name in used_columns
+        },
         is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_columns], t_s),
         energy_height_rate_mps=_sampled_energy_height_rate_mps(
             recording, vehicle, (t_s, stretch_number, step_s)
@@ -210,12 +212,12 @@ def _used_column_defect_texts(
             )
 
 
-def _unchanged_time_s(column: Column, t_s: Floats) -> Floats:
+def _time_since_change_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
     column = _finite_rows(column)
     return np.nan_to_num(
-        _latest_values(t_s, column.t_s, signals.unchanged_time_s(column)) + _held_age_s(column, t_s)
+        _latest_values(t_s, column.t_s, signals.time_since_change_s(column)) + _held_age_s(column, t_s)
     )
 
 
@@ -439,7 +441,7 @@ def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats
     return np.where(n_rows > 0, mean, held_values), 0.5 * step_s
 
 
-def _sampled_labels(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
+def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
     """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
     labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
     for i, surface in enumerate(vehicle.surfaces):
@@ -519,8 +521,8 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
     selected = {
         name: of[rows].copy() for name in _PER_SAMPLE_FIELDS if (of := getattr(samples, name)) is not None
     }
-    still_s = {name: of[rows].copy() for name, of in samples.unchanged_time_s.items()}
-    return replace(samples, log_stamps_s=selected["t_s"], unchanged_time_s=still_s, **selected)
+    still_s = {name: of[rows].copy() for name, of in samples.time_since_change_s.items()}
+    return replace(samples, log_stamps_s=selected["t_s"], time_since_change_s=still_s, **selected)
 
 
 def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
@@ -533,8 +535,8 @@ def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples
     is_begin[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
     joined["stretch_number"] = np.cumsum(is_begin)
     still_s = {
-        name: np.concatenate([one.unchanged_time_s[name] for one in flights])
-        for name in flights[0].unchanged_time_s
+        name: np.concatenate([one.time_since_change_s[name] for one in flights])
+        for name in flights[0].time_since_change_s
     }
     long_log_note = (
         f"a long log, read in {n_log_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked "
@@ -547,7 +549,7 @@ def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples
         notes=notes,
         n_log_parts=n_log_parts,
         log_stamps_s=joined["t_s"],
-        unchanged_time_s=still_s,
+        time_since_change_s=still_s,
         **joined,
     )
 

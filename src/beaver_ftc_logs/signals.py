@@ -17,7 +17,7 @@ _MIN_SPIKE_STEPS, _MAX_SPIKE_SHARE = 40.0, 0.01
 Mask = NDArray[np.bool_]
 
 
-def unchanged_time_s(column: Column) -> Floats:
+def time_since_change_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
     row_index = np.arange(len(column.values))
     unchanged_since = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row_index, 0))
@@ -91,7 +91,7 @@ def column_defect_texts(name: str, column: Column, is_measured_rate: bool) -> li
     n_missing = int((~np.isfinite(values)).sum())
     if n_missing:
         lines.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
-    longest_still_s = float(unchanged_time_s(column).max(initial=0.0))
+    longest_still_s = float(time_since_change_s(column).max(initial=0.0))
     if is_measured_rate and longest_still_s > MIN_STILL_S:
         lines.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
     if not is_measured_rate and values.size and np.nanmin(values) == np.nanmax(values):

@@ -106,13 +106,13 @@ def _column_correlation(values: Floats) -> Floats:
 
 
 def _longest_unchanged_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
-    names = dict.fromkeys(name for samples, _ in flights for name in samples.unchanged_time_s)
+    names = dict.fromkeys(name for samples, _ in flights for name in samples.time_since_change_s)
     return {
         name: max(
             (
-                float(one.unchanged_time_s[name].max(initial=0.0))
+                float(one.time_since_change_s[name].max(initial=0.0))
                 for one, _ in flights
-                if name in one.unchanged_time_s
+                if name in one.time_since_change_s
             )
         )
         for name in names
@@ -316,12 +316,12 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     if not compared:
         return
     flight, likeliest_model = max(compared, key=lambda one: one[1][0].mean())[0]
-    part_gains = _bound_part_gains(flight, likeliest_model)
+    part_gains = _bound_gains_over_flight_parts(flight, likeliest_model)
     if part_gains is None:
         return
     mistakes = _column_mistakes(samples, model, part_gains)
     for noise_ma_coefficients in NOISE_MA_CANDIDATES if mistakes else ():
-        other_gains = _bound_part_gains(whiten_samples(samples, noise_ma_coefficients), model)
+        other_gains = _bound_gains_over_flight_parts(whiten_samples(samples, noise_ma_coefficients), model)
         if (
             other_gains is not None
             and other_gains.log_likelihood_by_part.mean() > part_gains.log_likelihood_by_part.mean()
@@ -483,7 +483,7 @@ def _noise_variance_scale(squared_residual: Floats) -> float:
     return float(np.median(squared_residual.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3)
 
 
-def _bound_part_gains(samples: Samples, model: Model) -> _FlightPartGains | None:
+def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _FlightPartGains | None:
     """None where a part is too short."""
     is_predictable, unexplained, responses = regression.whitened_rates_and_responses(samples, model)
     if (parts := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
@@ -576,7 +576,7 @@ def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mas
     reasons: dict[str, Mask] = {}
     for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
         reasons[f"{name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
-            samples.unchanged_time_s[name] > max_unchanged_time_s
+            samples.time_since_change_s[name] > max_unchanged_time_s
         )
     if samples.is_rate_clipped is not None:
         reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
@@ -646,7 +646,7 @@ def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
     fitted_unchanged_time_s = model.fitted_ranges.longest_unchanged_time_s if model.fitted_ranges else {}
     usual_unchanged_time_s = {
-        name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.unchanged_time_s
+        name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.time_since_change_s
     } | fitted_unchanged_time_s
     min_unchanged_time_s = {
         name: MIN_STILL_S / 3.0
@@ -656,7 +656,7 @@ def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
     }
     return {
         name: max(min_unchanged_time_s[name], _UNCHANGED_TIME_FACTOR * usual_unchanged_time_s[name])
-        for name in samples.unchanged_time_s
+        for name in samples.time_since_change_s
     }
 
 
@@ -664,7 +664,7 @@ def is_frozen_or_clipped_sample(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
     is_dead = np.zeros(len(samples.t_s), dtype=bool)
     for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
-        is_dead |= samples.unchanged_time_s[name] > max_unchanged_time_s
+        is_dead |= samples.time_since_change_s[name] > max_unchanged_time_s
     return is_dead if samples.is_rate_clipped is None else is_dead | samples.is_rate_clipped
 
 

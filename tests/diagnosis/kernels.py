@@ -89,7 +89,7 @@ OF_SURFACE = {
     },
     "evidence": ("evidence", "n_anomalous_frames"),
     **{name: ("evidence", name) for name in _EVIDENCE},
-    "n_frames_since_fault_showed": ("accommodation", "n_frames_since_fault_showed"),
+    "n_frames_without_sign_of_fault": ("accommodation", "n_frames_without_sign_of_fault"),
     "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "decision_basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
     "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),

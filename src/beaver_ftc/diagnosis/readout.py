@@ -339,7 +339,7 @@ def disable_diagnosis(fdi: np.void) -> None:
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
-def arrays_of_every_frame(
+def certificate_arrays_of_every_frame(
     fdi: np.void, n_estimators: int, diagnoses_all_types: bool
 ) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies.

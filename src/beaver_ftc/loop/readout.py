@@ -178,7 +178,7 @@ def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[s
     `diagnosis.readout.recorded_always`."""
     means = frame["prediction"]["frame_means"]
     own = {"x": frame["measured"]["x"], "model": means["acceleration"]}
-    return own | of_diagnosis.arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
+    return own | of_diagnosis.certificate_arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
 
 
 def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:

@@ -20,7 +20,7 @@ from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, open_lo
 _TIME_FIELD, _INSTANCE_FIELDS = "TimeUS", ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
-MessageFields = dict[str, Any]
+ValuesByField = dict[str, Any]
 
 
 def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedFlight:
@@ -34,9 +34,9 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
     return RecordedFlight(path.stem, columns_of_topics(messages, _TIME_FIELD)[0])
 
 
-def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, MessageFields]:
+def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, ValuesByField]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
-    values_of_message: dict[str, MessageFields] = {}
+    values_of_message: dict[str, ValuesByField] = {}
     with (
         open_log_with_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
@@ -58,8 +58,8 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
 
 
 def _empty_columns(
-    name: str, numbers: MessageFields, wanted_columns: Collection[str] | None
-) -> MessageFields:
+    name: str, numbers: ValuesByField, wanted_columns: Collection[str] | None
+) -> ValuesByField:
     kept = [
         field
         for field in numbers

@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis.rivals.kalman import (
     sigma_points,
     update_state,
 )
-from beaver_ftc.diagnosis.rivals.rls import RecursiveLeastSquares
+from beaver_ftc.diagnosis.rivals.rls import RecursiveLeastSquaresFit
 
 RNG = np.random.default_rng(7)
 
@@ -102,7 +102,7 @@ def test_recursive_least_squares_is_the_weighted_batch_solution():
     forgetting, prior, n = 0.97, 1e3, 200
     phi, w = RNG.normal(size=(n, 4)), RNG.normal(size=4)
     y = phi @ w + 0.3 * RNG.normal(size=n)
-    rls = RecursiveLeastSquares(4, forgetting, prior)
+    rls = RecursiveLeastSquaresFit(4, forgetting, prior)
     for row, value in zip(phi, y, strict=True):
         rls.step(row, value)
     weight = forgetting ** np.arange(n)[::-1]
@@ -112,7 +112,7 @@ def test_recursive_least_squares_is_the_weighted_batch_solution():
 
 
 def test_recursive_least_squares_does_not_wind_up_without_excitation():
-    rls = RecursiveLeastSquares(2, 0.9, 100.0)
+    rls = RecursiveLeastSquaresFit(2, 0.9, 100.0)
     for _ in range(5000):
         rls.step(np.array([1.0, 0.0]), 1.0)
     assert np.isfinite(rls.P).all()

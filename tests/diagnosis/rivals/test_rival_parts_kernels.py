@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.rivals.effectiveness import (
     EffectivenessFilter,
 )
 from beaver_ftc.diagnosis.rivals.kalman import GustStates, unexplained_acceleration_size, update_state
-from beaver_ftc.diagnosis.rivals.rls import InputOutputPair, RecursiveLeastSquares, RlsMonitor
+from beaver_ftc.diagnosis.rivals.rls import InputOutputPair, RecursiveLeastSquaresFit, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
 GUSTY = Declared(
@@ -154,7 +154,7 @@ def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, squ
 def test_a_pairs_score_is_of_errors_against_those_before():
     """The model of least_squares.py, and mean and variance of its errors, both fading."""
     rng, fade, floor = np.random.default_rng(5), 0.9, 0.01
-    pair, model = InputOutputPair(0.98, fade, floor), RecursiveLeastSquares(5, 0.98, 1e4)
+    pair, model = InputOutputPair(0.98, fade, floor), RecursiveLeastSquaresFit(5, 0.98, 1e4)
     inputs, outputs = rng.normal(size=(2, 40))
     mean = variance = 0.0
     for k in range(40):

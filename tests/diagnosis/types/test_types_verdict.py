@@ -414,7 +414,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
     surface["last_observation"]["position_low"] = 0.1
     take_lead(fdi, verdict.choose_accommodated_surface, fdi["verdict"]["isolated_estimator"])
     assert (
-        surface["accommodation"]["n_frames_since_fault_showed"],
+        surface["accommodation"]["n_frames_without_sign_of_fault"],
         fdi["verdict"]["accommodated_surface"],
     ) == (
         0,
@@ -425,7 +425,7 @@ def test_the_lead_is_taken_on_one_surface_while_its_fault_shows():
 
 @pytest.mark.parametrize("dt", [0.01, 0.002, 0.05])
 def test_a_fault_that_has_gone_is_let_go_after_a_fifth_of_a_second_at_any_rate(dt):
-    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_frames_since_fault_showed=0)
+    fdi, surface = one(STUCK, command=0.3, low=0.29, high=0.31, n_frames_without_sign_of_fault=0)
     fdi["types"]["config"]["dt"] = dt
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
     there = [
@@ -1146,7 +1146,7 @@ def test_a_surface_acted_upon_that_cannot_be_at_fault_is_shifted_as_it_shows():
     (
         fdi["types"]["surface"]["last_observation"]["position_low"],
         fdi["types"]["surface"]["last_observation"]["position_high"],
-        fdi["types"]["surface"]["accommodation"]["n_frames_since_fault_showed"],
+        fdi["types"]["surface"]["accommodation"]["n_frames_without_sign_of_fault"],
     ) = (
         0.3,
         0.4,

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import extremes, fitting
 from beaver_ftc_logs.bank import build_hypothesis_bank
-from beaver_ftc_logs.filtering import fault_evidence_increments, page_cusum
+from beaver_ftc_logs.filtering import any_fault_log_odds_gains, page_cusum
 from beaver_ftc_logs.vehicle import with_false_alarm_rate
 from products.logs import small
 
@@ -93,7 +93,7 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
     posterior[:, place] = first, second, odds / (1.0 + odds)
     posterior[:, 0] = 1.0 - posterior[:, place]
     np.testing.assert_allclose(
-        fault_evidence_increments(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12
+        any_fault_log_odds_gains(posterior, bank), [0.0, 0.0, np.log(10.0)], atol=1e-12
     )
 
 

@@ -200,7 +200,7 @@ def test_evidence_is_the_log_of_a_likelihood_ratio():
     posterior = np.column_stack([1 - fault, 0.25 * fault, 0.75 * fault])
     before = [0.2, 0.9 * 0.3 + 0.1 * 0.5, 0.9 * 0.6 + 0.1 * 0.5]
     expected = [np.log(p / (1 - p)) - np.log(q / (1 - q)) for p, q in zip(fault, before, strict=True)]
-    assert filtering.fault_evidence_increments(posterior, bank) == pytest.approx(expected)
+    assert filtering.any_fault_log_odds_gains(posterior, bank) == pytest.approx(expected)
     assert np.isfinite(
-        filtering.fault_evidence_increments(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
+        filtering.any_fault_log_odds_gains(np.array([[0.0, 0.5, 0.5], [1.0, 0.0, 0.0]]), bank)
     ).all()

@@ -212,7 +212,7 @@ def test_columns_are_compared_in_white(moving, colour):
     flight = flown(colour, 1.1, 4000, 21)
     trust.check_columns_as_identified(flight, moving)
     found = [
-        trust._bound_part_gains(whiten_samples(flight, one.ma_coefficients), moving)
+        trust._bound_gains_over_flight_parts(whiten_samples(flight, one.ma_coefficients), moving)
         for one in moving.noise_models
     ]
     likeliest = max(
@@ -220,7 +220,7 @@ def test_columns_are_compared_in_white(moving, colour):
     )
     assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
     assert all(1.0 < gain < 1.6 for gain in likeliest[0].group_gain_upper_bounds)
-    plain = trust._bound_part_gains(flight, moving.model_copy(update={"noise_models": []}))
+    plain = trust._bound_gains_over_flight_parts(flight, moving.model_copy(update={"noise_models": []}))
     assert colour == (1.0,) or min(plain.group_gain_upper_bounds) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.check_columns_as_identified(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)

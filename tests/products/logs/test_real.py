@@ -45,8 +45,8 @@ def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
         cut = {name: getattr(samples, name)[:n] for name in (*fields, "is_rate_clipped")}
-        still_s = {name: still[:n] for name, still in samples.unchanged_time_s.items()}
-        short = diagnose(replace(samples, unchanged_time_s=still_s, **cut), model)
+        still_s = {name: still[:n] for name, still in samples.time_since_change_s.items()}
+        short = diagnose(replace(samples, time_since_change_s=still_s, **cut), model)
         assert np.array_equal(short.credible, whole.credible[:n])
         assert np.array_equal(short.effectiveness, whole.effectiveness[:n])
         assert np.array_equal(short.fault_probability, whole.fault_probability[:n])

@@ -147,11 +147,11 @@ def test_whether_a_replay_is_as_flown(tmp_path, beside, as_flown):
 
 def test_what_is_withdrawn_is_not_what_is_named():
     """The name that stands at the end, since it has stood there."""
-    assert of._isolation_time_and_name(T_S[:4], SAID[:4]) == (1.5, "rudder")
-    assert of._isolation_time_and_name(T_S[:5], SAID[:5]) == (1.5, "rudder")
-    assert of._isolation_time_and_name(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
+    assert of._last_isolation_start_and_name(T_S[:4], SAID[:4]) == (1.5, "rudder")
+    assert of._last_isolation_start_and_name(T_S[:5], SAID[:5]) == (1.5, "rudder")
+    assert of._last_isolation_start_and_name(T_S[:5], [*SAID[:4], Verdict(True)]) == (None, None)
     again = [SAID[0], SAID[2], SAID[1], SAID[2], SAID[2]]
-    assert of._isolation_time_and_name(T_S[:5], again) == (1.5, "elevator")
+    assert of._last_isolation_start_and_name(T_S[:5], again) == (1.5, "elevator")
 
 
 def test_a_replay_that_finds_nothing(tmp_path):

@@ -180,7 +180,7 @@ def test_names_under_other_laws(monkeypatch):
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "fault_evidence_increments", lambda posterior, bank: gained)
+    monkeypatch.setattr(diagnose, "any_fault_log_odds_gains", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
     bank = build_hypothesis_bank(model)
 

@@ -165,8 +165,10 @@ def test_a_rate_that_is_no_number_any_more_is_unknown_and_stands_still(step_s):
     assert np.isnan(found.rates[late, 0]).all()
     assert np.isfinite(found.rates[early, 0]).mean() > 0.6
     assert np.isfinite(found.rates[:, 1:]).all()
-    np.testing.assert_allclose(found.unchanged_time_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9)
-    assert found.unchanged_time_s["p_rad_s"][early].max() < 0.5
+    np.testing.assert_allclose(
+        found.time_since_change_s["p_rad_s"][late], found.t_s[late] - last_s, atol=1e-9
+    )
+    assert found.time_since_change_s["p_rad_s"][early].max() < 0.5
 
 
 def test_the_mixer_has_a_row_a_surface():
@@ -242,7 +244,7 @@ def test_a_log_too_slow_may_be_one_in_another_unit_of_time(rate_hz, says):
 def test_labels_are_the_last_ones_of_each_surface_that_has_them():
     vehicle = small.vehicle(labels={"left": {"column": "left_left", "scale": 0.01}, "right": "right_left"})
     known = RecordedFlight("log", {"left_left": column([1.0, 3.0], [40.0, 70.0])})
-    labels = of._sampled_labels(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
+    labels = of._labelled_effectiveness_by_surface(known, vehicle, np.array([0.5, 1.0, 2.9, 3.0]))
     assert np.isnan(labels[:, 0]).all()
     np.testing.assert_allclose(labels[:, 1], [np.nan, 0.4, 0.4, 0.7])
 

@@ -19,7 +19,7 @@ def noise(seed=1):
 def test_for_how_long_a_signal_stands_still():
     values = noise()
     values[200:261] = values[200]
-    still = signals.unchanged_time_s(Column(T_S, values))
+    still = signals.time_since_change_s(Column(T_S, values))
     assert still[211] == 0.0
     assert still[212] == pytest.approx(0.6)
     assert still[260] == pytest.approx(3.0)

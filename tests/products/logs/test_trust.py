@@ -81,7 +81,7 @@ def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredibl
 def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     still = np.zeros(600)
     still[300:400] = 0.1 * np.arange(100)
-    flown = small.flight(model, n=600, seed=4, unchanged_time_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, time_since_change_s={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
     assert list(rows.reasons_not_credible) == ["q_rad_s stands still, for longer than 1.5 s"]
@@ -99,7 +99,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
     )
     still = np.zeros(600)
     still[300:320] = 0.1 * np.arange(20)
-    flown = small.flight(model, n=600, seed=4, unchanged_time_s={"q_rad_s": still})
+    flown = small.flight(model, n=600, seed=4, time_since_change_s={"q_rad_s": still})
     assert (diagnose(flown, known).credible == 0).tolist() == (still > most).tolist()
 
 
@@ -108,7 +108,7 @@ def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
     known = model.model_copy(update={"fitted_ranges": trained})
     for longest, share in ((11.9, 1.0), (12.5, 0.98)):
         flown = small.flight(
-            model, n=600, seed=4, unchanged_time_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
+            model, n=600, seed=4, time_since_change_s={"roll": np.where(np.arange(600) < 12, longest, 0.0)}
         )
         assert diagnose(flown, known).credible.mean() == pytest.approx(share)
 
@@ -344,7 +344,7 @@ def test_what_was_clipped_is_remembered_for_half_a_minute():
 def test_for_how_long_each_column_may_stand_still():
     """A rate for a third of 1.5 s where it is known, any column thrice as long as it did; others for ever."""
     names = ["p_rad_s", "q_rad_s", "r_rad_s", "roll", "pitch", "air"]
-    samples = small.flight(small.model(), 20, unchanged_time_s=dict.fromkeys(names, np.zeros(20)))
+    samples = small.flight(small.model(), 20, time_since_change_s=dict.fromkeys(names, np.zeros(20)))
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
@@ -353,7 +353,7 @@ def test_for_how_long_each_column_may_stand_still():
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
-    short = replace(samples, t_s=np.arange(3.0), unchanged_time_s=still_s)
+    short = replace(samples, t_s=np.arange(3.0), time_since_change_s=still_s)
     assert trust.is_frozen_or_clipped_sample(short, model).tolist() == [False, True, False]
     clipped = replace(short, is_rate_clipped=np.array([False, False, True]))
     assert trust.is_frozen_or_clipped_sample(clipped, model).tolist() == [False, True, True]
@@ -384,10 +384,10 @@ def test_what_is_kept_of_the_flights_fitted():
     climbs = np.append(np.arange(22.0), np.nan)  # 0 to 20 are used, and what is no number
     use = np.arange(23) != 21
     one = small.flight(
-        small.model(), 23, energy_height_rate_mps=climbs, unchanged_time_s={"roll": np.array([0.3, 0.2])}
+        small.model(), 23, energy_height_rate_mps=climbs, time_since_change_s={"roll": np.array([0.3, 0.2])}
     )
     other = small.flight(
-        small.model(), 23, unchanged_time_s={"roll": np.array([0.4]), "air": np.array([0.7])}
+        small.model(), 23, time_since_change_s={"roll": np.array([0.4]), "air": np.array([0.7])}
     )
     flights = [(other, use), (one, use)]
     assert trust._unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)

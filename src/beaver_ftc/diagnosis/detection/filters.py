@@ -437,7 +437,7 @@ def start_fdae(fdae, gyro_error_change_bound, x):
 
 
 @kernel
-def set_fdae_threshold(fdae, threshold):
+def set_constant_fdae_threshold(fdae, threshold):
     """Replace the threshold by a constant, rad/s."""
     fdae.output.threshold[:] = threshold
 

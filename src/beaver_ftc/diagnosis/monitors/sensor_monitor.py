@@ -115,7 +115,7 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 # Accelerometers or flow sensor
-JUMP_WINDOW_AFTER_ALARM_S = 1.0  # after the alarm: later, a jump by chance is too likely
+FLOW_JUMP_WINDOW_AFTER_ALARM_S = 1.0  # after the alarm: later, a jump by chance is too likely
 ACCELEROMETER_JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
 MIN_READING_JUMP_PER_RESIDUAL = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
 MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
@@ -175,7 +175,8 @@ def update_cleared_sensors(monitor, signal):
     if not is_flow_test(alarm_test):
         return
     since_alarm_s = memory.n_summed_samples * monitor.redundancy.config.sample_time_s
-    if since_alarm_s < JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S and flow_reading_jumped(monitor, signal):
+    is_soon_enough = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
+    if is_soon_enough and flow_reading_jumped(monitor, signal):
         clear_accelerometers(monitor)
     sum_flow_residuals(monitor, signal)
     flow_sensor = flow_sensor_of_test(alarm_test)

@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 
 
-class RecursiveLeastSquares:
+class RecursiveLeastSquaresFit:
     """y = w' phi, learnt sample by sample.
 
     n: parameters. forgetting: lam in (0, 1]. prior: variance of the parameters at the start; it also bounds
@@ -48,7 +48,7 @@ class InputOutputPair:
     """One input, one output: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a constant."""
 
     def __init__(self, forgetting_factor: float, averaging_decay: float, min_error_std: float) -> None:
-        self._model = RecursiveLeastSquares(5, forgetting_factor, 1e4)
+        self._model = RecursiveLeastSquaresFit(5, forgetting_factor, 1e4)
         self._averaging_decay, self._min_error_std = averaging_decay, min_error_std
         self._regressor = np.zeros(5)
         self._regressor[4] = 1.0

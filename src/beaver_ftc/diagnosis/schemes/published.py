@@ -209,7 +209,7 @@ def advance_to_frame(fdi, prediction, measured, k, t):
 @kernel
 def set_all_constant_thresholds(fdi, constant_threshold):
     """Replace all adaptive thresholds by a constant, rad/s."""
-    filters.set_fdae_threshold(fdi.fdae, constant_threshold)
+    filters.set_constant_fdae_threshold(fdi.fdae, constant_threshold)
     filters.set_published_filter_threshold(fdi.bank, constant_threshold)
     isolation.set_constant_isolation_thresholds(fdi.isolation, constant_threshold)
 

@@ -106,7 +106,8 @@ class FaultType:
                             a record of its own, found at `surface.<memory_record_name>`
     reset_memory(surface, type_index)
                             its memory is reset: nothing is known yet
-    on_every_frame(config, surface, type_index)             called for every frame, before it is judged
+    before_judging_frame(config, surface, type_index)
+                            called for every frame, before it is judged
     on_skipped_frame(config, surface, type_index, k)  called for a frame that is not judged
     on_possible_release(config, surface, type_index, k)
                             a repair may have released the surface as the frame began
@@ -172,7 +173,7 @@ class FaultType:
     memory_dtype: np.dtype | None = None
     memory_record_name: str = ""
     reset_memory: Kernel | None = None
-    on_every_frame: Kernel | None = None
+    before_judging_frame: Kernel | None = None
     on_skipped_frame: Kernel | None = None
     on_possible_release: Kernel | None = None
     propagate_release: Kernel | None = None

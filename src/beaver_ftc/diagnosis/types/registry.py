@@ -194,7 +194,7 @@ def _kernel_calling_one_type(part_name: str, arguments: str, default: Any) -> Ke
 _FRAME_KERNEL_ARGUMENTS = "config, surface, type_index, k"
 reset_memory_each = _kernel_calling_each_type("reset_memory", "surface, type_index")
 set_parameter_range_each = _kernel_calling_each_type("parameter_range", "surface", set_feasible_set)
-on_every_frame_each = _kernel_calling_each_type("on_every_frame", "config, surface, type_index")
+before_judging_frame_each = _kernel_calling_each_type("before_judging_frame", "config, surface, type_index")
 on_skipped_frame_each = _kernel_calling_each_type("on_skipped_frame", _FRAME_KERNEL_ARGUMENTS)
 intersect_consistent_interval_each = _kernel_calling_each_type(
     "consistent_interval", _FRAME_KERNEL_ARGUMENTS, intersect_feasible_set
@@ -257,7 +257,7 @@ STATUS_RECORD = record(
 )
 
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
-ACCOMMODATION_RECORD = record(mode=int, n_frames_since_fault_showed=int)
+ACCOMMODATION_RECORD = record(mode=int, n_frames_without_sign_of_fault=int)
 
 # Where a surface can be that a type has held and released, rad: table/held_surface.py.
 RELEASE_RECORD = record(
@@ -466,7 +466,7 @@ def judge_previous_frame(types):
     """Judge the frame before the elapsed one."""
     config, k = types.config, types.frame_index - 1
     for s, surface in enumerate(types.surface):
-        on_every_frame_each(config, surface)
+        before_judging_frame_each(config, surface)
         if config.released_surface_returns_via_actuator and types.frame_index > 0:
             on_possible_release_each(config, surface, k)
         if (

@@ -437,10 +437,11 @@ def update_fault_presence(config, surface, mode, is_at_fault):
     explains_frame = (
         observation.position_low <= deflection <= observation.position_high or mode == SCALE_COMMAND
     )
-    accommodation.n_frames_since_fault_showed = (
-        0 if explains_frame else accommodation.n_frames_since_fault_showed + 1
+    accommodation.n_frames_without_sign_of_fault = (
+        0 if explains_frame else accommodation.n_frames_without_sign_of_fault + 1
     )
-    return accommodation.n_frames_since_fault_showed * config.dt < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
+    absence_s = accommodation.n_frames_without_sign_of_fault * config.dt
+    return absence_s < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
 
 
 @kernel

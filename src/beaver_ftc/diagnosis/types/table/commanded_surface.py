@@ -297,7 +297,7 @@ BIAS = FaultType(
 )  # fmt: skip
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
-    reset_memory=reset_growing_bias_memory, on_every_frame=widen_offset_interval,
+    reset_memory=reset_growing_bias_memory, before_judging_frame=widen_offset_interval,
     consistent_interval=consistent_growing_bias_interval,
     on_skipped_frame=forget_bias_offset_interval,
     memory_record_name="growing_bias",
@@ -408,7 +408,7 @@ def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float 
 
 OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
-    reset_memory=reset_oscillation_memory, on_every_frame=add_squared_deflection_error,
+    reset_memory=reset_oscillation_memory, before_judging_frame=add_squared_deflection_error,
     consistent_interval=consistent_oscillation_interval,
     on_skipped_frame=skip_oscillation_frame, memory_record_name="oscillatory",
     memory_dtype=record(

@@ -41,7 +41,8 @@ def identify(
 
     vehicle: Path of a vehicle file, or the built-in name `alfa`. `beaver-ftc new NAME --log` writes an
     example with every key.
-    out: Path of the model file. With --check: path of the proposed vehicle file.
+    out: Path of the model file; required without --check. With --check: path of the proposed vehicle file.
+    Default: the proposal is printed.
     check: Do not fit a model. Report the content of the logs, and propose a vehicle file if --vehicle is left
     out.
     false_alarms_per_hour: Number of false alarms that `diagnose` may raise in one hour of healthy flight.

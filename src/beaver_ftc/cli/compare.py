@@ -62,8 +62,8 @@ def command(options: Options) -> None:
     grade: With --tune: use only flights of this grade: exact, actuators or errors. Default: all three grades.
     trials: With --tune: number of trials for each method and grade.
     seed: With --tune: seed of the random numbers of the search.
-    draw: With --tune: number of the random draw of calibration flights. From draw 1 on, the command also
-    measures the gain of the tuning.
+    draw: With --tune: which set of calibration flights is drawn; 0: the standard set. From draw 1 on, the
+    command also measures the gain of the tuning.
     tuned: With --sweep or --benchmark: read the parameters from this file instead of the parameters of the
     package.
     schemes: Names of schemes, separated by commas. Without --schemes and --laws, all registered schemes and

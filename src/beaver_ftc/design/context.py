@@ -90,7 +90,9 @@ class Context:
 
     - `dt_s`: length of a frame, s.
     - `substeps`: number of JSBSim steps in a frame.
-    - `model`: the design model, with functions for f and G.
+    - `model`: the design model. `model.f(x, y)` (3,) rad/s² is the angular acceleration at neutral surfaces,
+      for rates x (3,) rad/s and signals y as in `Measured.y`. `model.G(y)` (3, surfaces) rad/s² for each rad
+      is the effect of each surface.
     - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and surfaces in
       the trim at the start. `trim_y` has the order and units of `Measured.y`.
     - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.

@@ -177,7 +177,10 @@ class Diagnosis:
         return prediction["f"].copy(), prediction["G"].copy()
 
     def inside(self) -> tuple[np.ndarray, Scenario]:
-        """The memory of the diagnosis as a structured array (1,), and the scenario that it represents."""
+        """The memory of the diagnosis as a structured array (1,), and the scenario that it represents.
+
+        Use it to inspect or record the state of the diagnosis after a sample.
+        """
         return self._frames, self._scenario
 
     def _estimate(self) -> float | None:

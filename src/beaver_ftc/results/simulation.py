@@ -36,10 +36,16 @@ class Simulation(Stepping):
     - `log`: True keeps one row of the log for each frame in memory. A `MemoryLog` receives the rows instead.
     - `prepare`: a function that is called once before the flight, with the trimmed plant as argument.
 
-    Attributes: `t_s` is the time of the last frame, s. `done` is True after the last frame or after the loss
-    of the aircraft. `mode` is the mode of the supervisor. `measured` and `verdict` are the last `Measured`
-    and `Verdict`. `readout` has further values of the last frame, with names and units. `log` is the log so
-    far.
+    Attributes:
+
+    - `t_s`: time of the last frame, s. `frames`: number of frames flown. `rate_hz`: frames in a second.
+    - `done`: True after the last frame or after the loss of the aircraft. `departed`: True after the loss.
+    - `mode`: mode of the supervisor. `inconclusive`: reason why the diagnosis can conclude nothing, or "".
+    - `measured`, `verdict`: the last `Measured` and `Verdict`.
+    - `columns`: names of the columns of the log. `values` (columns,): row of the last frame. `rows` (frames,
+      columns): rows of the last call of `step`. `log`: the log so far, as a DataFrame.
+    - `trim_rad` (surfaces,) and `travel_rad` (2, surfaces), rad: surfaces in trim; lower and upper stops.
+    - `readout`: further values of the last frame, with names and units, for example `readout.G`.
 
     The first call of `step` also flies frame 0, which measures the aircraft in trim.
     """

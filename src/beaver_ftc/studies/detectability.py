@@ -578,10 +578,12 @@ class Detectability(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
-    airspeed: Airspeed, m/s. Repeat the option for several.
-    altitude: Altitude above sea level, m. Repeat the option for several.
+    airspeed: Airspeed, m/s. Repeat the option for several. Default: 36, 40, 44, 48 and 52 for the Beaver; for
+    another aircraft, 0.9, 1 and 1.1 times its airspeed at the start.
+    altitude: Altitude above sea level, m. Repeat the option for several. Default: the altitude at the start
+    in the aircraft file, otherwise 0, 1000, 2000 and 3000.
     aircraft: Aircraft that replaces the scenario's aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the
-    working directory.
+    working directory. Default: the scenario's aircraft.
     surface: Only this surface. The command then prints one sentence for each airspeed and altitude.
     out: Folder for the maps, which are written as a page, CSV and JSON.
     """

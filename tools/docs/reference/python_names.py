@@ -21,8 +21,9 @@ READING = """## How to read an entry
 
 - **Heading.** The name without `beaver_ftc.` in front. A name without a dot is in the package itself: write
   `bf.fly`. A name with a dot needs an import: write `from beaver_ftc.results.model import Fault`.
-- **Signature.** An argument with `=` has this default. Arguments after `*` must be given by name. `X | None`
-  means that the value may be None. The types are explained in the text below the signature.
+- **Signature.** An argument with `=` has this default, and `= ...` means that the default is
+  computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The
+  types are explained in the text below the signature.
 - **Arguments and fields.** Each line of a list has the name, the shape of an array, the unit, and the
   meaning.
 - **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
@@ -81,7 +82,10 @@ SAYS = {
     "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives an aircraft `jsbsim:NAME` at its first use, "
     "and checks an aircraft `./FOLDER` against its JSBSim model.",
     "Plug-ins": "The two classes that you can write, and the records that they receive and return.",
-    "Errors": "Both errors have a message of one line, fit for a user, and an `exit_code` for a script.",
+    "Errors": "Both errors have a message of one line, fit for a user, and an `exit_code` for a script. "
+    "Subclasses of `BadInput` are `ScenarioError` (mistakes in a file, one line for each), `UnknownAircraft` "
+    "(no aircraft of this name), and `NotDerived`, an `UnknownAircraft` (an aircraft of JSBSim whose design "
+    "model is not derived yet).",
 }
 
 
@@ -106,10 +110,16 @@ def _joined(described: Callable[[str, tuple[str, ...]], Iterator[str]]) -> str:
 def _contents() -> str:
     """A row for each section, which links to it."""
     rows = [
-        (f"[{heading}](#{anchor(heading)})", ", ".join(f"`{name.rpartition('.')[2]}`" for name in names))
+        (f"[{heading}](#{anchor(heading)})", ", ".join(f"`{_listed(name)}`" for name in names))
         for heading, names in NAMES.items()
     ]
     return f"{_CONTENTS}\n\n{markdown_table(('section', 'names'), rows)}"
+
+
+def _listed(name: str) -> str:
+    """A name without its module, unless the package itself has another thing of this name."""
+    last = name.rpartition(".")[2]
+    return name if last != name and hasattr(bf, last) else last
 
 
 def _directive(name: str, members: tuple[str, ...]) -> str:
@@ -164,7 +174,9 @@ def _signature(name: str, what: Any) -> str:
     signature = _MODULES.sub("", written)
     for written, short in _SHORT.items():
         signature = signature.replace(written, short)
-    signature = re.sub(r"'([A-Z]\w+(?: \| None)?)'", r"\1", signature)  # a name that is imported later
+    signature = re.sub(r"'([A-Z][^']*)'", r"\1", signature).replace(
+        "<factory>", "..."
+    )  # a name that is imported later
     return _in_lines(name, signature)
 
 
@@ -173,9 +185,21 @@ def _in_lines(name: str, signature: str) -> str:
     if len(name + signature) <= LONGEST_LINE:
         return name + signature
     inside, _, returned = signature[1:].rpartition(")")
-    arguments = re.split(r", (?![^\[(]*[\])])", inside)
+    arguments = _arguments(inside)
     lines = "".join(f"    {argument},\n" for argument in arguments)
     return f"{name}(\n{lines}){returned}"
+
+
+def _arguments(inside: str) -> list[str]:
+    """The arguments of a signature; a comma in brackets separates none."""
+    found, depth = [""], 0
+    for part in re.split(r"(, |[\[\](){}])", inside):
+        depth += (part in ("[", "(", "{")) - (part in ("]", ")", "}"))
+        if part == ", " and depth == 0:
+            found.append("")
+        else:
+            found[-1] += part
+    return found
 
 
 def _text(what: Any) -> str:

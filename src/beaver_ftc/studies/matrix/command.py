@@ -31,12 +31,13 @@ class Matrix(StudyCommand):
     If the command is interrupted, the same command resumes it.
 
     out: Folder in which the result folder `fault-matrix` or `pitch-lost` is written.
-    airspeed: Airspeed, m/s. Repeat the option for several.
+    airspeed: Airspeed, m/s. Repeat the option for several. Default: 38, 45 and 52 for the Beaver; for
+    another aircraft, shares of its airspeed at the start.
     pitch_lost: Instead, fail elevator and flap together, with and without control by engine power.
     declared: Simulate tactical-grade sensors, servos and, if the model allows it, errors of 5 % of the moment
     coefficients. Declare these errors to the diagnosis.
     turbulence: With --declared: severity of the turbulence that is simulated and declared to the diagnosis.
-    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
     """
 
     out: Path = Path("runs")

@@ -326,9 +326,9 @@ class Power(StudyCommand):
     schemes.
     sensors: Fly only these sensors. Default: all sensors of the grid.
     turbulence: Fly only this severity of turbulence. Default: all severities of the grid.
-    airspeed: Airspeed, m/s.
-    altitude: Altitude above sea level, m.
-    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory.
+    airspeed: Airspeed, m/s. Default: the airspeed at the start of a scenario without this key.
+    altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
+    aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
     surface: Fly only losses of this surface. The command then prints one line for each loss.
     rates_alone: Plug-ins receive only the body rates, without the air data that the built-in detector uses.
     out: Folder in which the result folder `power` is written.

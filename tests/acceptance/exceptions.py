@@ -117,7 +117,8 @@ TABLE = (
         "python -m tools.drawn.certificates --flights 4 --altered 4",
     ),
     Exempt(
-        r"beaver-ftc (run|validate|sweep|compare|detectability|evidence|sitl|mismatch|separate|import gtm)",
+        r"beaver-ftc (run|validate|check|sweep|compare|detectability|evidence|sitl|mismatch|separate"
+        r"|import gtm)",
         "names the command without its arguments",
         r"beaver-ftc \1 --help",
     ),
@@ -149,7 +150,9 @@ TABLE = (
         r"\1 --replay 0 --no-report",
     ),
     Exempt(
-        r"beaver-ftc run SCENARIO (--as \w+)", "stands for any", r"beaver-ftc run brief.yaml \1 --no-report"
+        r"beaver-ftc run SCENARIO (--as \w+|--certificate)",
+        "stands for any",
+        r"beaver-ftc run brief.yaml \1 --no-report",
     ),
     Exempt(
         r"(beaver-ftc sweep my-sweep.yaml --(?:workers|resume|backend).*)",

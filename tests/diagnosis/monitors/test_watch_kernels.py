@@ -334,29 +334,18 @@ def test_an_instrument_without_a_reading_is_named_at_once():
     assert monitor["output"]["isolated_sensor"] == BETA
 
 
+def alarm_and_sensor(monitor):
+    """(whether there is an alarm, the test that raised it, the sensor that is named)."""
+    return tuple(monitor["output"][name] for name in ("alarmed", "alarm_test", "isolated_sensor"))
+
+
 def test_the_one_suspect_left_is_named_and_two_are_not():
     monitor = with_shares({CLIMB_TEST: 2.0})
     on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
-    assert (
-        monitor["output"]["alarmed"],
-        monitor["output"]["alarm_test"],
-        monitor["output"]["isolated_sensor"],
-    ) == (
-        1,
-        CLIMB_TEST,
-        ALTITUDE,
-    )
+    assert alarm_and_sensor(monitor) == (1, CLIMB_TEST, ALTITUDE)
     monitor = with_shares({ALPHA_FLOW_TEST: 2.0})
     on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
-    assert (
-        monitor["output"]["alarmed"],
-        monitor["output"]["alarm_test"],
-        monitor["output"]["isolated_sensor"],
-    ) == (
-        1,
-        ALPHA_FLOW_TEST,
-        NO_SENSOR,
-    )
+    assert alarm_and_sensor(monitor) == (1, ALPHA_FLOW_TEST, NO_SENSOR)
     monitor["redundancy"]["test"]["residual_bound_ratio"][SPEED_TEST] = 9.0
     on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 6.0)
     assert monitor["output"]["alarm_test"] == ALPHA_FLOW_TEST  # the first alarm leads

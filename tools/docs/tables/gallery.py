@@ -123,7 +123,7 @@ def _binned(values: np.ndarray, of) -> np.ndarray:
 def _span(values: np.ndarray) -> tuple[float, float]:
     """Whole degrees below and above all values."""
     low = float(np.floor(values.min()))
-    return low, max(float(np.ceil(values.max())), low + 1.0)
+    return low, max(float(np.ceil(values.max())), low + 1.0) + 0.0  # no zero with a sign
 
 
 def _axes(title: str, panel: tuple[int, int], span: tuple[float, float], colour: str) -> list[str]:

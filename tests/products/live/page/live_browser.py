@@ -1,5 +1,6 @@
 """A headless Chromium, and how to wait for what its page shows."""
 
+import json
 import shutil
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -17,3 +18,8 @@ def until(page, condition, wait_s=WAIT_S):
             return
         page.wait_for_timeout(50)
     raise AssertionError(f"not in {wait_s:g} s: {condition}")
+
+
+def shows(page, selector, part):
+    """Wait until an element shows a text: the page draws a frame only when the screen next asks."""
+    until(page, f"document.querySelector({json.dumps(selector)})?.textContent.includes({json.dumps(part)})")

@@ -71,8 +71,10 @@ def row(per_hour: float, flights: int, duration_s: float, hours: float, seed: in
 
 def identified(flights: list[Samples], vehicle: Vehicle) -> Model:
     """The model of flights, with its threshold."""
-    stretches = fitting.usable_stretches(flights)
-    return fitting.add_fitted_ranges_and_alarm_threshold(stretches, fitting.fit_model(stretches, vehicle))
+    usable_flights = fitting.flights_with_usable_rows(flights)
+    return fitting.add_fitted_ranges_and_alarm_threshold(
+        usable_flights, fitting.fit_model(usable_flights, vehicle)
+    )
 
 
 def begun(faulty: np.ndarray) -> int:

@@ -1,14 +1,14 @@
 """The inputs of the bank of filters: its hypotheses, how a flight may differ from the model, the noise.
 
-The hypotheses: healthy, one group of surfaces at a level, two at once, an unknown offset, or that nothing
-answers the commands at all. What is likelier is said by the model's settings: levels seen in labelled
-flights, how often things change.
+The hypotheses: all healthy; one group of surfaces at a level of effectiveness; two groups at once; an unknown
+offset of the rates; nothing answers the commands. Their prior probabilities follow from the model's settings:
+the levels in labelled flights, and the rate of changes.
 
-Trim, gain, and each group's own gain may differ from the model. All start from it and are bounded, so that a
-fault from the start is not learnt away. The trim differs as another loading or rigging would make it (a shift
-of each group's command) and a little freely; it wanders. Gains return to the model's in time: airspeed varies
-about what it was when the model was identified. A group's own gain that the fit knows worse than
-to a step between levels is free by as much: few minutes mean wide bounds.
+Trim, common gain and each group's own gain may differ from the model. They start from it and are bounded, so
+that the filter does not adapt to a fault that is there from the start. The trim differs as another loading or
+rigging would change it (a shift of each group's command), and it drifts. Gains return to those of the model
+in time, since the airspeed varies about that of the fitted flights. If the standard error of a group's gain
+is larger than a step between levels, the excess is added to the variance of its own gain.
 """
 
 from collections.abc import Sequence
@@ -32,19 +32,20 @@ _MAX_SQUARED_RESIDUAL = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
 
-HypothesisRow = tuple[
+OneHypothesis = tuple[
     Floats, int, float, Floats
-]  # a row of HypothesisBank: effectiveness, kind, weight, offset
+]  # effectiveness of each group, kind, transition share, variance of the rate offset
 
 
 class HypothesisBank(NamedTuple):
     """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands.
 
-    effectiveness (H, G); hypothesis_kind (H,); transition_share (H,): share of the changes that lead to the
-    hypothesis; rate_offset_variance (H, 3): of the offset of the rates that comes with it, (rad/s)2;
-    prior_probability (H,): probability before the flight; transition_probability: of a change in a sample;
-    group_gain_sensitivity (H, G): share of a group's healthy response that the group's own gain multiplies:
-    the effectiveness, or 1 where the response of a control law to noise adds to the effect of a surface.
+    effectiveness (H, G). hypothesis_kind (H,). transition_share (H,): share of all changes of hypothesis that
+    lead to this one. rate_offset_variance (H, 3): variance of the offset of the rates that comes with it,
+    (rad/s)2. prior_probability (H,): probability before the flight. change_probability_per_sample:
+    probability that the hypothesis changes within a sample. response_share_scaled_by_group_gain (H, G): share
+    of a group's healthy response that the group's own gain multiplies: the effectiveness, or 1 where the
+    response of a control law to noise adds to the effect of a surface.
     """
 
     effectiveness: Floats
@@ -52,8 +53,8 @@ class HypothesisBank(NamedTuple):
     transition_share: Floats
     rate_offset_variance: Floats
     prior_probability: Floats
-    transition_probability: float
-    group_gain_sensitivity: Floats
+    change_probability_per_sample: float
+    response_share_scaled_by_group_gain: Floats
 
     @property
     def no_response_index(self) -> int:
@@ -71,13 +72,13 @@ class HypothesisBank(NamedTuple):
 
 
 def build_hypothesis_bank(model: Model) -> HypothesisBank:
-    """The hypotheses of a model: none of a group of which nothing is said, where something is said of any."""
+    """The hypotheses of a model. A group whose effect is unknown has none, unless all effects are unknown."""
     n_groups, settings = len(model.groups), model.settings
     has_known_effect = is_group_effect_known(model)
     known_groups = [
         group for group in range(n_groups) if has_known_effect[group] or not any(has_known_effect)
     ]
-    rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
+    rows: list[OneHypothesis] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
     n_known_surfaces = sum(len(model.groups[group]) for group in known_groups)
     may_be_stuck = "stuck" in model.vehicle.faults
     may_be_pairs = len(known_groups) > 1
@@ -91,7 +92,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         group_share = (
             single_fault_share * len(model.groups[group]) / n_known_surfaces / len(model.vehicle.faults)
         )
-        for offset_variance in _rate_offset_variances(model, group):
+        for offset_variance in _rate_offset_variance_per_fault_kind(model, group):
             for level, transition_share in zip(levels, level_shares, strict=True):
                 rows.append(
                     (
@@ -114,16 +115,18 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         np.array(column) for column in zip(*rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
-    transition_probability = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
-    group_gain_sensitivity = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    change_probability_per_sample = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
+    response_share_scaled_by_group_gain = (
+        np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    )
     return HypothesisBank(
         effectiveness,
         hypothesis_kind,
         transition_share,
         offset_variance,
         _prior_probabilities(hypothesis_kind, transition_share),
-        transition_probability,
-        group_gain_sensitivity,
+        change_probability_per_sample,
+        response_share_scaled_by_group_gain,
     )
 
 
@@ -137,7 +140,7 @@ def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) ->
 def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled_levels = settings.likely_effectiveness_levels.get("+".join(model.groups[group]), [])
+    labelled_levels = settings.likely_effectiveness_levels_by_group.get("+".join(model.groups[group]), [])
     even_levels = np.arange(
         0.0, 1.0 - 0.5 * settings.effectiveness_level_step, settings.effectiveness_level_step
     )
@@ -153,7 +156,7 @@ def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Fl
     )
 
 
-def _rate_offset_variances(model: Model, group: int) -> list[Floats]:
+def _rate_offset_variance_per_fault_kind(model: Model, group: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
     _, _, response, noise = model.coefficient_arrays()
@@ -166,7 +169,7 @@ def _rate_offset_variances(model: Model, group: int) -> list[Floats]:
     return [variance_of_fault_kind[kind] for kind in model.vehicle.faults]
 
 
-def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[HypothesisRow]:
+def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[OneHypothesis]:
     """Two of the known groups at once, on a coarse grid."""
     groups_and_levels = list(
         product(combinations(known_groups, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
@@ -212,7 +215,7 @@ class TrimAndGainStateModel(NamedTuple):
 
 
 def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
-    """The bounds of adaptation that a model's settings say."""
+    """The prior and the limits of trim and gains, from a model's settings."""
     settings, n_groups = model.settings, len(model.groups)
     _, _, response, noise = model.coefficient_arrays()
     noise_variance = np.diag(noise)
@@ -247,19 +250,19 @@ def _gain_variance_beyond_level_step(model: Model) -> Floats:
 
 
 class ResidualNoise(NamedTuple):
-    """The noise of a sample.
+    """The noise of the one-step residual.
 
-    intercept_rad_s (3,): of the model; covariance (3, 3) of a sample, (rad/s)2; effective_sample_share:
-    information of a residual over that of a white one; degrees_of_freedom: of its t distribution;
-    memory_samples, min_variance_scale, max_variance_scale: memory and limits of the running scale of the
-    covariance; max_squared_residual: squared standardised residual above which a sample carries no more
-    information; covariance_inflation: the covariance over that of the residuals.
+    intercept_rad_s (3,): intercept of the model. covariance (3, 3) of a sample, (rad/s)2.
+    effective_sample_share: information of a residual over that of a white one. t_degrees_of_freedom of its t
+    distribution. scale_memory_samples, min_variance_scale, max_variance_scale: memory and limits of the
+    running scale of the covariance. max_squared_residual: squared standardised residual above which a sample
+    carries no information. covariance_inflation: covariance over that of the residuals in the fit.
     """
 
     intercept_rad_s: Floats
     covariance: Floats
     effective_sample_share: float
-    degrees_of_freedom: float
+    t_degrees_of_freedom: float
     scale_memory_samples: float
     min_variance_scale: float
     max_variance_scale: float
@@ -268,7 +271,8 @@ class ResidualNoise(NamedTuple):
 
 
 def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = ()) -> ResidualNoise:
-    """The noise that a model's settings say, of a colour."""
+    """The noise of a flight, from a model's settings. noise_ma_coefficients: the moving average by which the
+    flight is whitened, empty if it is not."""
     settings, max_squared_residual = (
         model.settings,
         _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_ma_coefficients)) else np.inf,

@@ -20,9 +20,9 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names
-from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_at
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_age_at
 from beaver_ftc_logs.stepped import ReplayedVerdicts, declared_errors, replay_samples, rows_of_replay
-from beaver_ftc_logs.vehicle import Quantity, Vehicle
+from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 if TYPE_CHECKING:
     from beaver_ftc.loop import Diagnosis
@@ -79,10 +79,10 @@ class AircraftDiagnosisInputs:
     samples: Samples
     diagnosis: "Diagnosis"
     rate_hz: float
-    diagnosis_inputs: list[Floats]
-    held_column_mean_age_s: dict[str, float]
+    input_arrays: list[Floats]
+    mean_age_s_by_held_column: dict[str, float]
     has_missing_value: Mask
-    stretches: list[tuple[int, int]]
+    gap_free_stretches: list[tuple[int, int]]
 
 
 def read_diagnosis_inputs(
@@ -104,8 +104,8 @@ def read_diagnosis_inputs(
     )
     _check_units_plausible(samples.name, inputs, diagnosed_aircraft.aircraft)
     has_missing_value = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
-    stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
-    if not stretches:
+    gap_free_stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
+    if not gap_free_stretches:
         raise BadInput(
             f"{samples.name}: has no {_MIN_STRETCH_SAMPLES} samples in turn, evenly spaced and without a "
             "missing number, allowed: all signals logged at one rate of "
@@ -116,7 +116,7 @@ def read_diagnosis_inputs(
         samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
     )
     return AircraftDiagnosisInputs(
-        samples, diagnosis, rate_hz, inputs, mean_age_s, has_missing_value, stretches
+        samples, diagnosis, rate_hz, inputs, mean_age_s, has_missing_value, gap_free_stretches
     )
 
 
@@ -132,14 +132,14 @@ def diagnose_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, diagnosis, inputs, stretches, stretch_verdicts = (
+    samples, diagnosis, inputs, gap_free_stretches, stretch_verdicts = (
         aircraft_inputs.samples,
         aircraft_inputs.diagnosis,
-        aircraft_inputs.diagnosis_inputs,
-        aircraft_inputs.stretches,
+        aircraft_inputs.input_arrays,
+        aircraft_inputs.gap_free_stretches,
         [],
     )
-    for begin, end in stretches:
+    for begin, end in gap_free_stretches:
         diagnosis.reset()
         stretch_verdicts.append(
             replay_samples(diagnosis, [values[begin:end] for values in inputs], aircraft_inputs.rate_hz)
@@ -147,15 +147,15 @@ def diagnose_inputs(
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
         _check_command_signs(samples.name, diagnosed_aircraft.aircraft, stretch_verdicts)
     replayed = _join_stretch_diagnoses(
-        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), stretches, stretch_verdicts
+        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), gap_free_stretches, stretch_verdicts
     )
     rows = rows_of_replay(samples.t_s, replayed, diagnosed_aircraft.aircraft.surfaces, diagnosis.config)
-    reasons = _rows_outside_envelope(
-        inputs[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, stretches
-    ) | _rows_unexplained_from_start(samples.t_s, stretches, replayed)
-    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(stretches, rows, reasons))
+    reasons = _undiagnosable_rows_by_reason(
+        inputs[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
+    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed)
+    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, reasons))
     return rows, _verdict_document(
-        samples, rows, replayed, diagnosed_aircraft, aircraft_inputs.held_column_mean_age_s
+        samples, rows, replayed, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
     )
 
 
@@ -224,10 +224,10 @@ def _read_sample_inputs(
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns` has them; and the
     mean age of what is held, s. needs_attitude: whether the attitude is wanted."""
-    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.held_column_mean_age_s)
+    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.mean_age_s_by_held_column)
 
-    def sampled_values(quantity: Quantity) -> Floats:
-        values, age_s = values_at(columns[quantity.column], samples.t_s, samples.dt_s)
+    def sampled_values(quantity: QuantityColumn) -> Floats:
+        values, age_s = values_and_age_at(columns[quantity.column], samples.t_s, samples.dt_s)
         if age_s is not None:
             mean_age_s[quantity.column] = age_s
         return values
@@ -307,33 +307,34 @@ def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: floa
 def _join_stretch_diagnoses(
     n_samples: int,
     n_surfaces: int,
-    stretches: list[tuple[int, int]],
+    gap_free_stretches: list[tuple[int, int]],
     stretch_verdicts: list[ReplayedVerdicts],
 ) -> ReplayedVerdicts:
-    """The stretches put together; nothing is said between them."""
+    """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
+    and 1."""
     verdicts, low, high = (
         [Verdict()] * n_samples,
         np.zeros((n_samples, n_surfaces)),
         np.ones((n_samples, n_surfaces)),
     )
     gains = np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0)
-    for (begin, end), one in zip(stretches, stretch_verdicts, strict=True):
+    for (begin, end), one in zip(gap_free_stretches, stretch_verdicts, strict=True):
         verdicts[begin:end], low[begin:end], high[begin:end] = (
             one.verdicts,
-            one.effectiveness_low,
-            one.effectiveness_high,
+            one.single_fault_effectiveness_low,
+            one.single_fault_effectiveness_high,
         )
     return ReplayedVerdicts(verdicts, low, high, gains)
 
 
-def _rows_outside_envelope(
-    signals: Floats, aircraft: Aircraft, has_missing_value: Mask, stretches: list[tuple[int, int]]
+def _undiagnosable_rows_by_reason(
+    signals: Floats, aircraft: Aircraft, has_missing_value: Mask, gap_free_stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
     """Rows of which the aircraft's model says nothing, by what is wrong."""
     min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
     min_alpha_rad, max_alpha_rad = aircraft.alpha_rad
     is_outside_stretches = np.ones(len(signals), dtype=bool)
-    for begin, end in stretches:
+    for begin, end in gap_free_stretches:
         is_outside_stretches[begin:end] = False
     airspeed, alpha = signals[:, 2], signals[:, 0]
     return {
@@ -346,12 +347,12 @@ def _rows_outside_envelope(
     }
 
 
-def _rows_unexplained_from_start(
-    t_s: Floats, stretches: list[tuple[int, int]], replayed: ReplayedVerdicts
+def _unexplained_start_rows_by_reason(
+    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """Stretches that nothing explains from their first second on."""
     is_unexplained = np.zeros(len(t_s), dtype=bool)
-    for begin, end in stretches:
+    for begin, end in gap_free_stretches:
         first_second_end = begin + int(
             np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_START_WINDOW_S)
         )
@@ -363,14 +364,14 @@ def _rows_unexplained_from_start(
 
 
 def _add_rows_after_doubtful_alarm(
-    stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
+    gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons there are; an alarm that was raised where one holds is none in what follows."""
     has_reason, is_after_doubtful_alarm = (
         np.logical_or.reduce(list(reasons.values())),
         np.zeros(len(rows.t_s), dtype=bool),
     )
-    for begin, end in stretches:
+    for begin, end in gap_free_stretches:
         alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarm_rows.size and has_reason[alarm_rows[0]]:
             is_after_doubtful_alarm[alarm_rows[0] : end] = True
@@ -385,7 +386,7 @@ def _verdict_document(
     rows: DiagnosisRows,
     replayed: ReplayedVerdicts,
     diagnosed_aircraft: DiagnosedAircraft,
-    held_column_mean_age_s: dict[str, float],
+    mean_age_s_by_held_column: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
     surfaces = list(diagnosed_aircraft.aircraft.surfaces)
@@ -396,7 +397,7 @@ def _verdict_document(
     ]
     held_column_notes = [
         f"{name} is held, {age:.2g} s old on average: errors declared have to cover it"
-        for name, age in held_column_mean_age_s.items()
+        for name, age in mean_age_s_by_held_column.items()
     ]
     return {
         "flight": samples.name,
@@ -413,7 +414,7 @@ def _verdict_document(
         "type": last_verdict.type,
         "estimate": last_verdict.estimate,
         "candidates": list(last_verdict.candidates),
-        "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
+        "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": findings.fault_events(rows, surfaces),
         "can_separate": _excluded_loss_sentences(rows, surfaces),
         "isolability": {"together": []},

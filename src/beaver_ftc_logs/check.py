@@ -19,7 +19,13 @@ from beaver_ftc_logs.readers import check_exists, detect_reader, read_parts
 from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
-from beaver_ftc_logs.units import ACCELERATION, RATE, SECONDS_PER_TIME_UNIT, UNITS, nearest_unit
+from beaver_ftc_logs.units import (
+    ACCELERATION,
+    KIND_AND_SI_FACTOR_OF_UNIT,
+    RATE,
+    SECONDS_PER_TIME_UNIT,
+    nearest_unit,
+)
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
 
@@ -48,7 +54,7 @@ _COMMAND_NAME_PATTERN = (
     r"aileron|elevator|rudder|elevon"
 )
 _NOT_A_COMMAND_NAME_PATTERN = r"truth|effectiveness|position|_pos|feedback|measured|error|failure"
-_RATE_UNIT_OF_SUFFIX = {
+_RATE_UNIT_BY_NAME_PART = {
     "rad_s": "rad/s",
     "rad/s": "rad/s",
     "deg_s": "deg/s",
@@ -56,7 +62,7 @@ _RATE_UNIT_OF_SUFFIX = {
     "dps": "deg/s",
 }
 _PWM_NEUTRAL_RANGE_US = (700.0, 2300.0)
-_IMPLAUSIBLE_RATE_RAD_S = 12.0
+_MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
 _MIN_ANGLE_RATE_CORRELATION = 0.7
 _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _PLAUSIBLE_LOG_RATES_HZ = (4.0, 2000.0)
@@ -167,11 +173,11 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     check_exists(path)
     reader_name = reader or detect_reader(path)
     time_column = _find_time_column(path, remarks) if reader_name == "table" else None
-    candidates = _candidate_columns(column_names(path)) if reader_name == "table" else None
+    candidates = _recognized_columns(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column, candidates))
     names = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
     column_of_quantity = {
-        problem: _matching_column(pattern, names) for problem, pattern in _COLUMN_NAME_PATTERNS.items()
+        quantity: _matching_column(pattern, names) for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
     commands = _command_columns(names, column_of_quantity)
     missing = [axis for axis in "pqr" if column_of_quantity[axis] is None]
@@ -199,36 +205,42 @@ def _propose_vehicle(
         _guess_angle_unit(str(column_of_quantity["roll"]), roll, reader_name) if roll is not None else "rad"
     )
     rate_unit = _guess_rate_unit(
-        recording, [str(column_of_quantity[axis]) for axis in "pqr"], roll, UNITS[angle_unit][1]
+        recording,
+        [str(column_of_quantity[axis]) for axis in "pqr"],
+        roll,
+        KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
     vehicle: Document = {"name": _as_vehicle_name(name), "reader": reader_name}
     if time_column and time_column != (TIME_COLUMN, "s"):
         vehicle["time"] = {"column": time_column[0], "unit": time_column[1]}
     vehicle["rates"] = {
-        axis: _vehicle_file_column(str(column_of_quantity[axis]), rate_unit, "rad/s") for axis in "pqr"
+        axis: _vehicle_file_column_entry(str(column_of_quantity[axis]), rate_unit, "rad/s") for axis in "pqr"
     }
-    vehicle["commands"] = [_vehicle_file_command(name, columns[name].values) for name in commands]
+    vehicle["commands"] = [_vehicle_file_command_entry(name, columns[name].values) for name in commands]
     vehicle["surfaces"] = {_as_vehicle_name(name): {name: 1.0} for name in commands}
     angle_columns = {axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]}
     if roll is not None:
         vehicle["attitude"] = {
-            axis: _vehicle_file_column(str(name), angle_unit, "rad") for axis, name in angle_columns.items()
+            axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
+            for axis, name in angle_columns.items()
         }
     if z_acceleration_column := column_of_quantity["az"]:
         median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column].values)))
         acceleration_unit = (
-            nearest_unit(ACCELERATION, UNITS["g"][1] / median_magnitude, 2.0)
+            nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median_magnitude, 2.0)
             if median_magnitude > 0.0
             else None
         )
         if acceleration_unit:
-            vehicle["acceleration"] = _vehicle_file_column(z_acceleration_column, acceleration_unit, "m/s2")
+            vehicle["acceleration"] = _vehicle_file_column_entry(
+                z_acceleration_column, acceleration_unit, "m/s2"
+            )
     if column_of_quantity["airspeed"]:
         vehicle["airspeed"] = column_of_quantity["airspeed"]
     return vehicle
 
 
-def _candidate_columns(names: Iterable[str]) -> list[str]:
+def _recognized_columns(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({one})" for one in _COLUMN_NAME_PATTERNS.values())
     known = [
@@ -322,13 +334,13 @@ def _guess_rate_unit(
         if fit is not None and abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (unit for text, unit in _RATE_UNIT_OF_SUFFIX.items() if text in rate_columns[0].lower()), None
+        (unit for text, unit in _RATE_UNIT_BY_NAME_PART.items() if text in rate_columns[0].lower()), None
     )
     if unit_in_name:
         return unit_in_name
     return (
         "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in rates) > _IMPLAUSIBLE_RATE_RAD_S
+        if max(_largest_magnitude(rate.values) for rate in rates) > _MAX_RATE_NUMBER_READ_AS_RAD_S
         else "rad/s"
     )
 
@@ -337,11 +349,11 @@ def _largest_magnitude(values: Floats) -> float:
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
-def _vehicle_file_column(column_name: str, unit: str, si_unit: str) -> Any:
+def _vehicle_file_column_entry(column_name: str, unit: str, si_unit: str) -> Any:
     return column_name if unit == si_unit else {"column": column_name, "unit": unit}
 
 
-def _vehicle_file_command(column_name: str, values: Floats) -> Any:
+def _vehicle_file_command_entry(column_name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
     median, max_magnitude = float(np.nanmedian(values)), _largest_magnitude(values)
     if _PWM_NEUTRAL_RANGE_US[0] < median < _PWM_NEUTRAL_RANGE_US[1]:

@@ -50,8 +50,8 @@ LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
 _MIN_LOSS_STANDARD_ERRORS = 5.0
 _STANDARD_ERRORS_OF_90_PERCENT = 1.645
-LOOP_DETECTOR_SURFACES = ("aileron", "elevator", "rudder")
-_N_LOOP_DETECTOR_SURFACES = 4
+LOOP_SURFACES_FOR_GROUPS = ("aileron", "elevator", "rudder")
+_N_LOOP_SURFACES_WITH_FLAP = 4
 _DECLARED_GYRO_NOISE_RAD_S = 1e-4
 BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
 
@@ -117,9 +117,9 @@ def _least_squares_rows(
         np.clip(effectiveness, 0.0, 1.0),
         effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
     )
-    if model.settings.likely_effectiveness_levels:
+    if model.settings.likely_effectiveness_levels_by_group:
         for g, group in enumerate(model.groups):
-            labelled_levels = model.settings.likely_effectiveness_levels.get("+".join(group))
+            labelled_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
             levels = (
                 np.array([*labelled_levels, 1.0]) if labelled_levels else np.unique(bank.effectiveness[:, g])
             )
@@ -128,14 +128,14 @@ def _least_squares_rows(
     bounds_by_group = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
     bounds = {name: group_values_by_surface(edge, model) for name, edge in bounds_by_group.items()}
     named = join_flagged_names(is_lost, ["+".join(group) for group in model.groups])
-    return _rows_without_bounds(samples, named, group_values_by_surface(estimate, model), **bounds)
+    return _rows_with_default_bounds(samples, named, group_values_by_surface(estimate, model), **bounds)
 
 
-def _rows_without_bounds(
+def _rows_with_default_bounds(
     samples: Samples, isolated_names: np.ndarray, effectiveness: Floats, **given_bounds: Floats
 ) -> DiagnosisRows:
-    """Rows of a detector without bounds or probability: faulty where it names a surface; the bounds are then
-    the estimate, the probability is 0 or 1."""
+    """Rows of a detector: faulty where it names a surface. Of low, high and probability those that are not
+    in given_bounds: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in isolated_names], dtype=np.int64)
     bounds = {
         "low": effectiveness,
@@ -167,7 +167,7 @@ def diagnose_by_freeze_rule(
         is_frozen[:, names.index(name)] = (
             samples.t_s - unchanged_since_s[np.maximum(last_rows, 0)] > MIN_FROZEN_OUTPUT_S
         ) & (last_rows >= 0)
-    return _rows_without_bounds(samples, join_flagged_names(is_frozen, names), 1.0 - is_frozen)
+    return _rows_with_default_bounds(samples, join_flagged_names(is_frozen, names), 1.0 - is_frozen)
 
 
 class LinearRateModel:
@@ -181,20 +181,20 @@ class LinearRateModel:
         return np.asarray(x @ self._jacobian)
 
     def G(self, y: Floats) -> Floats:
-        """Nothing: what surfaces do is in `contribution`, with its lags."""
-        return np.zeros((3, _N_LOOP_DETECTOR_SURFACES))
+        """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
+        return np.zeros((3, _N_LOOP_SURFACES_WITH_FLAP))
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
     """Return the inputs of a detector at each row: measurements, and the command (4,) as shares of travel.
 
-    Where the model can say nothing (a gap, a lost sample) the innovation is 0.
+    Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
     groups = surface_indices_by_group(model)
-    if len(groups) > len(LOOP_DETECTOR_SURFACES):
+    if len(groups) > len(LOOP_SURFACES_FOR_GROUPS):
         raise BadInput(
             f"{model.vehicle.name}: {len(groups)} groups of surfaces, allowed for a detector of the loop: "
-            f"at most {len(LOOP_DETECTOR_SURFACES)}"
+            f"at most {len(LOOP_SURFACES_FOR_GROUPS)}"
         )
     is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model)
     intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
@@ -205,8 +205,8 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     )
     acceleration = (predicted_rates - previous_rates) / dt_s
     contribution, command = (
-        np.zeros((len(rates), 3, _N_LOOP_DETECTOR_SURFACES)),
-        np.zeros((len(rates), _N_LOOP_DETECTOR_SURFACES)),
+        np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP)),
+        np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
     )
     known_responses = np.where(is_predictable[:, None, None], responses, 0.0)
     for group_index, members in enumerate(groups):
@@ -233,36 +233,37 @@ def loop_detector_context(model: Model) -> Context:
     design: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
-        trim_rad=np.zeros(_N_LOOP_DETECTOR_SURFACES),
-        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_DETECTOR_SURFACES)),
-        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3), surfaces=(*LOOP_DETECTOR_SURFACES, "flap"),
+        trim_rad=np.zeros(_N_LOOP_SURFACES_WITH_FLAP),
+        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES_WITH_FLAP)),
+        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
+        surfaces=(*LOOP_SURFACES_FOR_GROUPS, "flap"),
         declared=Declared(noise=noise_sd, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
 
 def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> DiagnosisRows:
-    """Step a detector of the loop through a flight. An alarm stands while its statistic says so."""
+    """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
     detector_inputs = loop_detector_inputs(samples, model)
     detector.reset(loop_detector_context(model))
     return rows_of_verdicts([detector.step(*frame) for frame in detector_inputs], samples, model)
 
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
-    """Verdicts as rows. A detector that gives no bounds says 0 to 1 of what it suspects."""
+    """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n_samples, groups = len(verdicts), surface_indices_by_group(model)
     faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
     estimate, low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
     named = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_DETECTOR_SURFACES[: len(groups)]:
+        if verdicts[k].isolated not in LOOP_SURFACES_FOR_GROUPS[: len(groups)]:
             named[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
-        group_index = LOOP_DETECTOR_SURFACES.index(str(verdicts[k].isolated))
+        group_index = LOOP_SURFACES_FOR_GROUPS.index(str(verdicts[k].isolated))
         named[k], low[k, groups[group_index]] = "+".join(model.groups[group_index]), 0.0
         estimate[k, groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
-    return _rows_without_bounds(
+    return _rows_with_default_bounds(
         samples, named, estimate, low=low, high=np.ones_like(low), probability=probability
     )
 

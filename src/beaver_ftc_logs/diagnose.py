@@ -20,9 +20,9 @@ from beaver_ftc_logs.regression import group_values_by_surface, unexplained_rate
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
-UNKNOWN_SURFACE = "unknown"
+UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
 _MIN_ISOLATION_PROBABILITY = 0.5
-_MAX_WRONG_ISOLATION_PROBABILITY = 0.001
+_MAX_WRONG_EXCLUSION_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
 _RESIDUAL_DIRECTION_WINDOW_S = 1.0
@@ -34,13 +34,13 @@ _MAX_NO_RESPONSE_PROBABILITY = 0.5
 
 @dataclass(frozen=True)
 class DiagnosisRows:
-    """A row a sample.
+    """The diagnosis of a flight, one row for each sample.
 
-    t_s (n,); faulty (n,) 0 or 1; isolated_surfaces (n,) text; effectiveness of each surface, its
-    effectiveness_low and effectiveness_high (n, S); fault_probability (n,) of any surface; credible (n,) 0 or
-    1, 1 where nothing else is given; evidence_start_time_s (n,) when the evidence for a fault began to
-    gather, t_s where nothing else is given; reasons_not_credible: rows that are not credible, by what is
-    wrong.
+    t_s (n,). faulty (n,): 0 or 1. isolated_surfaces (n,): names joined by +, empty without an alarm.
+    effectiveness of each surface, its bounds effectiveness_low and effectiveness_high (n, S).
+    fault_probability (n,) of any surface. credible (n,): 0 or 1, by default 1. evidence_start_time_s (n,):
+    time at which the evidence for a fault began to increase, by default t_s. not_credible_rows_by_reason:
+    for each reason the rows (n,) that are not credible.
     """
 
     t_s: Floats
@@ -52,7 +52,7 @@ class DiagnosisRows:
     fault_probability: Floats
     credible: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
-    reasons_not_credible: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    not_credible_rows_by_reason: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.evidence_start_time_s) != len(self.t_s):
@@ -61,7 +61,7 @@ class DiagnosisRows:
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
     def without_estimate(self, is_removed: NDArray[np.bool_]) -> "DiagnosisRows":
-        """The rows with nothing said of effectiveness where is_removed (n,) or (n, S) is true."""
+        """The rows with effectiveness 1 and bounds 0 and 1 where is_removed (n,) or (n, S) is true."""
         is_removed_by_surface = is_removed if is_removed.ndim == 2 else is_removed[:, None]
         return replace(
             self,
@@ -80,12 +80,13 @@ class DiagnosisRows:
         )
 
     def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "DiagnosisRows":
-        """The rows that say nothing where one of the reasons, (n,) each, is true."""
+        """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
+        true."""
         is_removed = np.zeros(len(self.t_s), dtype=bool)
         for has_reason in reasons.values():
             is_removed |= has_reason
         rows = self.without_estimate(is_removed).without_alarm(is_removed)
-        return replace(rows, credible=np.where(is_removed, 0, 1), reasons_not_credible=reasons)
+        return replace(rows, credible=np.where(is_removed, 0, 1), not_credible_rows_by_reason=reasons)
 
 
 def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
@@ -107,8 +108,8 @@ def blank_rows_not_credible(
     rows: DiagnosisRows,
     has_no_response: NDArray[np.bool_] | None = None,
 ) -> DiagnosisRows:
-    """Rows at the log's own stamps, that say nothing where the model is not credible, and nothing of a group
-    whose effect it does not know. has_no_response (n,): where nothing answers the commands."""
+    """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
+    for a group whose effect is unknown. has_no_response (n,): where nothing answers the commands."""
     reasons = trust.rows_not_credible_by_reason(samples, model)
     if has_no_response is not None and has_no_response.any():
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
@@ -118,7 +119,7 @@ def blank_rows_not_credible(
         reasons["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
-    rows = _add_surfaces_of_unknown_effect(
+    rows = _add_surfaces_of_unknown_effect_to_names(
         samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
     has_known_gain = np.array(trust.is_group_gain_known(model), dtype=float)[None]
@@ -128,12 +129,14 @@ def blank_rows_not_credible(
     return _rows_at_log_stamps(samples, rows.without_estimate(is_unknown_gain).without_verdict(reasons))
 
 
-def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: DiagnosisRows) -> DiagnosisRows:
-    """Rows that name, with a surface, each whose effect the model cannot tell and that may be at fault in its
-    place; bounds of a name of several hold where any one of them is at fault.
+def _add_surfaces_of_unknown_effect_to_names(
+    samples: Samples, model: Model, rows: DiagnosisRows
+) -> DiagnosisRows:
+    """Rows whose name also has each surface of unknown effect that may be at fault in place of the isolated
+    one. If a name has several surfaces, the bounds hold whichever of them is at fault.
 
-    A loss shows where a command moves: a surface that stands still in this flight is not named for it. A
-    stuck one may be any.
+    A loss of effectiveness shows only while the command moves: a surface whose command has not moved so far
+    is not added. If surfaces can be stuck, any is added.
     """
     surfaces = list(model.vehicle.surfaces)
     has_moved = (
@@ -151,14 +154,14 @@ def _add_surfaces_of_unknown_effect(samples: Samples, model: Model, rows: Diagno
         is_named = np.array([one in named_group or bool(may_join[k, i]) for i, one in enumerate(surfaces)])
         named[k] = "+".join(compress(surfaces, is_named))
         if is_named.sum() > len(named_group) or (
-            model.settings.isolates_single_group and not _are_in_one_group(named_group, model)
+            model.settings.assumes_one_group_at_fault and not _are_in_one_group(named_group, model)
         ):
             high[k, is_named] = 1.0
     return replace(rows, isolated_surfaces=named, effectiveness_high=high)
 
 
 def _are_in_one_group(isolated_surfaces: set[str], model: Model) -> bool:
-    """Whether surfaces are one group of the model, which has one effectiveness."""
+    """Whether these surfaces belong to one group of the model, which has one effectiveness."""
     return any(isolated_surfaces <= set(group) for group in model.groups)
 
 
@@ -186,11 +189,12 @@ def _withdraw_isolation_after_engine_failure(
 def _withdraw_contradicted_isolation(
     samples: Samples, model: Model, rows: DiagnosisRows, min_log_likelihood_gain: float
 ) -> DiagnosisRows:
-    """Rows that name no group where what the last second left unexplained lies along another.
+    """Rows with the name `unknown` where the residual of the last second lies along another group.
 
-    Whatever a surface at fault does, be it stuck, biased or swinging, it does along the rates that it turns
-    when it is healthy: a name is taken back where another direction, whatever the course of time along it,
-    explains as much more as is asked. Not in moving air: gusts have directions, too.
+    A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
+    turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
+    residual better by min_log_likelihood_gain, whatever the course of time along it. Not used in moving air,
+    since gusts have directions too.
     """
     residual = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
     _, _, response, noise = model.coefficient_arrays()
@@ -224,7 +228,7 @@ def standardized_healthy_residual(
 
 
 def _rows_isolating_any(isolated_surfaces: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
-    """Which rows name a surface of which nothing is claimed."""
+    """Which rows (n,) name at least one of these surfaces."""
     return np.array([bool(surfaces & set(name.split("+"))) for name in isolated_surfaces], dtype=bool)
 
 
@@ -310,7 +314,7 @@ def _group_effectiveness_and_bounds(
 
 def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    min_samples = round(model.settings.alarm_hold_s * model.rate_hz)
+    min_samples = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
     held_samples = np.arange(len(condition)) - np.maximum.accumulate(
         np.where(condition, -1, np.arange(len(condition)))
     )
@@ -374,7 +378,7 @@ def _surfaces_at_fault(
     ]
     group_share = np.column_stack(group_shares)
     is_likely = (group_share > _MIN_ISOLATION_PROBABILITY) & has_isolation_evidence[:, None]
-    if model.settings.isolates_single_group:
+    if model.settings.assumes_one_group_at_fault:
         is_single_loss = bank.hypothesis_kind == GROUP_LOSS
         single_loss_probability = np.column_stack(
             [
@@ -384,7 +388,7 @@ def _surfaces_at_fault(
         )
         is_likely = (
             single_loss_probability
-            > _MAX_WRONG_ISOLATION_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
+            > _MAX_WRONG_EXCLUSION_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
         ) & has_isolation_evidence[:, None]
         candidates = single_loss_probability.max(axis=0) > 0.0
         is_likely &= ~(is_likely[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
@@ -415,7 +419,7 @@ def _surfaces_at_fault(
 def _still_names_all_surfaces(new_name: str, last_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
-    return model.settings.isolates_single_group and (
+    return model.settings.assumes_one_group_at_fault and (
         new_name == UNKNOWN_SURFACE or set(last_name.split("+")) <= set(new_name.split("+"))
     )
 
@@ -431,8 +435,12 @@ def _rows_at_log_stamps(samples: Samples, rows: DiagnosisRows) -> DiagnosisRows:
         return rows
     last_rows = np.maximum(np.searchsorted(rows.t_s, samples.log_stamps_s, side="right") - 1, 0)
     field_names = [
-        name for name in DiagnosisRows.__dataclass_fields__ if name not in ("t_s", "reasons_not_credible")
+        name
+        for name in DiagnosisRows.__dataclass_fields__
+        if name not in ("t_s", "not_credible_rows_by_reason")
     ]
-    reasons = {reason: rows_outside[last_rows] for reason, rows_outside in rows.reasons_not_credible.items()}
+    reasons = {
+        reason: rows_outside[last_rows] for reason, rows_outside in rows.not_credible_rows_by_reason.items()
+    }
     fields = {name: getattr(rows, name)[last_rows] for name in field_names}
-    return DiagnosisRows(t_s=samples.log_stamps_s, reasons_not_credible=reasons, **fields)
+    return DiagnosisRows(t_s=samples.log_stamps_s, not_credible_rows_by_reason=reasons, **fields)

@@ -30,7 +30,7 @@ _MIN_PEAKS, _PEAKS_PER_ROOT_OF_COUNT = 10, 2.0
 _CREDIBLE_INTERVAL_PROBABILITIES = (0.05, 0.95)
 EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM = 3.0
 """-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
-_MAX_THRESHOLD = 1e4
+_MAX_SEARCHED_EXCESS = 1e4
 _PROBABILITY_ROUNDING = (
     1e-9  # of a sum of probabilities: a quantile between two rates must not hang on its last digits
 )
@@ -42,7 +42,7 @@ PeaksAndHours = tuple[Floats, float]
 class PeakTail(Section):
     """The highest peaks of the alarm statistic on parts not fitted."""
 
-    threshold_level: Number = Field(description="the level, in natural logarithms of odds", alias="level")
+    tail_start_level: Number = Field(description="the level, in natural logarithms of odds", alias="level")
     excess_over_level: list[Number] = Field(
         min_length=1, description="by how much each peak is over it", alias="excess"
     )
@@ -53,7 +53,7 @@ class PeakTail(Section):
 
 
 @dataclass(frozen=True)
-class ExpectedFalseAlarms:
+class ExpectedFalseAlarmsPerHour:
     """False alarms an hour: mean, and what 90 % of the posterior lies between."""
 
     value: float
@@ -67,9 +67,11 @@ def peaks_between_zeros(statistic: Floats) -> Floats:
     return np.array([statistic[begin:end].max() for begin, end in zip(edges[::2], edges[1::2], strict=True)])
 
 
-def fit_peak_tail(healthy_parts: Sequence[PeaksAndHours]) -> PeakTail | None:
+def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail | None:
     """The tail of parts left out: each one's peaks and its hours; None where they are fewer than ten."""
-    peaks = np.sort(np.concatenate([one for one, _ in healthy_parts]) if healthy_parts else [])[::-1]
+    peaks = np.sort(
+        np.concatenate([one for one, _ in held_out_peaks_and_hours]) if held_out_peaks_and_hours else []
+    )[::-1]
     if len(peaks) <= _MIN_PEAKS:
         return None
     n_peaks_over_level = min(
@@ -79,36 +81,36 @@ def fit_peak_tail(healthy_parts: Sequence[PeaksAndHours]) -> PeakTail | None:
     return PeakTail(
         level=level,
         excess=(peaks[:n_peaks_over_level] - level).tolist(),
-        minutes=60.0 * sum(hours for _, hours in healthy_parts),
+        minutes=60.0 * sum(hours for _, hours in held_out_peaks_and_hours),
         dispersion=_excess_overdispersion(
-            [(one[one > level] - level, hours) for one, hours in healthy_parts]
+            [(one[one > level] - level, hours) for one, hours in held_out_peaks_and_hours]
         ),
     )
 
 
-def _excess_overdispersion(healthy_parts: Sequence[PeaksAndHours]) -> float:
+def _excess_overdispersion(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> float:
     """Chi-square by degree of freedom of what each part's excess comes to, 1 at least: sums of exponential
     excess at Poisson times have twice the variance that their number alone would give."""
     excess_sums, hours = (
-        np.array([one.sum() for one, _ in healthy_parts]),
-        np.array([hours for _, hours in healthy_parts]),
+        np.array([one.sum() for one, _ in held_out_peaks_and_hours]),
+        np.array([hours for _, hours in held_out_peaks_and_hours]),
     )
-    n_peaks, hours_share = sum(len(one) for one, _ in healthy_parts), hours / hours.sum()
-    if len(healthy_parts) < 2 or excess_sums.sum() <= 0.0:
+    n_peaks, hours_share = sum(len(one) for one, _ in held_out_peaks_and_hours), hours / hours.sum()
+    if len(held_out_peaks_and_hours) < 2 or excess_sums.sum() <= 0.0:
         return 1.0
     mean_excess, mean_excess_of_peak = hours_share * excess_sums.sum(), excess_sums.sum() / n_peaks
     squared_deviation = (excess_sums - mean_excess) ** 2 / np.maximum(
         2.0 * mean_excess * mean_excess_of_peak, MIN_DIVISOR
     )
-    return max(float(squared_deviation.sum()) / (len(healthy_parts) - 1), 1.0)
+    return max(float(squared_deviation.sum()) / (len(held_out_peaks_and_hours) - 1), 1.0)
 
 
-def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarms:
+def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarmsPerHour:
     """False alarms an hour at a threshold not below the tail's level."""
     shape, scale, weight = _pareto_posterior(tail)
     false_alarm_rates = (
-        _exceedance_probability(threshold - tail.threshold_level, shape, scale)[:, None]
-        * _peak_rate_quantiles(tail)[None, :]
+        _exceedance_probability(threshold - tail.tail_start_level, shape, scale)[:, None]
+        * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
     by_rate, rate_probability = (
         np.argsort(false_alarm_rates),
@@ -119,13 +121,13 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
         np.array(_CREDIBLE_INTERVAL_PROBABILITIES) - _PROBABILITY_ROUNDING,
     )
     low, high = false_alarm_rates[by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
-    return ExpectedFalseAlarms(float(false_alarm_rates @ rate_probability), float(low), float(high))
+    return ExpectedFalseAlarmsPerHour(float(false_alarm_rates @ rate_probability), float(low), float(high))
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """The threshold at which so many false alarms an hour are expected; the level where that has fewer."""
     shape, scale, weight = _pareto_posterior(tail)
-    mean_peak_rate = float(_peak_rate_quantiles(tail).mean())
+    mean_peak_rate = float(_peaks_per_hour_quantiles(tail).mean())
 
     def has_too_many_alarms(excess: float) -> bool:
         return (
@@ -135,8 +137,8 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
 
     low_excess, high_excess = 0.0, 1.0
     if not has_too_many_alarms(low_excess):
-        return tail.threshold_level
-    while has_too_many_alarms(high_excess) and high_excess < _MAX_THRESHOLD:
+        return tail.tail_start_level
+    while has_too_many_alarms(high_excess) and high_excess < _MAX_SEARCHED_EXCESS:
         low_excess, high_excess = high_excess, 2.0 * high_excess
     for _ in range(40):
         middle_excess = 0.5 * (low_excess + high_excess)
@@ -145,7 +147,7 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
             if has_too_many_alarms(middle_excess)
             else (low_excess, middle_excess)
         )
-    return tail.threshold_level + high_excess
+    return tail.tail_start_level + high_excess
 
 
 def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> float:
@@ -161,7 +163,7 @@ def missing_healthy_minutes(tail: PeakTail, false_alarms_per_hour: float) -> flo
     )
 
 
-def _peak_rate_quantiles(tail: PeakTail) -> Floats:
+def _peaks_per_hour_quantiles(tail: PeakTail) -> Floats:
     """Peaks over the level an hour, at even steps of their posterior."""
     from scipy.stats import gamma
 

@@ -27,12 +27,12 @@ from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import whitened_rates_and_responses
 from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
 
-_DELAY_EVIDENCE_MEMORY_S = 600.0
+_MODEL_EVIDENCE_MEMORY_S = 600.0
 _MIN_HYPOTHESIS_PROBABILITY = 1e-15
-_MAX_CLIPPED_SQUARED_RESIDUAL = 3.0
+_SQUARED_RESIDUAL_CLIP_PER_AXIS = 3.0
 _RESIDUAL_SUM_SPANS_S, _SCALE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the seconds in which its size is taken."""
-_MEAN_CLIPPED_SQUARED_RESIDUAL = 0.93
+_MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 _MIN_NOISE_MODEL_PROBABILITY = 1e-3
 """Probability of a colour of the noise below which it is left out."""
@@ -137,14 +137,14 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
     change_to_fault = (
-        bank.transition_probability
+        bank.change_probability_per_sample
         * bank.transition_share[bank.is_fault_hypothesis].sum()
         / bank.transition_share.sum()
     )
     predicted_probability = np.concatenate(
         [
             [bank.prior_probability[bank.is_fault_hypothesis].sum()],
-            (1.0 - bank.transition_probability) * fault_probability[:-1] + change_to_fault,
+            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1] + change_to_fault,
         ]
     )
     return np.asarray(
@@ -183,7 +183,7 @@ def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate
     """Probability of each delay at each sample, (D, n), by the evidence of some minutes."""
     from scipy.signal import lfilter
 
-    forgetting_factor = np.exp(-1.0 / (_DELAY_EVIDENCE_MEMORY_S * rate_hz))
+    forgetting_factor = np.exp(-1.0 / (_MODEL_EVIDENCE_MEMORY_S * rate_hz))
     cumulated = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
     weights = np.exp(cumulated - cumulated.max(axis=0))
     return np.asarray(weights / weights.sum(axis=0))
@@ -197,14 +197,14 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
     least = np.zeros(len(ok))
     if model.vehicle.other_laws:
         residual = np.where(ok[:, None], unexplained - noise.intercept_rad_s - answers.sum(axis=1), 0.0)
-        least = min_noise_variance_scale(residual, ok, noise.covariance, model.rate_hz)
+        least = recent_noise_variance_scale(residual, ok, noise.covariance, model.rate_hz)
     found: BankRunResult = run_bank(
         unexplained, answers, ok, bank, build_trim_and_gain_state_model(model), noise, least
     )
     return found
 
 
-def min_noise_variance_scale(
+def recent_noise_variance_scale(
     residual: Floats, is_usable: np.ndarray, covariance: Floats, rate_hz: float
 ) -> Floats:
     """Return how many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the
@@ -230,14 +230,16 @@ def min_noise_variance_scale(
 
 
 @kernel
-def run_bank(unexplained_rates, group_responses, is_usable, bank, state_model, noise, min_variance_scale):
+def run_bank(
+    unexplained_rates, group_responses, is_usable, bank, state_model, noise, recent_noise_variance_scale
+):
     """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
 
     Evidence is the log likelihood of the sample given all before it, raised to the power.
 
     Shapes: unexplained_rates (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the sample may
     be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
-    min_variance_scale (n,): scale of the noise at least.
+    recent_noise_variance_scale (n,): lower bound of the scale of the noise.
     """
     n, hypotheses, states = len(unexplained_rates), len(bank.transition_share), len(state_model.initial_mean)
     idle = hypotheses - 1
@@ -267,7 +269,7 @@ def run_bank(unexplained_rates, group_responses, is_usable, bank, state_model, n
                 group_responses[k],
                 bank,
                 noise,
-                max(scale, min_variance_scale[k]),
+                max(scale, recent_noise_variance_scale[k]),
             )
             _limit_states(
                 m,
@@ -276,7 +278,7 @@ def run_bank(unexplained_rates, group_responses, is_usable, bank, state_model, n
             )
             scale *= np.exp(
                 (1.0 - mu[idle])
-                * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL)
+                * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
                 / noise.scale_memory_samples
             )
             scale = min(max(scale, noise.min_variance_scale), noise.max_variance_scale)
@@ -294,7 +296,7 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
     """Let each hypothesis pass to any other; state_means (H, N) and state_covariances (H, N, N) are replaced,
     the prior probabilities returned."""
     hypotheses, states = state_means.shape
-    stay = 1.0 - bank.transition_probability
+    stay = 1.0 - bank.change_probability_per_sample
     mean = np.zeros(states)
     spread = np.zeros((states, states))
     for h in range(hypotheses):
@@ -308,7 +310,7 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
     prior = np.empty(hypotheses)
     total = 0.0
     for h in range(hypotheses):
-        prior[h] = stay * probabilities[h] + bank.transition_probability * bank.transition_share[h]
+        prior[h] = stay * probabilities[h] + bank.change_probability_per_sample * bank.transition_share[h]
         total += prior[h]
         _merge_gaussians(
             stay * probabilities[h] / prior[h],
@@ -386,11 +388,11 @@ def _correct_hypotheses(
     log = np.empty(hypotheses)
     squares = np.empty(hypotheses)
     nothing, certain = np.zeros(states), np.zeros((states, states))
-    covariance, dof = noise.covariance * noise_variance_scale, noise.degrees_of_freedom
+    covariance, dof = noise.covariance * noise_variance_scale, noise.t_degrees_of_freedom
     for h in range(hypotheses):
         seen = _state_sensitivity(
             bank.effectiveness[h],
-            bank.group_gain_sensitivity[h],
+            bank.response_share_scaled_by_group_gain[h],
             group_responses,
             noise.intercept_rad_s,
             states,
@@ -413,7 +415,7 @@ def _correct_hypotheses(
     mu /= total
     clipped = 0.0
     for h in range(hypotheses):
-        clipped += mu[h] * min(noise.covariance_inflation * squares[h], 3.0 * _MAX_CLIPPED_SQUARED_RESIDUAL)
+        clipped += mu[h] * min(noise.covariance_inflation * squares[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS)
     return mu, clipped, most + np.log(total)
 
 
@@ -448,7 +450,7 @@ def _update_gaussian(
     Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
     out in the tail of the t distribution counts less, and one that is too far nothing.
     """
-    states, dof = len(state_mean), noise.degrees_of_freedom
+    states, dof = len(state_mean), noise.t_degrees_of_freedom
     cross = np.zeros((states, 3))
     s = noise_covariance.copy()
     v = unexplained_rates.copy()

@@ -44,7 +44,7 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "gaps": int(samples.stretch_number[-1]),
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(rows.faulty.any()),
-        "credible": trust.credibility_entry(rows.reasons_not_credible, rows.credible),
+        "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(found)],
         "isolability": found,
@@ -184,11 +184,11 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
             if len(group) > 1
         ],
         "groups": [
-            {"surfaces": group, **_group_fisher_information(answers, index, model, bank, samples.dt_s)}
+            {"surfaces": group, **_group_isolability_entry(answers, index, model, bank, samples.dt_s)}
             for index, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosines(answers, model),
-        "columns_held_s": {name: round(age, 4) for name, age in samples.held_column_mean_age_s.items()},
+        "alike": _group_pair_cosine_entries(answers, model),
+        "columns_held_s": {name: round(age, 4) for name, age in samples.mean_age_s_by_held_column.items()},
     }
 
 
@@ -200,7 +200,7 @@ def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
     return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.effective_sample_share))
 
 
-def _group_fisher_information(
+def _group_isolability_entry(
     group_responses: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
@@ -249,7 +249,7 @@ def _smallest_detectable_losses(
     return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
-def _group_pair_cosines(group_responses: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosine_entries(group_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for a, b in combinations(range(len(model.groups)), 2):

@@ -1,10 +1,9 @@
 """Fit: from recorded flights to a model, with how well it is known and how it does elsewhere.
 
-Fitted are the stretches known to be healthy; where labels say how much effectiveness was left, the faulty
-stretches too, with the commands scaled by it. Half of the choice is refused to the fit: the number of past
-samples is taken by the Bayesian information criterion, and every figure of merit comes from parts of the
-flights the fit did not see. One flight is cut in two halves of what is known of it; of several, each is left
-out in turn.
+The fit uses the rows that are known to be healthy. Where labels state the remaining effectiveness, it uses
+the faulty rows too, with the commands multiplied by the effectiveness. The Bayesian information criterion
+chooses the number of past samples. Every figure of merit comes from held-out data, which the fit did not use:
+the two halves of a single flight in turn, or each of several flights in turn.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,7 +34,7 @@ RATE_LAG_CANDIDATES = (1, 2, 3, 4)
 COMMAND_LAG_CANDIDATES = (2, 3, 4, 6)
 _NEWEY_WEST_MAX_LAG_S = 2.0
 _MIN_RATE_SPREAD_RAD_S = 1e-6
-_MARGIN_BEFORE_FAILURE_S = 1.0
+_UNFITTED_MARGIN_BEFORE_FAILURE_S = 1.0
 _ALARM_PROBABILITY, _ALARM_PROBABILITY_HOLD_S, _EFFECTIVE_SAMPLE_SHARE_UNLABELLED = 0.995, 0.3, 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
 With parts enough that are not fitted, the rate of false alarms decides instead."""
@@ -76,15 +75,15 @@ same way, the first on seed 1 of five aircraft."""
 _GYRO_NOISE_FACTOR, _GUST_NOISE_FACTOR = 1.7, 2.5
 """In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
 Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
-_MAX_PART_NOISE_INFLATION = 200.0
-"""Largest noise factor of a part: of few flights one can be far from all others (1,550 of seed 205, else
-5)."""
+_MAX_WINDOW_NOISE_INFLATION = 200.0
+"""Largest noise factor of a window of ten seconds: of few flights one can be far from all others (1,550 of
+seed 205, else 5)."""
 _COMMAND_DELAY_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _RANK_TOLERANCE = 1e-9
-_MAX_PARTS_TESTED_FOR_COLUMN_MISTAKES = 4
-"""Parts left out whose columns are read wrongly, too: the largest of n is passed by the next, if that is
-alike, with the chance 1 / (n + 1)."""
+_N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
+"""Number of held-out flights that are also read with each mistake in their columns. The largest gain in
+likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
 _MAX_CROSS_VALIDATION_SPLITS, _MAX_GAIN_SD = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _MAX_COLUMN_GAIN_SD = 1e3
@@ -95,12 +94,13 @@ _CREDIBLE_COVERAGE_GOAL = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
-Result = TypeVar("Result")
+CachedResult = TypeVar("CachedResult")
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A flight and which of its samples may be fitted; known: what was made of it and others already."""
+class FlightWithUsableRows:
+    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
+    results that were computed from this flight and others."""
 
     samples: Samples
     is_usable: NDArray[np.bool_]
@@ -110,18 +110,20 @@ class Stretch:
 
 
 def _compute_once(
-    stretches: Sequence[Stretch], result_key: tuple[object, ...], compute: Callable[[], Result]
-) -> Result:
-    """Compute a result of these stretches once: every test of a model needs the same fits to parts."""
-    cache, key = stretches[0].result_cache, (*result_key, *map(id, stretches))
+    usable_flights: Sequence[FlightWithUsableRows],
+    result_key: tuple[object, ...],
+    compute: Callable[[], CachedResult],
+) -> CachedResult:
+    """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
+    cache, key = usable_flights[0].result_cache, (*result_key, *map(id, usable_flights))
     if key not in cache:
-        cache[key] = (tuple(stretches), compute())  # held: an id is of one object while this lives
+        cache[key] = (tuple(usable_flights), compute())  # held: an id is of one object while this lives
     return cache[key][1]  # type: ignore[return-value]
 
 
-def usable_stretches(flights: Sequence[Samples]) -> list[Stretch]:
-    """Return the samples of each flight that are known well enough for the fit."""
-    return [Stretch(samples, is_usable_for_fit(samples)) for samples in flights]
+def flights_with_usable_rows(flights: Sequence[Samples]) -> list[FlightWithUsableRows]:
+    """Return each flight with the samples that are known well enough for the fit."""
+    return [FlightWithUsableRows(samples, is_usable_for_fit(samples)) for samples in flights]
 
 
 def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
@@ -129,7 +131,8 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
     is_usable = np.ones(len(samples.t_s), dtype=bool)
     if samples.logged_failures:
         is_usable &= (
-            samples.t_s < min(event.t_s for event in samples.logged_failures) - _MARGIN_BEFORE_FAILURE_S
+            samples.t_s
+            < min(event.t_s for event in samples.logged_failures) - _UNFITTED_MARGIN_BEFORE_FAILURE_S
         )
     is_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_labelled.any():
@@ -145,18 +148,18 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
 
 
 def fit_model(
-    stretches: Sequence[Stretch], vehicle: Vehicle, settings: FilterSettings | None = None
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, settings: FilterSettings | None = None
 ) -> Model:
-    """The model that fits these stretches. Raises BadInput where there is too little to fit."""
-    history, lags = choose_model_order(stretches, vehicle)
-    model = _fit_model_cached(stretches, vehicle, history, lags)
-    model = model.model_copy(update={"settings": settings or estimate_filter_settings(stretches, model)})
-    return _with_inflated_noise(stretches, model) if model.noise_models else model
+    """The model that fits these flights. Raises BadInput where there is too little to fit."""
+    history, lags = choose_model_order(usable_flights, vehicle)
+    model = _fit_model_of_order(usable_flights, vehicle, history, lags)
+    model = model.model_copy(update={"settings": settings or estimate_filter_settings(usable_flights, model)})
+    return _with_inflated_noise(usable_flights, model) if model.noise_models else model
 
 
-def fit_with_same_order(stretches: Sequence[Stretch], model: Model) -> Model:
-    """Another fit of the same order and settings to other stretches."""
-    fitted = _fit_model_cached(stretches, model.vehicle, model.n_rate_lags, model.n_command_lags)
+def fit_with_same_order(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
+    """A model of the same order and settings, fitted to other flights."""
+    fitted = _fit_model_of_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
     noise_inflation_by_ma_coefficients = {
         tuple(one.ma_coefficients): one.covariance_inflation for one in model.noise_models
     }
@@ -182,33 +185,37 @@ def _with_noise_inflation(
 
 
 def _cross_validation_fits(
-    stretches: Sequence[Stretch], model: Model, effect_share_explained_by_others: list[float]
-) -> Iterator[tuple[Model, Sequence[Stretch]]]:
-    """Fits like the model to parts of the stretches, with how well each knows its gains; and the rest.
-    effect_share_explained_by_others: of the whole, as in `FittedRanges`."""
-    for fitted, kept in _cross_validation_splits(stretches):
+    usable_flights: Sequence[FlightWithUsableRows],
+    model: Model,
+    effect_share_explained_by_others: list[float],
+) -> Iterator[tuple[Model, Sequence[FlightWithUsableRows]]]:
+    """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
+    held-out flights. effect_share_explained_by_others: of all flights, as in `FittedRanges`."""
+    for fitted, held_out in _cross_validation_splits(usable_flights):
         part_model = fit_with_same_order(fitted, model)
         fit = fit_least_squares_of_order(fitted, model.vehicle, model.n_rate_lags, model.n_command_lags)
         gain_sd = group_gain_standard_error(fit, model).tolist()
         part_ranges = FittedRanges(
             commands=[], rates=[], gain_sd=gain_sd, tied=effect_share_explained_by_others
         )
-        yield part_model.model_copy(update={"fitted_ranges": part_ranges}), kept
+        yield part_model.model_copy(update={"fitted_ranges": part_ranges}), held_out
 
 
-def choose_model_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> tuple[int, int]:
+def choose_model_order(usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle) -> tuple[int, int]:
     """Past samples of rates and commands by the Bayesian information criterion."""
-    scores = bic_by_order(stretches, vehicle)
+    scores = bic_by_order(usable_flights, vehicle)
     return min(scores, key=lambda order: scores[order])
 
 
-def bic_by_order(stretches: Sequence[Stretch], vehicle: Vehicle) -> dict[tuple[int, int], float]:
+def bic_by_order(
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle
+) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
     Every order's regressors are among those of the largest: one matrix of products serves all.
     """
     regressors, rates, _ = stacked_regression_data(
-        stretches, vehicle, max(RATE_LAG_CANDIDATES), max(COMMAND_LAG_CANDIDATES)
+        usable_flights, vehicle, max(RATE_LAG_CANDIDATES), max(COMMAND_LAG_CANDIDATES)
     )
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
     regressor_products, cross_products, rate_products = (
@@ -247,22 +254,22 @@ def _regressor_columns_of_order(vehicle: Vehicle, n_rate_lags: int, n_command_la
 
 
 def fit_least_squares_of_order(
-    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> regression.RateRegression:
-    """Least squares of given order over all stretches."""
+    """Least squares of given order over all flights."""
     what = ("order", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
     return _compute_once(
-        stretches,
+        usable_flights,
         what,
-        lambda: _fit_least_squares_of_order_uncached(stretches, vehicle, n_rate_lags, n_command_lags),
+        lambda: _fit_least_squares_of_order_uncached(usable_flights, vehicle, n_rate_lags, n_command_lags),
     )
 
 
 def _fit_least_squares_of_order_uncached(
-    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> regression.RateRegression:
     regressors, rates, stretch_number = stacked_regression_data(
-        stretches, vehicle, n_rate_lags, n_command_lags
+        usable_flights, vehicle, n_rate_lags, n_command_lags
     )
     if len(rates) < 10 * regressors.shape[1]:
         raise BadInput(
@@ -277,14 +284,14 @@ def _fit_least_squares_of_order_uncached(
         raise BadInput(
             f"identify: rate {still_axes[0]} does not move, allowed: flights in which every rate does"
         )
-    dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
+    dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
     return regression.least_squares(regressors, rates, stretch_number, round(_NEWEY_WEST_MAX_LAG_S / dt_s))
 
 
 def stacked_regression_data(
-    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Regressors, rates and run number over all stretches: the same samples for any order.
+    """Regressors, rates and run number over all flights: the same samples for any order.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
@@ -293,12 +300,12 @@ def stacked_regression_data(
         max(RATE_LAG_CANDIDATES + COMMAND_LAG_CANDIDATES),
     )
     regressors, rates, stretch_numbers = [], [], []
-    for stretch_index, stretch in enumerate(stretches):
-        one, n_signal_lags = stretch.samples, vehicle.n_signal_lags(n_rate_lags)
+    for flight_index, usable_flight in enumerate(usable_flights):
+        one, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
         past, commands, is_predictable = regression.build_regressors(
             one, groups, n_rate_lags, n_command_lags, True, n_signal_lags
         )
-        is_usable = stretch.is_usable & is_predictable
+        is_usable = usable_flight.is_usable & is_predictable
         is_usable[:max_lag] = False
         n_samples = len(past)
         regressors.append(
@@ -307,30 +314,32 @@ def stacked_regression_data(
         )
         rates.append(one.fit_weight * one.rates[is_usable])
         stretch_numbers.append(
-            np.cumsum(np.diff(np.flatnonzero(is_usable), prepend=0) > 1) + 1_000_000 * stretch_index
+            np.cumsum(np.diff(np.flatnonzero(is_usable), prepend=0) > 1) + 1_000_000 * flight_index
         )
     return np.vstack(regressors), np.vstack(rates), np.concatenate(stretch_numbers)
 
 
-def _fit_model_cached(
-    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+def _fit_model_of_order(
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> Model:
     what = ("model", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
     return _compute_once(
-        stretches, what, lambda: _fit_model_uncached(stretches, vehicle, n_rate_lags, n_command_lags)
+        usable_flights,
+        what,
+        lambda: _fit_model_of_order_uncached(usable_flights, vehicle, n_rate_lags, n_command_lags),
     )
 
 
-def _fit_model_uncached(
-    stretches: Sequence[Stretch], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
+def _fit_model_of_order_uncached(
+    usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> Model:
-    fit = fit_least_squares_of_order(stretches, vehicle, n_rate_lags, n_command_lags)
+    fit = fit_least_squares_of_order(usable_flights, vehicle, n_rate_lags, n_command_lags)
     names, groups = list(vehicle.surfaces), regression.group_surfaces_by_commands(vehicle)
     first_command_row = len(fit.coefficients) - len(groups) * n_command_lags
     shape = (len(groups), n_command_lags, 3)
     model = Model(
         vehicle=vehicle,
-        rate_hz=1.0 / float(np.median([stretch.samples.dt_s for stretch in stretches])),
+        rate_hz=1.0 / float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights])),
         groups=[[names[i] for i in group] for group in groups],
         history=n_rate_lags,
         lags=n_command_lags,
@@ -340,16 +349,16 @@ def _fit_model_uncached(
         response_sd=fit.standard_errors[first_command_row:].reshape(shape).tolist(),
         noise=fit.residual_covariance.tolist(),
     )
-    return model.model_copy(update={"noise_models": _fit_noise_models(stretches, model)})
+    return model.model_copy(update={"noise_models": _fit_noise_models(usable_flights, model)})
 
 
-def _fit_noise_models(stretches: Sequence[Stretch], model: Model) -> list[NoiseModel]:
+def _fit_noise_models(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> list[NoiseModel]:
     """The colours that flights are whitened by, with the noise of each."""
     noise_models = []
-    for noise_ma_coefficients in sorted({one.samples.noise_ma_coefficients for one in stretches} - {()}):
+    for noise_ma_coefficients in sorted({one.samples.noise_ma_coefficients for one in usable_flights} - {()}):
         residuals = [
             one_step_residuals(model, one)
-            for one in stretches
+            for one in usable_flights
             if one.samples.noise_ma_coefficients == noise_ma_coefficients
         ]
         noise_models.append(_fit_noise_model(list(noise_ma_coefficients), residuals))
@@ -379,18 +388,21 @@ def _fit_noise_model(
     )
 
 
-def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> FilterSettings:
+def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed.
 
     A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
     """
-    hours = sum(stretch.is_usable.sum() * stretch.samples.dt_s for stretch in stretches) / 3600.0
+    hours = (
+        sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
+        / 3600.0
+    )
     changes, repairs, levels = 0, 0, {}
     names = list(model.vehicle.surfaces)
     for group in model.groups:
         column = names.index(group[0])
         label_levels = (
-            [_labelled_effectiveness_levels(stretch, column) for stretch in stretches]
+            [_labelled_levels_in_order(usable_flight, column) for usable_flight in usable_flights]
             if len(group) == 1
             else []
         )
@@ -410,7 +422,7 @@ def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> Filt
         else {}
     )
     if not levels:
-        trim_walk = _trim_drift_sd(stretches, model)
+        trim_walk = _trim_drift_sd(usable_flights, model)
         usual_model = model.model_copy(
             update={"settings": FilterSettings(trim_walk=trim_walk, **law_settings)}
         )
@@ -419,7 +431,7 @@ def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> Filt
             if law_settings
             else _EFFECTIVE_SAMPLE_SHARE_UNLABELLED
         )
-        power = min(max_power, 1.0 / gain_error_overdispersion(stretches, usual_model))
+        power = min(max_power, 1.0 / gain_error_overdispersion(usable_flights, usual_model))
         alarm = {"alarm": _ALARM_PROBABILITY, "hold_s": _ALARM_PROBABILITY_HOLD_S}
         return FilterSettings(**alarm, **law_settings, power=power, trim_walk=trim_walk, delays_s=delays_s)
     return FilterSettings(
@@ -435,7 +447,7 @@ def estimate_filter_settings(stretches: Sequence[Stretch], model: Model) -> Filt
     )
 
 
-def gain_error_overdispersion(stretches: Sequence[Stretch], model: Model) -> float:
+def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> float:
     """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
     believes.
 
@@ -445,37 +457,37 @@ def gain_error_overdispersion(stretches: Sequence[Stretch], model: Model) -> flo
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
+    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
     squares = n_gains = float(len(model.groups))
     for part_model, left_out in _cross_validation_fits(
-        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
+        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
         has_known_effect = np.array(trust.is_group_effect_known(part_model))
         for one in left_out:
-            responses, residual = _standardized_group_responses(part_model, one)
+            responses, residual = _standardized_responses_and_residual(part_model, one)
             responses = responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
-            squared_error, rank = _normalized_squared_gain_error(
+            squared_error, rank = _normalized_squared_gain_error_and_rank(
                 responses, residual.ravel(), _prior_gain_covariance(part_model, has_known_effect)
             )
             squares, n_gains = squares + squared_error, n_gains + rank
     return squares / n_gains
 
 
-def _with_inflated_noise(stretches: Sequence[Stretch], model: Model) -> Model:
+def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
-    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
+    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
     ratios_of_noise: dict[tuple[float, ...], list[float]] = {}
     for part_model, left_out in _cross_validation_fits(
-        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
+        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
         has_known_effect = np.array(trust.is_group_effect_known(part_model))
         gain_covariance: Floats = np.asarray(
             np.kron(_prior_gain_covariance(part_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
         for one in left_out:
-            responses, residual = _standardized_group_responses(part_model, one)
+            responses, residual = _standardized_responses_and_residual(part_model, one)
             responses = responses[:, :, has_known_effect].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * one.samples.dt_s / _GAIN_WINDOW_S), 1)
             for part in np.array_split(np.arange(len(residual)), n_windows):
@@ -483,13 +495,13 @@ def _with_inflated_noise(stretches: Sequence[Stretch], model: Model) -> Model:
                     _without_mean(responses[part]),
                     _without_mean(residual[part]),
                 )
-                squares, rank = _normalized_squared_gain_error(
+                squares, rank = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
                     gain_covariance,
                 )
                 ratios_of_noise.setdefault(one.samples.noise_ma_coefficients, []).append(
-                    min(squares / max(rank, 1), _MAX_PART_NOISE_INFLATION)
+                    min(squares / max(rank, 1), _MAX_WINDOW_NOISE_INFLATION)
                 )
     noise_inflation_by_ma_coefficients = {
         colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in ratios_of_noise.items()
@@ -513,7 +525,7 @@ def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) ->
     return np.asarray(state_covariance[0, 0] + np.diag(np.diag(state_covariance)[1:][has_known_effect]))
 
 
-def _normalized_squared_gain_error(
+def _normalized_squared_gain_error_and_rank(
     responses: Floats, residual: Floats, gain_covariance: Floats
 ) -> tuple[float, int]:
     """Squares of the gains of a residual (m,) on responses (m, G), in their covariance and what lies between
@@ -527,7 +539,9 @@ def _normalized_squared_gain_error(
     return squares, int(np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information)))
 
 
-def _standardized_group_responses(model: Model, held_out: Stretch) -> tuple[Floats, Floats]:
+def _standardized_responses_and_residual(
+    model: Model, held_out: FlightWithUsableRows
+) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
     _, residual, rate_responses = whitened_residual_and_responses(model, held_out)
@@ -548,7 +562,7 @@ def _without_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _trim_drift_sd(stretches: Sequence[Stretch], model: Model) -> list[float]:
+def _trim_drift_sd(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
@@ -559,9 +573,9 @@ def _trim_drift_sd(stretches: Sequence[Stretch], model: Model) -> list[float]:
         np.zeros(2),
         np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz),
     )
-    for fitted, kept in _cross_validation_splits(stretches):
+    for fitted, held_out in _cross_validation_splits(usable_flights):
         part_model = fit_with_same_order(fitted, model)
-        for one in kept:
+        for one in held_out:
             rows, residual, _ = whitened_residual_and_responses(part_model, one)
             noise = np.array(
                 part_model.with_noise_model(one.samples.noise_ma_coefficients).residual_covariance
@@ -593,75 +607,83 @@ def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
-def _labelled_effectiveness_levels(stretch: Stretch, surface_index: int) -> list[float]:
+def _labelled_levels_in_order(usable_flight: FlightWithUsableRows, surface_index: int) -> list[float]:
     """The levels of one surface's label in their order, edges left out."""
-    values = stretch.samples.labels[:, surface_index][stretch.is_usable]
+    values = usable_flight.samples.labels[:, surface_index][usable_flight.is_usable]
     return [round(level, 6) for level, _ in groupby(values[np.isfinite(values)].tolist())]
 
 
-def validation_folds(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], Stretch, str]]:
-    """Return the fitted stretches, the part left out and its name, for each fold."""
-    if len(stretches) > 1:
-        fitted_stretches = [[other for other in stretches if other is not kept] for kept in stretches]
-        return [
-            (fitted, kept, kept.samples.name)
-            for fitted, kept in zip(fitted_stretches, stretches, strict=True)
+def validation_folds(
+    usable_flights: Sequence[FlightWithUsableRows],
+) -> list[tuple[list[FlightWithUsableRows], FlightWithUsableRows, str]]:
+    """Return the fitted flights, the held-out one and its name, for each fold."""
+    if len(usable_flights) > 1:
+        fitted_flights = [
+            [other for other in usable_flights if other is not held_out] for held_out in usable_flights
         ]
-    (only,) = stretches
-    first, second = _compute_once(stretches, ("halves",), lambda: _split_in_halves(only))
+        return [
+            (fitted, held_out, held_out.samples.name)
+            for fitted, held_out in zip(fitted_flights, usable_flights, strict=True)
+        ]
+    (only,) = usable_flights
+    first, second = _compute_once(usable_flights, ("halves",), lambda: _split_in_halves(only))
     return [([first], second, "second half"), ([second], first, "first half")]
 
 
-def _split_in_halves(stretch: Stretch) -> tuple[Stretch, Stretch]:
+def _split_in_halves(
+    usable_flight: FlightWithUsableRows,
+) -> tuple[FlightWithUsableRows, FlightWithUsableRows]:
     """Split the usable samples of a flight into two halves."""
-    usable_rows = np.flatnonzero(stretch.is_usable)
+    usable_rows = np.flatnonzero(usable_flight.is_usable)
     middle_row = int(usable_rows[len(usable_rows) // 2]) if len(usable_rows) else 0
-    is_early = np.arange(len(stretch.is_usable)) < middle_row
-    return Stretch(stretch.samples, stretch.is_usable & is_early), Stretch(
-        stretch.samples, stretch.is_usable & ~is_early
-    )
+    is_early = np.arange(len(usable_flight.is_usable)) < middle_row
+    return FlightWithUsableRows(
+        usable_flight.samples, usable_flight.is_usable & is_early
+    ), FlightWithUsableRows(usable_flight.samples, usable_flight.is_usable & ~is_early)
 
 
-def add_fitted_ranges_and_alarm_threshold(stretches: Sequence[Stretch], model: Model) -> Model:
+def add_fitted_ranges_and_alarm_threshold(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model
+) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
     and at which evidence of a fault they would alarm as often as declared."""
-    flights = [(stretch.samples, stretch.is_usable) for stretch in stretches]
+    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
     scale, misread_log_likelihood, parts, gain_deviations = (
         1.0,
         0.0,
         list[extremes.PeaksAndHours](),
         list[Floats](),
     )
-    for part_model, kept in _cross_validation_fits(
-        stretches, model, trust.effect_share_explained_by_others(flights, model).tolist()
+    for part_model, held_out in _cross_validation_fits(
+        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
     ):
-        for one in kept:
-            noise_scale, part = _healthy_alarm_statistics(part_model, one)
+        for one in held_out:
+            noise_scale, part = _noise_scale_and_healthy_alarm_peaks(part_model, one)
             scale = max(scale, noise_scale)
-            if len(parts) < _MAX_PARTS_TESTED_FOR_COLUMN_MISTAKES:
+            if len(parts) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
                 misread_log_likelihood = max(
                     misread_log_likelihood, _max_column_mistake_log_likelihood_gain(part_model, one)
                 )
             parts.append(part)
-            if len(stretches) > 1 and model.vehicle.other_laws:
+            if len(usable_flights) > 1 and model.vehicle.other_laws:
                 gain_deviations.append(_squared_gain_deviation(part_model, one))
-    fit = fit_least_squares_of_order(stretches, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    fit = fit_least_squares_of_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
     gain_variance = np.zeros(len(model.groups))
     if model.vehicle.other_laws:
         gain_variance = _gain_variance_between_laws(
-            _max_gain_bias_under_one_law(stretches, model), gain_deviations
+            _max_gain_bias_under_one_law(usable_flights, model), gain_deviations
         )
     gain_standard_errors = np.minimum(
         np.sqrt(group_gain_standard_error(fit, model) ** 2 + gain_variance), _MAX_GAIN_SD
     )
-    column_gain_errors = column_gain_standard_error(fit, model, float(gain_variance.max()))
+    column_gain_errors = gain_standard_error_by_column(fit, model, float(gain_variance.max()))
     fitted_ranges = trust.fitted_ranges(flights, model, gain_standard_errors, scale).model_copy(
-        update={"column_gain_standard_error": column_gain_errors}
+        update={"gain_standard_error_by_column": column_gain_errors}
     )
     asked_per_hour = model.vehicle.false_alarms_per_hour
     false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
-        if asked_per_hour is None and not model.settings.likely_effectiveness_levels
+        if asked_per_hour is None and not model.settings.likely_effectiveness_levels_by_group
         else asked_per_hour
     )
     tail = extremes.fit_peak_tail(parts)
@@ -696,7 +718,7 @@ def add_fitted_ranges_and_alarm_threshold(stretches: Sequence[Stretch], model: M
     )
 
 
-def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> Floats:
+def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Floats:
     """By how much a group's gain may be misread under one law, (G,).
 
     Of the residual's variance the share that its own past predicts is no noise, but what the model lacks. A
@@ -709,7 +731,7 @@ def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> 
     for colour in model.noise_models:
         flight_residuals = [
             one_step_residuals(model, one)[1]
-            for one in stretches
+            for one in usable_flights
             if list(one.samples.noise_ma_coefficients) == colour.ma_coefficients
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
@@ -720,15 +742,15 @@ def _max_gain_bias_under_one_law(stretches: Sequence[Stretch], model: Model) -> 
         )
         lacking_share = max(lacking_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - chance_share)
     effect_power = trust.effect_power_unexplained_by_others(
-        [(one.samples, one.is_usable) for one in stretches], model
+        [(one.samples, one.is_usable) for one in usable_flights], model
     )
     return np.minimum(np.sqrt(3.0 * lacking_share / np.maximum(effect_power, MIN_DIVISOR)), _MAX_GAIN_SD)
 
 
-def _squared_gain_deviation(model: Model, held_out: Stretch) -> Floats:
+def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
-    responses, residual = _standardized_group_responses(model, held_out)
+    responses, residual = _standardized_responses_and_residual(model, held_out)
     responses = responses.sum(axis=3).reshape(residual.size, -1)
     squared_deviation = np.full(responses.shape[1], np.nan)
     has_known_effect = np.array(trust.is_group_effect_known(model)) & (responses.any(axis=0))
@@ -768,7 +790,7 @@ def _choose_alarm_threshold(
     )
 
 
-def _max_column_mistake_log_likelihood_gain(model: Model, held_out: Stretch) -> float:
+def _max_column_mistake_log_likelihood_gain(model: Model, held_out: FlightWithUsableRows) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
     gain_of_mistake, _ = trust.log_likelihood_gain_of_corrections(
@@ -777,34 +799,39 @@ def _max_column_mistake_log_likelihood_gain(model: Model, held_out: Stretch) -> 
     return max(0.0, *gain_of_mistake.values()) if gain_of_mistake else 0.0
 
 
-def _total_healthy_minutes(parts: Sequence[extremes.PeaksAndHours]) -> float:
-    return 60.0 * sum(hours for _, hours in parts)
+def _total_healthy_minutes(held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours]) -> float:
+    return 60.0 * sum(hours for _, hours in held_out_peaks_and_hours)
 
 
 def _cross_validate_alarm_threshold(
-    healthy_parts: Sequence[extremes.PeaksAndHours], false_alarms_per_hour: float | None, model: Model
+    held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours],
+    false_alarms_per_hour: float | None,
+    model: Model,
 ) -> Document:
     """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
     others ask for, and how often."""
     tails = [
-        extremes.fit_peak_tail([*healthy_parts[:i], *healthy_parts[i + 1 :]])
-        for i in range(len(healthy_parts))
+        extremes.fit_peak_tail([*held_out_peaks_and_hours[:i], *held_out_peaks_and_hours[i + 1 :]])
+        for i in range(len(held_out_peaks_and_hours))
     ]
-    if false_alarms_per_hour is None or len(healthy_parts) < 2 or not all(tails):
+    if false_alarms_per_hour is None or len(held_out_peaks_and_hours) < 2 or not all(tails):
         return {}
     thresholds = [_choose_alarm_threshold(tail, false_alarms_per_hour, model) for tail in tails if tail]
     n_alarms_by_part = [
-        int((peaks >= limit).sum()) for (peaks, _), limit in zip(healthy_parts, thresholds, strict=True)
+        int((peaks >= limit).sum())
+        for (peaks, _), limit in zip(held_out_peaks_and_hours, thresholds, strict=True)
     ]
     return {
-        "parts": len(healthy_parts),
-        "minutes": _total_healthy_minutes(healthy_parts),
+        "parts": len(held_out_peaks_and_hours),
+        "minutes": _total_healthy_minutes(held_out_peaks_and_hours),
         "alarmed": sum(count > 0 for count in n_alarms_by_part),
         "alarms": sum(n_alarms_by_part),
     }
 
 
-def _healthy_alarm_statistics(model: Model, held_out: Stretch) -> tuple[float, extremes.PeaksAndHours]:
+def _noise_scale_and_healthy_alarm_peaks(
+    model: Model, held_out: FlightWithUsableRows
+) -> tuple[float, extremes.PeaksAndHours]:
     """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
@@ -824,16 +851,21 @@ def _healthy_alarm_statistics(model: Model, held_out: Stretch) -> tuple[float, e
     )
 
 
-def _cross_validation_splits(stretches: Sequence[Stretch]) -> list[tuple[list[Stretch], list[Stretch]]]:
+def _cross_validation_splits(
+    usable_flights: Sequence[FlightWithUsableRows],
+) -> list[tuple[list[FlightWithUsableRows], list[FlightWithUsableRows]]]:
     """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
-    if len(stretches) == 1:
-        return [(fitted, [kept]) for fitted, kept, _ in validation_folds(stretches)]
-    n_splits = min(len(stretches), _MAX_CROSS_VALIDATION_SPLITS)
+    if len(usable_flights) == 1:
+        return [(fitted, [held_out]) for fitted, held_out, _ in validation_folds(usable_flights)]
+    n_splits = min(len(usable_flights), _MAX_CROSS_VALIDATION_SPLITS)
     left_out_indices = [
-        [i for i in range(len(stretches)) if i % n_splits == turn] for turn in range(n_splits)
+        [i for i in range(len(usable_flights)) if i % n_splits == turn] for turn in range(n_splits)
     ]
     return [
-        ([one for i, one in enumerate(stretches) if i not in left_out], [stretches[i] for i in left_out])
+        (
+            [one for i, one in enumerate(usable_flights) if i not in left_out],
+            [usable_flights[i] for i in left_out],
+        )
         for left_out in left_out_indices
     ]
 
@@ -876,7 +908,7 @@ def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> F
     )
 
 
-def column_gain_standard_error(
+def gain_standard_error_by_column(
     fit: regression.RateRegression, model: Model, gain_variance: float
 ) -> dict[str, float]:
     """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
@@ -907,26 +939,28 @@ def column_gain_standard_error(
     return sd_of_column
 
 
-def explained_variance_by_fold(stretches: Sequence[Stretch], model: Model) -> list[Document]:
+def explained_variance_by_fold(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model
+) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
     return [
-        {"left_out": name, **one_step_prediction_quality(fit_with_same_order(fitted, model), kept)}
-        for fitted, kept, name in validation_folds(stretches)
+        {"left_out": name, **one_step_prediction_quality(fit_with_same_order(fitted, model), held_out)}
+        for fitted, held_out, name in validation_folds(usable_flights)
     ]
 
 
 def score_folds_and_choose_credible_mass(
-    stretches: Sequence[Stretch], model: Model
+    usable_flights: Sequence[FlightWithUsableRows], model: Model
 ) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     entries: list[Document] = []
     coverage_by_mass: list[list[float]] = []
-    for fitted, kept, name in validation_folds(stretches):
+    for fitted, held_out, name in validation_folds(usable_flights):
         part_model = fit_with_same_order(fitted, model)
-        entry: Document = {"left_out": name, **one_step_prediction_quality(part_model, kept)}
-        labels = np.where(kept.is_usable[:, None], kept.samples.labels, np.nan)
+        entry: Document = {"left_out": name, **one_step_prediction_quality(part_model, held_out)}
+        labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            by_mass = _diagnosis_by_credible_mass(part_model, kept)
+            by_mass = _diagnosis_rows_by_credible_mass(part_model, held_out)
             entry["score"] = score_against_labels(by_mass[model.settings.credible_mass], labels)
             coverage_by_mass.append(
                 [
@@ -942,7 +976,9 @@ def score_folds_and_choose_credible_mass(
     ]
 
 
-def _diagnosis_by_credible_mass(model: Model, held_out: Stretch) -> dict[float, DiagnosisRows]:
+def _diagnosis_rows_by_credible_mass(
+    model: Model, held_out: FlightWithUsableRows
+) -> dict[float, DiagnosisRows]:
     bank = build_hypothesis_bank(model)
     posterior, _, _ = hypothesis_posterior(held_out.samples, model, bank)
     settings = [
@@ -957,7 +993,7 @@ def _diagnosis_by_credible_mass(model: Model, held_out: Stretch) -> dict[float, 
     }
 
 
-def one_step_prediction_quality(model: Model, held_out: Stretch) -> Document:
+def one_step_prediction_quality(model: Model, held_out: FlightWithUsableRows) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
     rows, residual = one_step_residuals(model, held_out)
     rates = held_out.samples.rates[rows]
@@ -972,22 +1008,22 @@ def one_step_prediction_quality(model: Model, held_out: Stretch) -> Document:
 
 
 def whitened_residual_and_responses(
-    model: Model, stretch: Stretch
+    model: Model, usable_flight: FlightWithUsableRows
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
     is_predictable, unexplained, responses = regression.whitened_rates_and_responses(
-        stretch.samples, model, scales_by_labels=True
+        usable_flight.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(stretch.is_usable & is_predictable)
-    intercept = model.whitened_intercept(stretch.samples.noise_ma_coefficients)
+    rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
+    intercept = model.whitened_intercept(usable_flight.samples.noise_ma_coefficients)
     return rows, (unexplained - responses.sum(axis=1) - intercept)[rows], responses[rows]
 
 
-def one_step_residuals(model: Model, stretch: Stretch) -> tuple[NDArray[np.int64], Floats]:
+def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
     is_predictable, unexplained, responses = regression.unexplained_rates_and_responses(
-        stretch.samples, model, scales_by_labels=True
+        usable_flight.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(stretch.is_usable & is_predictable)
+    rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
     return rows, (unexplained - responses.sum(axis=1) - np.array(model.intercept))[rows]

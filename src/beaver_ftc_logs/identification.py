@@ -27,7 +27,7 @@ from beaver_ftc_logs.samples import (
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_VARIANCE_INFLATION = 10.0
+_MIN_COLLINEAR_VARIANCE_INFLATION = 10.0
 _SCORE_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "mean_error": "mean error",
     "held_by_bounds": "held by bounds",
@@ -46,20 +46,22 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
     vehicle, assumption_lines = with_assumed_law_and_air(flights, vehicle)
     _check_command_units_alike(flights, vehicle)
-    stretches = fitting.usable_stretches(whiten_flights(flights, vehicle))
-    model = fitting.fit_model(stretches, vehicle)
-    check_explained_variance(fitting.explained_variance_by_fold(stretches, model), stretches, model)
-    model = add_unseen_noise_models(fitting.add_fitted_ranges_and_alarm_threshold(stretches, model), flights)
-    tests, bounds = fitting.score_folds_and_choose_credible_mass(stretches, model)
+    usable_flights = fitting.flights_with_usable_rows(whiten_flights(flights, vehicle))
+    model = fitting.fit_model(usable_flights, vehicle)
+    check_explained_variance(fitting.explained_variance_by_fold(usable_flights, model), usable_flights, model)
+    model = add_unseen_noise_models(
+        fitting.add_fitted_ranges_and_alarm_threshold(usable_flights, model), flights
+    )
+    tests, bounds = fitting.score_folds_and_choose_credible_mass(usable_flights, model)
     identified = {
         "assumed": assumption_lines,
-        "flights": [_used_samples_entry(stretch) for stretch in stretches],
+        "flights": [_used_samples_entry(usable_flight) for usable_flight in usable_flights],
         "tests": tests,
         "another_day": expected_performance_on_another_day(tests, model),
-        "collinear": collinear_regressors(stretches, model),
-        "colour": standard_error_inflation(stretches, model),
-        "spectrum": residual_spectrum(stretches, model),
-        "output_error": fit_output_error(stretches, surface_indices_by_group(model)),
+        "collinear": collinear_regressors(usable_flights, model),
+        "colour": median_standard_error_inflation_by_axis(usable_flights, model),
+        "spectrum": residual_spectrum(usable_flights, model),
+        "output_error": fit_output_error(usable_flights, surface_indices_by_group(model)),
     }
     settings = model.settings.model_copy(update={"credible_mass": bounds})
     return model.model_copy(update={"settings": settings, "identification_results": identified})
@@ -68,7 +70,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
 def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
-    much of it, the flight itself shows (`filtering.min_noise_variance_scale`)."""
+    much of it, the flight itself shows (`filtering.recent_noise_variance_scale`)."""
     if not model.noise_models:
         return model
     known_averages, max_inflation = (
@@ -79,7 +81,9 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     colours = list(model.noise_models)
     for average in UNSEEN_NOISE_MA_COEFFICIENTS:
         if average not in known_averages:
-            whitened_flights = fitting.usable_stretches([whiten_samples(one, average) for one in flights])
+            whitened_flights = fitting.flights_with_usable_rows(
+                [whiten_samples(one, average) for one in flights]
+            )
             residuals = np.vstack([fitting.one_step_residuals(model, one)[1] for one in whitened_flights])
             colours.append(
                 NoiseModel(average=list(average), noise=np.cov(residuals.T).tolist(), wider=max_inflation)
@@ -126,22 +130,25 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
     for what the surface does [Ljung1999, section 13.4].
     """
-    n_lags = max(fitting.RATE_LAG_CANDIDATES), max(fitting.RATE_LAG_CANDIDATES)
+    rate_and_command_lags = max(fitting.RATE_LAG_CANDIDATES), max(fitting.RATE_LAG_CANDIDATES)
     if not vehicle.moving_air:
         return list(flights)
-    noise_averages = [_choose_noise_ma_coefficients(one, vehicle, n_lags) for one in flights]
+    noise_averages = [_choose_noise_ma_coefficients(one, vehicle, rate_and_command_lags) for one in flights]
     whitened_flights = [
         whiten_samples(one, noise_ma_coefficients)
         for one, noise_ma_coefficients in zip(flights, noise_averages, strict=True)
     ]
     for _ in range(_N_WHITENING_ROUNDS):
         regressors, rates, _ = fitting.stacked_regression_data(
-            fitting.usable_stretches(whitened_flights), vehicle, *n_lags
+            fitting.flights_with_usable_rows(whitened_flights), vehicle, *rate_and_command_lags
         )
         coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
         best_averages = [
-            _best_noise_ma_coefficients(
-                fitting.usable_stretches([one]), vehicle, n_lags, np.asarray(coefficients)
+            _log_determinant_and_best_ma_coefficients(
+                fitting.flights_with_usable_rows([one]),
+                vehicle,
+                rate_and_command_lags,
+                np.asarray(coefficients),
             )
             for one in flights
         ]
@@ -158,14 +165,16 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
 
 def _choose_noise_ma_coefficients(
-    flight: Samples, vehicle: Vehicle, n_lags: tuple[int, int]
+    flight: Samples, vehicle: Vehicle, rate_and_command_lags: tuple[int, int]
 ) -> tuple[float, ...]:
     """The colour of which a fit to one flight alone leaves least: the likeliest of an ARMAX model, by
     profile likelihood over the moving averages."""
 
     def residual_log_determinant(noise_ma_coefficients: tuple[float, ...]) -> float:
         regressors, rates, _ = fitting.stacked_regression_data(
-            fitting.usable_stretches([whiten_samples(flight, noise_ma_coefficients)]), vehicle, *n_lags
+            fitting.flights_with_usable_rows([whiten_samples(flight, noise_ma_coefficients)]),
+            vehicle,
+            *rate_and_command_lags,
         )
         if len(rates) < 2:
             raise BadInput(
@@ -179,13 +188,16 @@ def _choose_noise_ma_coefficients(
     return min(NOISE_MA_CANDIDATES, key=residual_log_determinant)
 
 
-def _best_noise_ma_coefficients(
-    stretch: list[fitting.Stretch], vehicle: Vehicle, n_lags: tuple[int, int], coefficients: Floats
+def _log_determinant_and_best_ma_coefficients(
+    usable_flight: list[fitting.FlightWithUsableRows],
+    vehicle: Vehicle,
+    rate_and_command_lags: tuple[int, int],
+    coefficients: Floats,
 ) -> tuple[float, tuple[float, ...]]:
     """The colour of a flight, and the log determinant of the residual that it leaves."""
     from scipy.signal import lfilter
 
-    regressors, rates, _ = fitting.stacked_regression_data(stretch, vehicle, *n_lags)
+    regressors, rates, _ = fitting.stacked_regression_data(usable_flight, vehicle, *rate_and_command_lags)
     residual = rates - regressors @ coefficients
     log_determinants = {
         one: np.linalg.slogdet(np.cov(lfilter([1.0], one, residual, axis=0).T))[1]
@@ -260,7 +272,7 @@ def _choose_dynamic_pressure_scaling(
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     """The least Bayesian information criterion of any order."""
-    return min(fitting.bic_by_order(fitting.usable_stretches(flights), vehicle).values())
+    return min(fitting.bic_by_order(fitting.flights_with_usable_rows(flights), vehicle).values())
 
 
 def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
@@ -276,17 +288,17 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
     )  # a criterion believes each sample, as only white noise lets it
 
     def scale_and_whiten_flights(scaled_vehicle: Vehicle, whitens: bool = True) -> list[Samples]:
-        bic = [
+        rescaled_flights = [
             scale_by_dynamic_pressure(
                 one, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
             for one in flights
         ]
         if not (whitens and vehicle.moving_air):
-            return bic
+            return rescaled_flights
         return [
             whiten_samples(one, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
-            for one, whitened_flight in zip(bic, whitened_flights, strict=True)
+            for one, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
         ]
 
     min_bic, names = (
@@ -303,7 +315,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
 
 
 def check_explained_variance(
-    tests: list[Document], stretches: Sequence[fitting.Stretch], model: Model
+    tests: list[Document], usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
 ) -> None:
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
     known_tests = [test for test in tests if test["samples"]]
@@ -313,8 +325,10 @@ def check_explained_variance(
         axis: float(np.average(values, weights=weights)) for axis, values in shares.items() if known_tests
     }
     if unexplained_axes := {axis: share for axis, share in explained.items() if share <= 0.0}:
-        minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in stretches) / 60.0
-        stillest_command = min(_command_spread(stretches, model).items(), key=lambda pair: pair[1])
+        minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in usable_flights) / 60.0
+        stillest_command = min(
+            _command_sd_by_surface(usable_flights, model).items(), key=lambda pair: pair[1]
+        )
         raise BadInput(
             "identify: on parts it was not fitted on the model explains less of "
             f"{', '.join(unexplained_axes)} than the "
@@ -323,14 +337,14 @@ def check_explained_variance(
             f"help: more than these {minutes:.1f} min, commands that move more "
             f"({stillest_command[0]} has a standard "
             f"deviation of {stillest_command[1]:.2g}), or the commands that this vehicle follows"
-            f"{_remarks_on_rates(stretches, model)}"
+            f"{_remarks_on_rates(usable_flights, model)}"
         )
 
 
 def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     """Raise BadInput where a flight's command is in another unit than that of the first."""
     first_ranges = FittedRanges(
-        commands=trust.central_range(flights[0].commands), rates=trust.central_range(flights[0].rates)
+        commands=trust.central_ranges(flights[0].commands), rates=trust.central_ranges(flights[0].rates)
     )
     for other in flights[1:]:
         trust.check_command_units(
@@ -338,36 +352,42 @@ def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> 
         )
 
 
-def _remarks_on_rates(stretches: Sequence[fitting.Stretch], model: Model) -> str:
+def _remarks_on_rates(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> str:
     """Return the mistakes found in the rates when the log was read, each after a semicolon."""
     rates = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
-    notes = [note for one in stretches for note in one.samples.notes if note.startswith(rates)]
+    notes = [note for one in usable_flights for note in one.samples.notes if note.startswith(rates)]
     return "".join(f"; {note}" for note in notes)
 
 
-def _command_spread(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
+def _command_sd_by_surface(
+    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
+) -> dict[str, float]:
     """Standard deviation of each surface's command."""
-    commands = np.vstack([stretch.samples.commands[stretch.is_usable] for stretch in stretches])
+    commands = np.vstack(
+        [usable_flight.samples.commands[usable_flight.is_usable] for usable_flight in usable_flights]
+    )
     return dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
 
 
-def _used_samples_entry(stretch: fitting.Stretch) -> Document:
-    samples, use = stretch.samples, stretch.is_usable
+def _used_samples_entry(usable_flight: fitting.FlightWithUsableRows) -> Document:
+    samples, use = usable_flight.samples, usable_flight.is_usable
     return {"name": samples.name, "samples": int(use.sum()), "of": len(use), "notes": list(samples.notes)}
 
 
-def collinear_regressors(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
+def collinear_regressors(
+    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
+) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
     regressors, _, _ = fitting.stacked_regression_data(
-        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     factors = variance_inflation_factors(regressors[:, 1:])
     worst = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     inflated = [
         (name, factor if isfinite(factor) else None)
         for name, factor in worst
-        if factor > _MAX_VARIANCE_INFLATION
+        if factor > _MIN_COLLINEAR_VARIANCE_INFLATION
     ]
     return [{"regressor": name, "inflation": factor} for name, factor in inflated]
 
@@ -381,10 +401,12 @@ def regressor_names(model: Model) -> list[str]:
     return rates + signals + [f"command of {group}[-{k}]" for group in groups for k in delays]
 
 
-def standard_error_inflation(stretches: Sequence[fitting.Stretch], model: Model) -> dict[str, float]:
+def median_standard_error_inflation_by_axis(
+    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
+) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
     fit = fitting.fit_least_squares_of_order(
-        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     first_command_row = len(fit.standard_error_inflation) - len(model.groups) * model.n_command_lags
     return dict(
@@ -392,9 +414,11 @@ def standard_error_inflation(stretches: Sequence[fitting.Stretch], model: Model)
     )
 
 
-def residual_spectrum(stretches: Sequence[fitting.Stretch], model: Model) -> list[Document]:
+def residual_spectrum(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    residual = np.vstack([fitting.one_step_residuals(model, stretch)[1] for stretch in stretches])
+    residual = np.vstack(
+        [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
+    )
     frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     white_density = residual.var(axis=0) / (0.5 * model.rate_hz)
     bands = []
@@ -442,7 +466,7 @@ def identification_text(model: Model) -> str:
         lines.append(
             f"  {n_collinear} {'regressors are' if n_collinear > 1 else 'regressor is'} "
             "collinear (variance inflated over "
-            f"{_MAX_VARIANCE_INFLATION:g} times), most {worst['regressor']} "
+            f"{_MIN_COLLINEAR_VARIANCE_INFLATION:g} times), most {worst['regressor']} "
             f"({_variance_inflation_text(worst['inflation'])})"
         )
     return "\n".join(lines)
@@ -512,14 +536,16 @@ def _values_by_axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def fit_output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int]]) -> dict[str, Any]:
+def fit_output_error(
+    usable_flights: Sequence[fitting.FlightWithUsableRows], groups: list[list[int]]
+) -> dict[str, Any]:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
     and the share of the rates' variance explained over free-running windows not fitted, an axis."""
     from scipy.optimize import least_squares
 
-    dt_s = float(np.median([stretch.samples.dt_s for stretch in stretches]))
+    dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
     commands, rates = _cut_free_run_windows(
-        stretches, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_COMMAND_DELAY_S / dt_s) + 1
+        usable_flights, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_COMMAND_DELAY_S / dt_s) + 1
     )
     if len(rates) < 20 or not np.ptp(rates, axis=(0, 1)).all():
         return {"windows": len(rates), "says": "too few gap-free windows in which every rate moves"}
@@ -555,19 +581,22 @@ def fit_output_error(stretches: Sequence[fitting.Stretch], groups: list[list[int
 
 
 def _cut_free_run_windows(
-    stretches: Sequence[fitting.Stretch], groups: list[list[int]], window_samples: int, n_past_samples: int
+    usable_flights: Sequence[fitting.FlightWithUsableRows],
+    groups: list[list[int]],
+    window_samples: int,
+    n_past_samples: int,
 ) -> tuple[Floats, Floats]:
     """Commands (W, n_past_samples + window_samples, G) with their past, scaled by labels, and rates (W,
     window_samples, 3)."""
     commands, rates = [], []
-    for stretch in stretches:
-        samples = stretch.samples
+    for usable_flight in usable_flights:
+        samples = usable_flight.samples
         effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
         group_commands = np.column_stack(
             [(samples.commands * effectiveness)[:, g].sum(axis=1) for g in groups]
         )
         is_usable = (
-            stretch.is_usable
+            usable_flight.is_usable
             & np.isfinite(group_commands).all(axis=1)
             & np.isfinite(samples.rates).all(axis=1)
         )

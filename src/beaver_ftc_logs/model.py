@@ -38,7 +38,7 @@ class FilterSettings(Section):
         alias="changes_per_hour",
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    likely_effectiveness_levels: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
+    likely_effectiveness_levels_by_group: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
         default={},
         description="likelier levels of effectiveness, by group",
         alias="levels",
@@ -129,7 +129,7 @@ class FilterSettings(Section):
     alarm_probability: Number = Field(
         0.5, gt=0, lt=1, description="probability of a fault that raises the alarm", alias="alarm"
     )
-    alarm_hold_s: Number = Field(
+    alarm_confirmation_time_s: Number = Field(
         0.0,
         ge=0,
         le=_MAX_COEFFICIENT,
@@ -160,8 +160,10 @@ class FilterSettings(Section):
         description="for how long another name stands before it counts, s",
         alias="rename_s",
     )
-    isolates_single_group: bool = Field(
-        False, description="whether a name is of the likeliest group alone", alias="one_group"
+    assumes_one_group_at_fault: bool = Field(
+        False,
+        description="whether one group alone is at fault: a name has every group that is not excluded",
+        alias="one_group",
     )
     effectiveness_level_step: Number = Field(
         0.1, ge=0.01, le=0.5, description="step of the grid of effectiveness", alias="level_step"
@@ -185,7 +187,7 @@ class FittedRanges(Section):
     rate_sd_rad_s: Row = Field(
         default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    command_correlation: Matrix = Field(
+    group_command_correlation: Matrix = Field(
         default=[], description="correlation of the groups' commands", alias="correlation"
     )
     effect_share_explained_by_others: Row = Field(
@@ -196,12 +198,12 @@ class FittedRanges(Section):
     group_gain_standard_error: Row = Field(
         default=[], description="standard error of each group's gain", alias="gain_sd"
     )
-    column_gain_standard_error: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+    gain_standard_error_by_column: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
         default={},
         description="standard error of the gain of what the rates answer to each rate and signal",
         alias="column_sd",
     )
-    longest_unchanged_time_s: dict[str, Number] = Field(
+    longest_unchanged_time_s_by_column: dict[str, Number] = Field(
         default={}, description="longest time each column stood still, s", alias="still_s"
     )
     max_noise_variance_scale: Number = Field(
@@ -303,13 +305,13 @@ class Model(Section):
             f"has {len(self.past_coefficients)} rows, allowed: {rows}, as `identify` writes them: "
             "identify it again"
         )
-        conflicts: list[Conflict] = [(("past",), says)] * (len(self.past_coefficients) != rows)
-        conflicts += [*self._group_conflicts(), *self._shape_conflicts(len(self.past_coefficients))]
-        refuse(conflicts)  # before any of it is computed with
+        file_mistakes: list[Conflict] = [(("past",), says)] * (len(self.past_coefficients) != rows)
+        file_mistakes += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
+        refuse(file_mistakes)  # before any of it is computed with
         refuse(self._invalid_covariances_or_errors())
         return self
 
-    def _group_conflicts(self) -> Iterator[Conflict]:
+    def _group_mistakes(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
         seen_surfaces: set[str] = set()
         for i, group in enumerate(self.groups):
@@ -319,7 +321,7 @@ class Model(Section):
                     yield ("groups", i, k), f"{name!r:.60} {what}, allowed: each surface once"
                 seen_surfaces.add(name)
         known = ["+".join(group) for group in self.groups]
-        for name in self.settings.likely_effectiveness_levels:
+        for name in self.settings.likely_effectiveness_levels_by_group:
             if name not in known:
                 says = f"{name!r:.60} is no group, allowed: {', '.join(known)}"
                 yield ("settings", "levels", name), says
@@ -327,7 +329,7 @@ class Model(Section):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
-    def _shape_conflicts(self, n_past_rows: int) -> Iterator[Conflict]:
+    def _shape_mistakes(self, n_past_rows: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         count = len(self.groups)
         expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
@@ -350,7 +352,7 @@ class Model(Section):
                 ("commands", fitted.command_ranges, (len(fitted.command_ranges), 2)),
                 ("rates", fitted.rate_ranges_rad_s, (3, 2)),
                 ("airspeed", fitted.airspeed_range_mps, (2,)), ("spread", fitted.rate_sd_rad_s, (3,)),
-                ("correlation", fitted.command_correlation, (count, count)),
+                ("correlation", fitted.group_command_correlation, (count, count)),
                 ("tied", fitted.effect_share_explained_by_others, (count,)),
                 ("gain_sd", fitted.group_gain_standard_error, (count,)),
             ]  # fmt: skip

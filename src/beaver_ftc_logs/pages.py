@@ -73,7 +73,7 @@ def _render_flight_page(
         brief_s=MAX_BRIEF_EVENT_S,
         words=wording,
         picture=_encode_png(flight_figure(samples, surfaces, rows, wording["bounds"])),
-        ages=samples.held_column_mean_age_s,
+        ages=samples.mean_age_s_by_held_column,
         notes=[*_log_notes(samples), wording["predicts"]],
     )
 
@@ -84,7 +84,7 @@ def _log_notes(samples: Samples) -> list[str]:
     notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gap_count_text} in the log."]
     notes += [
         f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
-        for name, age in samples.held_column_mean_age_s.items()
+        for name, age in samples.mean_age_s_by_held_column.items()
     ]
     return [*notes, *samples.notes]
 
@@ -240,19 +240,19 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    stretches = fitting.usable_stretches(flights)
+    usable_flights = fitting.flights_with_usable_rows(flights)
     fit = fitting.fit_least_squares_of_order(
-        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=IDENTIFICATION_PAGE_MARK,
         model=model,
         found=model.identification_results,
-        used=sum(int(stretch.is_usable.sum()) for stretch in stretches),
+        used=sum(int(usable_flight.is_usable.sum()) for usable_flight in usable_flights),
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
-        fits=_encode_png(_prediction_figure(stretches, model)),
-        spectrum=_encode_png(_spectrum_figure(stretches, model)),
+        fits=_encode_png(_prediction_figure(usable_flights, model)),
+        spectrum=_encode_png(_spectrum_figure(usable_flights, model)),
         correlation=_encode_png(_coefficient_correlation_figure(fit, names)),
     )
 
@@ -269,20 +269,20 @@ def _encode_png(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     folds = [
-        (fitting.fit_with_same_order(fitted, model), kept, name)
-        for fitted, kept, name in fitting.validation_folds(stretches)
+        (fitting.fit_with_same_order(fitted, model), held_out, name)
+        for fitted, held_out, name in fitting.validation_folds(usable_flights)
     ]
     folds = [part for part in folds if part[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
     n_shown = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n_shown)
     blocks = figure.subfigures(n_shown, squeeze=False)[:, 0]
-    for block, (fitted, kept, name) in zip(blocks, folds, strict=False):
+    for block, (fitted, held_out, name) in zip(blocks, folds, strict=False):
         axes = block.subplots(3, 1, sharex=True)
         t_s, rates, residual = _prediction_in_most_active_window(
-            fitted, kept, round(_PREDICTION_WINDOW_S * model.rate_hz)
+            fitted, held_out, round(_PREDICTION_WINDOW_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
             residual_deg_s, rate_deg_s = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
@@ -297,7 +297,7 @@ def _prediction_figure(stretches: Sequence[fitting.Stretch], model: Model) -> An
 
 
 def _prediction_in_most_active_window(
-    model: Model, held_out: fitting.Stretch, window_samples: int
+    model: Model, held_out: fitting.FlightWithUsableRows, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
     rows, residual = fitting.one_step_residuals(model, held_out)
@@ -306,12 +306,12 @@ def _prediction_in_most_active_window(
         np.full_like(held_out.samples.rates, np.nan),
     )
     rates[rows], window_residual[rows] = held_out.samples.rates[rows], residual
-    begin = _start_of_most_active_window(rates, rows, window_samples)
+    begin = _first_row_of_most_active_window(rates, rows, window_samples)
     part = slice(begin, begin + window_samples)
     return held_out.samples.t_s[part], rates[part], window_residual[part]
 
 
-def _start_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
+def _first_row_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
     squared_rates = np.zeros(len(rates))
     squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
@@ -323,9 +323,11 @@ def _start_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_
     )
 
 
-def _spectrum_figure(stretches: Sequence[fitting.Stretch], model: Model) -> Any:
+def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack([fitting.one_step_residuals(model, stretch)[1] for stretch in stretches])
+    residual = np.vstack(
+        [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
+    )
     frequency, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc_logs.recording import Column, Floats
-from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, UNITS, nearest_unit
+from beaver_ftc_logs.units import ACCELERATION, ANGLE, KIND_AND_SI_FACTOR_OF_UNIT, RATE, nearest_unit
 
 _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
 _MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _UNIT_TOLERANCE = 20, 0.7, 1.3
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW = 1.5, 1.8
 _LOW_CORRELATION, _LOW_CORRELATION_OF_FEW = 0.4, 0.2
-_GRAVITY_MPS2 = UNITS["g"][1]
+_GRAVITY_MPS2 = KIND_AND_SI_FACTOR_OF_UNIT["g"][1]
 _PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
 _MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
 _MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
@@ -246,11 +246,15 @@ def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) ->
     if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
         unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_TOLERANCE)
     ):
-        return f"{fits}: {angle_column} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
+        return (
+            f"{fits}: {angle_column} is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+        )
     if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
         unit := nearest_unit(RATE, slope_magnitude, _UNIT_TOLERANCE)
     ):
-        return f"{fits}: {rate_column} is in {unit}, a factor of {UNITS[unit][1]:.4g} fits"
+        return (
+            f"{fits}: {rate_column} is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+        )
     return (
         f"{fits}: a factor of {slope_magnitude:.4g} on {rate_column} fits, or of "
         f"{1.0 / slope_magnitude:.4g} on {angle_column}"
@@ -263,8 +267,15 @@ def pitch_angle_unit_remark(pitch: Column, column_name: str) -> str | None:
     max_pitch = float(np.nanmax(np.abs(pitch.values), initial=0.0))
     if max_pitch <= _MAX_PITCH_RAD:
         return None
-    unit = next((one for one in ("deg", "cdeg") if max_pitch * UNITS[one][1] <= _MAX_PITCH_RAD), None)
-    fits = f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
+    unit = next(
+        (one for one in ("deg", "cdeg") if max_pitch * KIND_AND_SI_FACTOR_OF_UNIT[one][1] <= _MAX_PITCH_RAD),
+        None,
+    )
+    fits = (
+        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+        if unit
+        else "no unit fits"
+    )
     return (
         f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' "
         "too"
@@ -280,7 +291,9 @@ def gravity_remark(acceleration: Column, column_name: str) -> str | None:
         return None
     unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None
     fits = (
-        f"it is in {unit}, a factor of {UNITS[unit][1]:.4g} fits" if unit else "no unit fits: is 1 g in it?"
+        f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+        if unit
+        else "no unit fits: is 1 g in it?"
     )
     return (
         f"{column_name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is "

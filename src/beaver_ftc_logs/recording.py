@@ -69,7 +69,9 @@ def nearest_names(wanted_name: str, names: Iterable[str]) -> str:
 
 
 @contextmanager
-def open_log_with_package(path: Path, log_kind: str, package: str, file_form: str) -> Iterator[None]:
+def refuse_log_unreadable_by_package(
+    path: Path, log_kind: str, package: str, file_form: str
+) -> Iterator[None]:
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
     here. Raises BadInput where the package is missing, or the file is none that it can read.
 
@@ -92,7 +94,8 @@ def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tu
     topics: each topic's fields by name, one of them the stamps in us.
     """
     rows_of_topic = {
-        name: rows_in_time_order(name, _as_floats(fields[stamp_field])) for name, fields in topics.items()
+        name: rows_with_increasing_time(name, _as_floats(fields[stamp_field]))
+        for name, fields in topics.items()
     }
     first_stamps = [
         float(topics[name][stamp_field][kept_rows[0]])
@@ -116,7 +119,7 @@ def _as_floats(values: Any) -> Floats:
     return np.asarray(values, dtype=float)
 
 
-def rows_in_time_order(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
+def rows_with_increasing_time(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
     """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
 
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and

@@ -37,8 +37,8 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     inputs = [*stepped.log_input_columns(aircraft), ["altitude_m"]]
     log = _read_columns(path, ["t_s", *chain.from_iterable(inputs)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
-    diagnosis_inputs = [np.column_stack([log[name] for name in names]) for names in inputs]
-    replayed = stepped.replay_samples(diagnosis, diagnosis_inputs, scenario.rate_hz)
+    input_arrays = [np.column_stack([log[name] for name in names]) for names in inputs]
+    replayed = stepped.replay_samples(diagnosis, input_arrays, scenario.rate_hz)
     rows = stepped.rows_of_replay(log["t_s"], replayed, aircraft.surfaces, scenario.fdi)
     return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replayed.verdicts)
 

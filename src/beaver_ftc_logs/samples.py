@@ -47,15 +47,15 @@ _MIN_GAP_STEPS = 3.5
 class Samples:
     """One flight, ready for identification and filtering.
 
-    t_s (n,) s; rates (n, 3) rad/s; commands (n, S) what each healthy surface would make of the commands;
-    signals (n, X); labels (n, S) effectiveness, nan where unknown; stretch_number (n,) of the gap-free
-    stretch; held_column_mean_age_s: mean age of each; log_stamps_s (m,) the log's own time stamps, s; notes:
-    what is said of the reading; airspeed (n,) m/s, nan where unknown; time_since_change_s: for how long each
-    column of rates, commands and signals has been the same, (n,) s; is_rate_clipped (n,);
-    energy_height_rate_mps (n,): rate of the energy height over the last seconds, None where it is not logged;
-    noise_ma_coefficients: the moving average of the noise, that rates, commands and signals are whitened by,
-    none where empty; fit_weight: of a sample in a fit; n_log_parts: in how many the log was read, of which
-    these are stretches where there are several.
+    t_s (n,) s. rates (n, 3) rad/s. commands (n, S): command of each surface as the mixer makes it, in shares
+    of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown. stretch_number (n,): number of
+    the gap-free stretch. mean_age_s_by_held_column: mean age of the values of each column that is held.
+    log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading. airspeed (n,) m/s, nan
+    where unknown. time_since_change_s: for how long each column of rates, commands and signals has been
+    constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy height over the
+    last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the noise by which
+    rates, commands and signals are whitened, empty if they are not. fit_weight of each sample in a fit.
+    n_log_parts: number of parts in which the log was read; if several, the samples are chosen stretches.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Samples:
     labels: Floats
     stretch_number: NDArray[np.int64]
     dt_s: float
-    held_column_mean_age_s: dict[str, float]
+    mean_age_s_by_held_column: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
     log_stamps_s: Floats
     notes: tuple[str, ...] = ()
@@ -93,8 +93,8 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     _check_columns(recording, used_columns, rate_columns=rate_columns)
     _check_rates_fit_attitude(recording, vehicle)
     log_stamps_s = recording.columns[rate_columns[0]].t_s
-    t_s, stretch_number, step_s = _sample_times(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
-    values_and_age = {name: values_at(recording.columns[name], t_s, step_s) for name in used_columns}
+    t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
+    values_and_age = {name: values_and_age_at(recording.columns[name], t_s, step_s) for name in used_columns}
     for name in rate_columns:
         values, age_s = values_and_age[name]
         values_and_age[name] = (
@@ -116,7 +116,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         labels=_labelled_effectiveness_by_surface(recording, vehicle, t_s),
         stretch_number=stretch_number,
         dt_s=step_s,
-        held_column_mean_age_s={
+        mean_age_s_by_held_column={
             name: age_s for name, (_, age_s) in values_and_age.items() if age_s is not None
         },
         logged_failures=recording.logged_failures,
@@ -239,7 +239,7 @@ def _sampled_airspeed(
 ) -> Floats | None:
     """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
     column = recording.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
-    return None if column is None else values_at(column, t_s, step_s)[0]
+    return None if column is None else values_and_age_at(column, t_s, step_s)[0]
 
 
 def _sampled_energy_height_rate_mps(
@@ -253,7 +253,7 @@ def _sampled_energy_height_rate_mps(
     if len(logged_columns) < 2 or not all(len(column.t_s) > 1 for column in logged_columns):
         return None
     t_s, stretch_number, step_s = time_base
-    altitude, airspeed = (values_at(column, t_s, step_s)[0] for column in logged_columns)
+    altitude, airspeed = (values_and_age_at(column, t_s, step_s)[0] for column in logged_columns)
     return energy.energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
@@ -329,7 +329,7 @@ def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_colu
             )
 
 
-def _sample_times(
+def _time_base(
     flight_name: str, stamps: Floats, max_rate_hz: float
 ) -> tuple[Floats, NDArray[np.int64], float]:
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
@@ -352,7 +352,7 @@ def _sample_times(
         )
     if rate_hz <= 1.05 * max_rate_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
-    regular_times = _regular_times(stamps, 1.0 / max_rate_hz)
+    regular_times = _regular_time_base(stamps, 1.0 / max_rate_hz)
     if len(regular_times[0]) < _MIN_LOG_SAMPLES:
         raise BadInput(
             f"{flight_name}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are "
@@ -377,8 +377,8 @@ def _other_time_unit_hint(rate_hz: float) -> str:
     )
 
 
-def _regular_times(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
-    """Samples a step apart over each stretch of the log, from its first stamp on: as `_sample_times`."""
+def _regular_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
+    """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
     stretch_begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     stretch_end = np.append(stretch_begin[1:], len(stamps)) - 1
     n_samples = np.ceil((stamps[stretch_end] - stamps[stretch_begin]) / step_s + 0.5).astype(np.int64)
@@ -392,7 +392,7 @@ def _median_step_s(stamps: Floats) -> float:
     return float(np.median(np.diff(stamps[:_MIN_LOG_SAMPLES]))) if len(stamps) > 1 else float("inf")
 
 
-def values_at(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
+def values_and_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None

@@ -1,6 +1,6 @@
-"""A diagnosis against the log's own word: labels of effectiveness, or the time and surface of a failure.
+"""Compare a diagnosis with what the log states: labels of effectiveness, or time and surface of a failure.
 
-Used after the fact (`--score`, the benchmark, identification's own tests), never by the filter.
+Used after the diagnosis (`--score`, the benchmark, the tests of an identification), never by the filter.
 """
 
 from dataclasses import replace
@@ -8,19 +8,18 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.results import Document, Onset
-from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, DiagnosisRows
 from beaver_ftc_logs.recording import Floats, LoggedFailure
 from beaver_ftc_logs.samples import Samples
 
-ENGINE = "engine"
 _SIMULTANEOUS_FAILURE_SPAN_S = 2.0
 
 
 def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str]]) -> Document:
-    """Every figure that the log's own word allows: by labels where it has them, by its failure otherwise.
+    """All figures that the log allows: by its labels, or by its failure if it has no labels.
 
-    Of a log faster than its samples each row has the label of its last sample; a surface of which the log
-    says nothing is not judged.
+    Where the log has more rows than samples, each row is compared with the label of the last sample up to its
+    time. Surfaces without a label are left out.
     """
     is_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_labelled.any():
@@ -36,11 +35,11 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
 
 
 def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
-    """Against labelled effectiveness (n, S), on the rows where it is known.
+    """Scores against labelled effectiveness (n, S), on the rows in which every label is known.
 
-    classes: share of rows whose estimate is nearest to the true one of the label's own settings, those that
-    it takes for at least a hundredth of the flight, over all surfaces; side: whether the same surfaces are
-    faulty. Without a row in which every label is known, all figures are None.
+    A setting is a row of labels that makes up at least 0.5 % of the flight. classes: share of rows whose
+    estimate is nearest to the same setting as the label. side: share of rows in which the same surfaces are
+    below 1. Without such a row all figures are None.
     """
     is_known = np.isfinite(labels).all(axis=1)
     if not is_known.any():
@@ -55,8 +54,8 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
         "settings": frequent_settings.tolist(),
         "classes": float(
             np.mean(
-                nearest_label_setting(estimated_effectiveness, frequent_settings)
-                == nearest_label_setting(true_effectiveness, frequent_settings)
+                nearest_label_setting_index(estimated_effectiveness, frequent_settings)
+                == nearest_label_setting_index(true_effectiveness, frequent_settings)
             )
         ),
         "healthy_or_faulty": float(np.mean((rows.faulty[is_known] == 1) == is_truly_faulty)),
@@ -71,8 +70,8 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     }
 
 
-def nearest_label_setting(effectiveness: Floats, label_settings: Floats) -> np.ndarray:
-    """Index of the setting nearest to each row."""
+def nearest_label_setting_index(effectiveness: Floats, label_settings: Floats) -> np.ndarray:
+    """Index of the setting nearest to each row of effectiveness (n, S), (n,)."""
     squared_distance = ((effectiveness[:, None, :] - label_settings[None, :, :]) ** 2).sum(axis=2)
     return np.asarray(squared_distance.argmin(axis=1))
 
@@ -80,7 +79,8 @@ def nearest_label_setting(effectiveness: Floats, label_settings: Floats) -> np.n
 def score_against_failures(
     rows: DiagnosisRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
 ) -> Document:
-    """Against the first failure the log tells of: alarms before it are false, those after it are late by."""
+    """Scores against the first failure in the log: alarms before it are false, the first one after it has the
+    delay delay_s."""
     first_failure_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
     surfaces = sorted(
@@ -118,7 +118,8 @@ def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray
 def _is_right_group(
     name_shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
-    """Whether the name held longest after the failure is of the group that failed; None: nothing to judge."""
+    """Whether the most frequent name after the failure is a group that failed; None without a failure or
+    name."""
     name_endings = tuple(f"_{surface}" for surface in surfaces)
     failed_groups = {
         index
@@ -126,7 +127,7 @@ def _is_right_group(
         for name in group
         if name in surfaces or name.endswith(name_endings)
     }
-    names = {name: share for name, share in name_shares.items() if name != "unknown"}
+    names = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
     if not failed_groups or not names:
         return None
     longest_name = set(max(names, key=lambda name: names[name]).split("+"))

@@ -1,7 +1,7 @@
-"""Whether a logged signal lives: how long it has stood still, whether it is clipped, where it jumps.
+"""Checks of a logged signal: how long it has been constant, whether it is clipped, where it has spikes.
 
-A measured quantity never repeats for long to the last bit. A command may: for how long, the flights say that
-a model was fitted to.
+A measured quantity does not repeat for long to the last bit. A command may: the flights that a model was
+fitted to show for how long.
 """
 
 import numpy as np
@@ -27,12 +27,14 @@ def time_since_change_s(column: Column) -> Floats:
 
 
 def _differs_from_previous(values: Floats) -> Mask:
-    """Rows whose value is another than the row's before, the first among them; what is no number moves."""
+    """Rows (n,) whose value differs from that of the row before. The first row and each row without a number
+    count as different."""
     return np.concatenate([[True], values[1:] != values[:-1]])[: len(values)]
 
 
 def is_clipped(values: Floats) -> Mask:
-    """Rows at the largest value seen so far, either way, that stands for three rows and was met ten times.
+    """Rows (n,) at the largest value so far, of either sign, if it has lasted for three rows and has been
+    reached in ten rows.
 
     Uses nothing later than the row.
     """
@@ -44,10 +46,10 @@ def is_clipped(values: Floats) -> Mask:
         at_maximum_since = np.maximum.accumulate(
             np.where(_differs_from_previous(signed_values) | ~is_at_maximum, row_index, 0)
         )
-        level = np.cumsum(
+        maximum_number = np.cumsum(
             _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
-        n_met = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(is_at_maximum, level)
+        n_met = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(is_at_maximum, maximum_number)
         clipped |= (
             is_at_maximum
             & (row_index - at_maximum_since >= _MIN_CLIPPED_ROWS - 1)
@@ -56,19 +58,23 @@ def is_clipped(values: Floats) -> Mask:
     return clipped
 
 
-def _count_rows_at_previous_maxima(is_at_maximum: Mask, level: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Count the rows at the largest value before the present one was reached."""
+def _count_rows_at_previous_maxima(
+    is_at_maximum: Mask, maximum_number: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Count, for each row, the rows at smaller largest values: those before the present largest value was
+    reached. maximum_number (n,): number of the present largest value, counted from 1."""
     n_at_maximum = np.cumsum(is_at_maximum)
-    first_rows = np.flatnonzero(np.diff(level, prepend=0))
+    first_rows = np.flatnonzero(np.diff(maximum_number, prepend=0))
     return (
-        (n_at_maximum - is_at_maximum)[first_rows][level - 1]
+        (n_at_maximum - is_at_maximum)[first_rows][maximum_number - 1]
         if len(first_rows)
-        else np.zeros(len(level), dtype=np.int64)
+        else np.zeros(len(maximum_number), dtype=np.int64)
     )
 
 
 def find_spike_rows(values: Floats) -> NDArray[np.int64]:
-    """Single rows that leave the signal by 40 times its usual step and come back, where these are few."""
+    """Indices of single rows that differ from both neighbours by more than 40 times the usual step; none if
+    they are more than 1 % of the rows."""
     finite_rows = np.flatnonzero(np.isfinite(values))
     if len(finite_rows) < MIN_STILL_ROWS:
         return finite_rows[:0]

@@ -1,9 +1,9 @@
-"""A recorded flight through the diagnosis of the loop, sample by sample: its verdicts, and what they say of
+"""Step the diagnosis of the control loop through a recorded flight; from its verdicts, the effectiveness of
 each surface.
 
-theta in [-1, 0] of a loss explains a frame if |nu_i - theta Z_i| <= eta_bar_i on every axis: as in
-diagnosis/isolation.py. Where one surface alone is at fault, and its effectiveness stands for a
-second, it is in the intersection of that second's sets.
+A loss theta in [-1, 0] explains a frame if |nu_i - theta Z_i| <= eta_bar_i on every axis, as in
+diagnosis/isolation.py. If one surface alone is at fault and its effectiveness is constant for a second, its
+theta is in the intersection of the sets of that second's frames.
 """
 
 from collections.abc import Sequence
@@ -27,13 +27,15 @@ _DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between sampl
 
 @dataclass(frozen=True)
 class ReplayedVerdicts:
-    """verdicts, one a sample; effectiveness_low and effectiveness_high (n, S) of each surface if it alone is
-    at fault; command_gain_upper_bounds (S,): of what each command does at most as much as this in all of it,
-    1 where it is too short."""
+    """The verdicts of a stretch, one for each sample.
+
+    single_fault_effectiveness_low and single_fault_effectiveness_high (n, S): bounds on the effectiveness of
+    each surface if it alone is at fault. command_gain_upper_bounds (S,): upper bound of the measured effect
+    of each command over the expected one, the largest of all parts of the stretch; 1 if it is too short."""
 
     verdicts: list[Verdict]
-    effectiveness_low: Floats
-    effectiveness_high: Floats
+    single_fault_effectiveness_low: Floats
+    single_fault_effectiveness_high: Floats
     command_gain_upper_bounds: Floats
 
 
@@ -82,8 +84,8 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
 
 
 def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> Floats:
-    """Gains as in `ReplayedVerdicts`, from the rates' innovation (n, 3) and the expected effect of each
-    surface, (n, 3, S)."""
+    """The upper bounds (S,) of `ReplayedVerdicts`, from the innovation of the rates (n, 3) and the expected
+    effect of each surface (n, 3, S)."""
     finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
     if (parts := split_into_flight_parts(finite_rows)) is None:
         return np.ones(expected_effect.shape[2])
@@ -121,7 +123,7 @@ def _bounds_of_explaining_losses(
 
 
 def _sliding_maximum(values: Floats, window_samples: int) -> Floats:
-    """The greatest of each sample's own and the `window_samples - 1` values before it, by column."""
+    """For each column the maximum over each sample and the `window_samples - 1` samples before it."""
     from scipy.ndimage import maximum_filter1d
 
     padded = np.concatenate([np.full((window_samples - 1, values.shape[1]), -np.inf), values])
@@ -135,9 +137,9 @@ def rows_of_replay(
     """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replayed.verdicts])
     estimate, low, high = (
-        np.ones_like(replayed.effectiveness_low),
-        np.zeros_like(replayed.effectiveness_low),
-        np.ones_like(replayed.effectiveness_low),
+        np.ones_like(replayed.single_fault_effectiveness_low),
+        np.zeros_like(replayed.single_fault_effectiveness_low),
+        np.ones_like(replayed.single_fault_effectiveness_low),
     )
     gives_bounds = fdi_config.is_ours and not fdi_config.pairs
     for k, verdict in enumerate(replayed.verdicts):
@@ -145,7 +147,7 @@ def rows_of_replay(
             _fill_effectiveness_bounds(
                 verdict,
                 surfaces,
-                (replayed.effectiveness_low[k], replayed.effectiveness_high[k]),
+                (replayed.single_fault_effectiveness_low[k], replayed.single_fault_effectiveness_high[k]),
                 low[k],
                 high[k],
             )
@@ -173,8 +175,8 @@ def _fill_effectiveness_bounds(
     low: Floats,
     high: Floats,
 ) -> None:
-    """Fill the bounds (S,) of one row, which are 0 and 1 where nothing is said. single_fault_bounds: as in
-    `ReplayedVerdicts`."""
+    """Fill the bounds low and high (S,) of one row, which are given as 0 and 1. single_fault_bounds: low and
+    high (S,) of `ReplayedVerdicts`."""
     if not verdict.detected:
         low[:] = single_fault_bounds[0]
     elif verdict.isolated in surfaces:

@@ -18,22 +18,22 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
+from beaver_ftc_logs.column_mistakes import logs_with_one_mistake_corrected
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.readings import corrected_readings
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 
 Mask = NDArray[np.bool_]
 
-_RANGE_MARGIN = 0.5
+_RANGE_MARGIN_SHARE = 0.5
 """Share of its span by which a range is passed before a row is outside."""
-_AIRSPEED_MARGIN = 0.15
+_AIRSPEED_MARGIN_SHARE = 0.15
 _RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
-_UNCHANGED_TIME_FACTOR = 3.0
+_MAX_UNCHANGED_TIME_FACTOR = 3.0
 _MISREAD_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
-_CLIPPED_MEMORY_S = 30.0
+_DISTRUST_AFTER_CLIPPING_S = 30.0
 _MIN_EFFECT_NOISE_POWER_RATIO = 1e-6
 _MAX_EXPLAINED_SHARE, _MAX_EFFECT_NOISE_POWER_RATIO = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
@@ -65,14 +65,14 @@ def fitted_ranges(
     ]
     group_commands = np.column_stack([commands[:, group].sum(axis=1) for group in groups])
     return FittedRanges(
-        commands=central_range(commands),
-        rates=central_range(rates),
-        airspeed=central_range(np.concatenate(known_airspeeds)[:, None])[0] if known_airspeeds else None,
+        commands=central_ranges(commands),
+        rates=central_ranges(rates),
+        airspeed=central_ranges(np.concatenate(known_airspeeds)[:, None])[0] if known_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        correlation=_column_correlation(group_commands).tolist(),
+        correlation=_correlation_matrix(group_commands).tolist(),
         tied=effect_share_explained_by_others(flights, model).tolist(),
         gain_sd=gain_standard_error.tolist(),
-        still_s=_longest_unchanged_times_s(flights),
+        still_s=_longest_unchanged_time_s_by_column(flights),
         scale=noise_variance_scale,
         energy_climb=_unpowered_energy_height_rate_mps(flights),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
@@ -91,7 +91,7 @@ def _unpowered_energy_height_rate_mps(flights: Sequence[tuple[Samples, Mask]]) -
     return float(np.quantile(values, energy.UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE)) if values.size else None
 
 
-def central_range(values: Floats) -> list[list[float]]:
+def central_ranges(values: Floats) -> list[list[float]]:
     """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
     if not values.shape[1]:
         return []
@@ -99,13 +99,13 @@ def central_range(values: Floats) -> list[list[float]]:
     return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
-def _column_correlation(values: Floats) -> Floats:
+def _correlation_matrix(values: Floats) -> Floats:
     centred = np.nan_to_num(values - np.nanmean(values, axis=0))
     size = np.sqrt((centred**2).sum(axis=0))
     return np.asarray(centred.T @ centred / np.maximum(np.outer(size, size), MIN_DIVISOR))
 
 
-def _longest_unchanged_times_s(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+def _longest_unchanged_time_s_by_column(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
     names = dict.fromkeys(name for samples, _ in flights for name in samples.time_since_change_s)
     return {
         name: max(
@@ -260,7 +260,7 @@ def check_command_units(
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    rate_width_ratios = _range_widths(central_range(rates)) / np.maximum(
+    rate_width_ratios = _range_widths(central_ranges(rates)) / np.maximum(
         _range_widths(fitted.rate_ranges_rad_s), MIN_DIVISOR
     )
     move_rates_alike = (
@@ -268,7 +268,7 @@ def check_command_units(
         and rate_width_ratios.max() < _ALIKE_MOTION_FACTOR
     )
     max_ratio = _OTHER_UNIT_FACTOR * (1.0 if move_rates_alike else max(rate_width_ratios.max(), 1.0))
-    command_width_ratios = _range_widths(central_range(commands)) / np.maximum(
+    command_width_ratios = _range_widths(central_ranges(commands)) / np.maximum(
         _range_widths(fitted.command_ranges), MIN_DIVISOR
     )
     for surface, ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
@@ -282,7 +282,7 @@ def check_command_units(
             )
 
 
-class _FlightPartGains(NamedTuple):
+class _GainBoundsOverFlight(NamedTuple):
     """Answers in all parts of a flight: at most, and at least, how much of the model's answer to each group's
     command, (G,), and at most to each column, by its name, there is; the least scale of the noise; and the
     log likelihood of a sample of each part, (4,), but for what all colours have alike."""
@@ -304,45 +304,47 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     knows the effect of no surface says nothing of any flight, and refuses none."""
     if not any(is_group_effect_known(model)):
         return
-    whitened_readings = [
+    whitened_flights = [
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
     compared = [
         (one, found)
-        for one in whitened_readings or [(samples, model)]
-        if (found := _part_log_likelihoods(*one))
+        for one in whitened_flights or [(samples, model)]
+        if (found := _log_likelihood_by_flight_part(*one))
     ]
     if not compared:
         return
     flight, likeliest_model = max(compared, key=lambda one: one[1][0].mean())[0]
-    part_gains = _bound_gains_over_flight_parts(flight, likeliest_model)
-    if part_gains is None:
+    gain_bounds = _bound_gains_over_flight_parts(flight, likeliest_model)
+    if gain_bounds is None:
         return
-    mistakes = _column_mistakes(samples, model, part_gains)
+    mistakes = _column_mistake_texts(samples, model, gain_bounds)
     for noise_ma_coefficients in NOISE_MA_CANDIDATES if mistakes else ():
         other_gains = _bound_gains_over_flight_parts(whiten_samples(samples, noise_ma_coefficients), model)
         if (
             other_gains is not None
-            and other_gains.log_likelihood_by_part.mean() > part_gains.log_likelihood_by_part.mean()
+            and other_gains.log_likelihood_by_part.mean() > gain_bounds.log_likelihood_by_part.mean()
         ):
-            other_mistakes = _column_mistakes(samples, model, other_gains)
+            other_mistakes = _column_mistake_texts(samples, model, other_gains)
             mistakes = {what: says for what, says in mistakes.items() if what in other_mistakes}
-    says = next(iter(mistakes.values()), None) or _likelier_column_mistake(flight, likeliest_model)
+    says = next(iter(mistakes.values()), None) or _likelier_column_mistake_text(flight, likeliest_model)
     if says is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {says}, {allowed}")
 
 
-def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGains) -> dict[str, str]:
+def _column_mistake_texts(
+    samples: Samples, model: Model, gain_bounds: _GainBoundsOverFlight
+) -> dict[str, str]:
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
     mistakes, gain_known = {}, is_group_gain_known(model)
     for group, has_known_gain, max_gain, min_gain in zip(
         model.groups,
         gain_known,
-        part_gains.group_gain_upper_bounds,
-        part_gains.group_gain_lower_bounds,
+        gain_bounds.group_gain_upper_bounds,
+        gain_bounds.group_gain_lower_bounds,
         strict=True,
     ):
         name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
@@ -365,7 +367,7 @@ def _column_mistakes(samples: Samples, model: Model, part_gains: _FlightPartGain
             mistakes[f"unit {name}"] = f"{command} {motion_text} model, and {effect_text}{_COMMAND_UNIT_HINT}"
     if odd_columns := [
         name
-        for name, share in part_gains.column_gain_upper_bounds.items()
+        for name, share in gain_bounds.column_gain_upper_bounds.items()
         if share < _min_plausible_column_gain(model, name)
     ]:
         says = (
@@ -379,7 +381,7 @@ def _min_plausible_column_gain(model: Model, column_name: str) -> float:
     """The gain of what the rates answer to a column below which it is another: below what the model's error
     explains; none where that may be all of it."""
     gain_sd = (
-        model.fitted_ranges.column_gain_standard_error.get(column_name, 0.0)
+        model.fitted_ranges.gain_standard_error_by_column.get(column_name, 0.0)
         if model.fitted_ranges is not None
         else 0.0
     )
@@ -387,7 +389,7 @@ def _min_plausible_column_gain(model: Model, column_name: str) -> float:
     return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
 
 
-def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
+def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
@@ -416,14 +418,16 @@ def _likelier_column_mistake(samples: Samples, model: Model) -> str | None:
 def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
-    corrected = list(corrected_readings(samples, model.vehicle, surfaces_of_unknown_effect(model)))
-    log_likelihood = _part_log_likelihoods(samples, model)
+    corrected = list(
+        logs_with_one_mistake_corrected(samples, model.vehicle, surfaces_of_unknown_effect(model))
+    )
+    log_likelihood = _log_likelihood_by_flight_part(samples, model)
     if log_likelihood is None:
         return {}, 0.0
     part_likelihoods, n_part_samples = log_likelihood
     gain_of_mistake = {}
     for correction in corrected:
-        corrected_likelihood = _part_log_likelihoods(correction.samples, model)
+        corrected_likelihood = _log_likelihood_by_flight_part(correction.samples, model)
         gain_of_mistake[correction.correction_text] = (
             -np.inf
             if corrected_likelihood is None
@@ -432,9 +436,10 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
     return gain_of_mistake, n_part_samples
 
 
-def _part_log_likelihoods(samples: Samples, model: Model) -> tuple[Floats, float] | None:
-    """Log likelihood of a sample of each part, as in `_FlightPartGains`, and as how many white samples a part
-    counts; of a long flight every k-th sample is taken. None where a part is too short."""
+def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+    """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
+    number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
+    short."""
     whitening, effective_sample_share, log_noise_size = _flight_noise_whitening(samples, model)
     is_predictable, unexplained, responses = regression.whitened_rates_and_responses(samples, model)
     rows = np.flatnonzero(is_predictable)
@@ -483,7 +488,7 @@ def _noise_variance_scale(squared_residual: Floats) -> float:
     return float(np.median(squared_residual.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI_SQUARE_3)
 
 
-def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _FlightPartGains | None:
+def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:
     """None where a part is too short."""
     is_predictable, unexplained, responses = regression.whitened_rates_and_responses(samples, model)
     if (parts := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
@@ -521,7 +526,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _FlightPar
             column_gain_upper_bounds, 1.0 + column_gain[3 + n_groups :]
         )  # what the past does is taken off already
         noise_scales.append(_noise_variance_scale(squared_residual))
-    return _FlightPartGains(
+    return _GainBoundsOverFlight(
         max_gains.tolist(),
         min_gains.tolist(),
         dict(zip(names, column_gain_upper_bounds.tolist(), strict=True)),
@@ -535,7 +540,7 @@ def _relative_command_motion(samples: Samples, model: Model, group: list[str]) -
     not known."""
     if model.fitted_ranges is None or not model.fitted_ranges.command_ranges:
         return 0.0
-    width_ratios = _range_widths(central_range(samples.commands)) / np.maximum(
+    width_ratios = _range_widths(central_ranges(samples.commands)) / np.maximum(
         _range_widths(model.fitted_ranges.command_ranges), MIN_DIVISOR
     )
     return max(float(width_ratios[list(model.vehicle.surfaces).index(name)]) for name in group)
@@ -574,33 +579,37 @@ def _range_widths(ranges: Sequence[Sequence[float]]) -> Floats:
 def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows that are not credible, by reason."""
     reasons: dict[str, Mask] = {}
-    for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
+    for name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
         reasons[f"{name} stands still, for longer than {max_unchanged_time_s:.3g} s"] = (
             samples.time_since_change_s[name] > max_unchanged_time_s
         )
     if samples.is_rate_clipped is not None:
-        reasons[f"a rate was clipped in the last {_CLIPPED_MEMORY_S:g} s"] = _was_clipped_recently(
+        reasons[f"a rate was clipped in the last {_DISTRUST_AFTER_CLIPPING_S:g} s"] = _was_clipped_recently(
             samples.is_rate_clipped, samples.dt_s
         )
     if model.fitted_ranges is None:
         return _drop_empty_reasons(reasons)
-    return _drop_empty_reasons(reasons | _rows_out_of_fitted_ranges(samples, model, model.fitted_ranges))
+    return _drop_empty_reasons(
+        reasons | _rows_out_of_fitted_ranges_by_reason(samples, model, model.fitted_ranges)
+    )
 
 
 def _was_clipped_recently(is_clipped: Mask, dt_s: float) -> Mask:
     """Whether a condition held in the last half minute."""
     row_index = np.arange(len(is_clipped))
     rows_since = row_index - np.maximum.accumulate(
-        np.where(is_clipped, row_index, -len(is_clipped) - round(_CLIPPED_MEMORY_S / dt_s))
+        np.where(is_clipped, row_index, -len(is_clipped) - round(_DISTRUST_AFTER_CLIPPING_S / dt_s))
     )
-    return np.asarray(rows_since * dt_s <= _CLIPPED_MEMORY_S)
+    return np.asarray(rows_since * dt_s <= _DISTRUST_AFTER_CLIPPING_S)
 
 
 def _drop_empty_reasons(reasons: dict[str, Mask]) -> dict[str, Mask]:
     return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
-def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRanges) -> dict[str, Mask]:
+def _rows_out_of_fitted_ranges_by_reason(
+    samples: Samples, model: Model, fitted: FittedRanges
+) -> dict[str, Mask]:
     names = [f"command of {surface}" for surface in model.vehicle.surfaces]
     columns = [
         *zip(names, samples.commands.T, fitted.command_ranges, strict=False),
@@ -608,14 +617,14 @@ def _rows_out_of_fitted_ranges(samples: Samples, model: Model, fitted: FittedRan
     ]
     reasons = {}
     for name, values, (low, high) in columns:
-        margin = _RANGE_MARGIN * (high - low) + MIN_DIVISOR
+        margin = _RANGE_MARGIN_SHARE * (high - low) + MIN_DIVISOR
         reasons[_outside_range_text(name, low, high)] = _mostly_true_recently(
             ~_is_within(values, low - margin, high + margin), samples
         )
     if fitted.airspeed_range_mps is not None and samples.airspeed is not None:
         low, high = fitted.airspeed_range_mps
         is_outside = ~_is_within(
-            samples.airspeed, (1.0 - _AIRSPEED_MARGIN) * low, (1.0 + _AIRSPEED_MARGIN) * high
+            samples.airspeed, (1.0 - _AIRSPEED_MARGIN_SHARE) * low, (1.0 + _AIRSPEED_MARGIN_SHARE) * high
         )
         reasons[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(is_outside, samples)
     return reasons
@@ -641,10 +650,12 @@ def _rate_column_names(model: Model) -> list[str]:
     return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
 
 
-def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
+def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
-    fitted_unchanged_time_s = model.fitted_ranges.longest_unchanged_time_s if model.fitted_ranges else {}
+    fitted_unchanged_time_s = (
+        model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
+    )
     usual_unchanged_time_s = {
         name: 0.0 if name in _rate_column_names(model) else np.inf for name in samples.time_since_change_s
     } | fitted_unchanged_time_s
@@ -655,7 +666,7 @@ def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
         for name in usual_unchanged_time_s
     }
     return {
-        name: max(min_unchanged_time_s[name], _UNCHANGED_TIME_FACTOR * usual_unchanged_time_s[name])
+        name: max(min_unchanged_time_s[name], _MAX_UNCHANGED_TIME_FACTOR * usual_unchanged_time_s[name])
         for name in samples.time_since_change_s
     }
 
@@ -663,7 +674,7 @@ def _max_unchanged_time_s(samples: Samples, model: Model) -> dict[str, float]:
 def is_frozen_or_clipped_sample(samples: Samples, model: Model) -> Mask:
     """Samples with a signal that does not live: what the filter is not to learn from."""
     is_dead = np.zeros(len(samples.t_s), dtype=bool)
-    for name, max_unchanged_time_s in _max_unchanged_time_s(samples, model).items():
+    for name, max_unchanged_time_s in _max_unchanged_time_s_by_column(samples, model).items():
         is_dead |= samples.time_since_change_s[name] > max_unchanged_time_s
     return is_dead if samples.is_rate_clipped is None else is_dead | samples.is_rate_clipped
 

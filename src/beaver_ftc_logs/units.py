@@ -8,7 +8,7 @@ RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
     "rate", "angle", "speed", "acceleration", "length", "share", "time",
 )  # fmt: skip
 _RAD_PER_DEG = pi / 180.0
-UNITS: dict[str, tuple[str, float]] = {
+KIND_AND_SI_FACTOR_OF_UNIT: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),
     "mrad/s": (RATE, 1e-3),
     "rad": (ANGLE, 1.0), "deg": (ANGLE, _RAD_PER_DEG), "cdeg": (ANGLE, 0.01 * _RAD_PER_DEG),
@@ -27,11 +27,14 @@ SECONDS_PER_TIME_UNIT = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 def units_of_kind(kind: str) -> list[str]:
     """The units of one kind, the SI unit first."""
-    return [name for name, (unit_kind, _) in UNITS.items() if unit_kind == kind]
+    return [name for name, (unit_kind, _) in KIND_AND_SI_FACTOR_OF_UNIT.items() if unit_kind == kind]
 
 
 def nearest_unit(kind: str, factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratios = {name: max(factor / UNITS[name][1], UNITS[name][1] / factor) for name in units_of_kind(kind)}
+    ratios = {
+        name: max(factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / factor)
+        for name in units_of_kind(kind)
+    }
     best = min(ratios, key=lambda name: ratios[name])
     return best if ratios[best] <= max_ratio else None

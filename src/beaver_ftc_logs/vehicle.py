@@ -28,16 +28,16 @@ from beaver_ftc.scenario import looks_like_a_path
 from beaver_ftc_logs.units import (
     ACCELERATION,
     ANGLE,
+    KIND_AND_SI_FACTOR_OF_UNIT,
     LENGTH,
     RATE,
     SECONDS_PER_TIME_UNIT,
     SPEED,
-    UNITS,
     units_of_kind,
 )
 
 _MAX_FILE_BYTES = 1_000_000
-MAX_FALSE_ALARMS_PER_HOUR = 1000.0
+MAX_SETTABLE_FALSE_ALARMS_PER_HOUR = 1000.0
 _DEFAULT_MAX_RATE_HZ, _OTHER_LAWS_MAX_RATE_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
@@ -47,13 +47,13 @@ ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
 
 
-class Quantity(Section):
+class QuantityColumn(Section):
     """A column of the log. Its value in the given unit is scale times the number in the log, plus offset. If
     a column has its SI unit, its name alone can be written instead of this section.
     """
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
-    unit: Literal[tuple(UNITS)] | None = Field(  # type: ignore[valid-type]
+    unit: Literal[tuple(KIND_AND_SI_FACTOR_OF_UNIT)] | None = Field(  # type: ignore[valid-type]
         default=None, description="unit of the numbers; left out: the SI unit", examples=["deg/s"]
     )
     scale: Number = number(
@@ -68,7 +68,7 @@ class Quantity(Section):
     )
 
     @model_validator(mode="after")
-    def _check_scale_not_zero(self) -> "Quantity":
+    def _check_scale_not_zero(self) -> "QuantityColumn":
         refuse(
             [(("scale",), "0 leaves nothing of the column, allowed: any other number")] * (self.scale == 0)
         )
@@ -83,7 +83,7 @@ class Quantity(Section):
     @property
     def si_factor(self) -> float:
         """Return the factor from the column's numbers to SI."""
-        return self.scale * (UNITS[self.unit][1] if self.unit else 1.0)
+        return self.scale * (KIND_AND_SI_FACTOR_OF_UNIT[self.unit][1] if self.unit else 1.0)
 
     def to_si(self, values: Any) -> Any:
         """The column's numbers in SI."""
@@ -96,10 +96,10 @@ def _expand_column_name(given: Any) -> Any:
     return {"column": given} if isinstance(given, str) else given
 
 
-LoggedQuantity = Annotated[Quantity, BeforeValidator(_expand_column_name)]
+QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
 
 
-class Time(Section):
+class TimeColumn(Section):
     """The column of a table with the time."""
 
     column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
@@ -108,32 +108,34 @@ class Time(Section):
     )
 
 
-class Rates(Section):
+class RateColumns(Section):
     """The columns of the three body rates, rad/s."""
 
-    p: LoggedQuantity = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
-    q: LoggedQuantity = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
-    r: LoggedQuantity = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
+    p: QuantityColumnOrName = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
+    q: QuantityColumnOrName = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
+    r: QuantityColumnOrName = Field(description="column of the yaw rate, rad/s", examples=["r_rad_s"])
 
 
-class Attitude(Section):
+class AttitudeColumns(Section):
     """Columns of the attitude. The body rates are checked against them. In turbulence `diagnose --aircraft`
     requires them."""
 
-    roll: LoggedQuantity = Field(description="column of the roll angle, rad", examples=["roll_rad"])
-    pitch: LoggedQuantity | None = Field(
+    roll: QuantityColumnOrName = Field(description="column of the roll angle, rad", examples=["roll_rad"])
+    pitch: QuantityColumnOrName | None = Field(
         default=None, description="column of the pitch angle, rad", examples=["pitch_rad"]
     )
-    yaw: LoggedQuantity | None = Field(
+    yaw: QuantityColumnOrName | None = Field(
         default=None, description="column of the yaw angle, rad", examples=["yaw_rad"]
     )
 
 
-class Energy(Section):
+class EnergyColumns(Section):
     """Columns that show an engine failure: altitude and airspeed fall together."""
 
-    altitude: LoggedQuantity = Field(description="column of the altitude, m", examples=["altitude_m"])
-    airspeed: LoggedQuantity = Field(description="column of the airspeed, m/s", examples=["airspeed_m_s"])
+    altitude: QuantityColumnOrName = Field(description="column of the altitude, m", examples=["altitude_m"])
+    airspeed: QuantityColumnOrName = Field(
+        description="column of the airspeed, m/s", examples=["airspeed_m_s"]
+    )
 
 
 class Vehicle(Section):
@@ -143,17 +145,17 @@ class Vehicle(Section):
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
         default=None, description="format of the logs, if the path does not show it"
     )
-    time: Time | None = Field(
+    time: TimeColumn | None = Field(
         default=None, description="column with the time, in a table without the column `t_s`"
     )
-    rates: Rates
-    commands: list[LoggedQuantity] = Field(
+    rates: RateColumns
+    commands: list[QuantityColumnOrName] = Field(
         min_length=1,
         max_length=20,
         description="columns of the commands, recorded before any part that can fail",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
-    signals: list[LoggedQuantity] = Field(
+    signals: list[QuantityColumnOrName] = Field(
         default=[],
         max_length=12,
         description="further measured columns on which the rates depend",
@@ -166,33 +168,33 @@ class Vehicle(Section):
         json_schema_extra={"unit": "share of 1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
     )
-    labels: dict[str, LoggedQuantity] = Field(
+    labels: dict[str, QuantityColumnOrName] = Field(
         default={},
         description="columns with the true effectiveness of each surface, which is 1 if the surface is "
         "healthy. `identify` and `diagnose --score` read them",
         examples=[{"left": "left_truth"}],
     )
-    attitude: Attitude | None = Field(
+    attitude: AttitudeColumns | None = Field(
         default=None, description="columns of the attitude. The body rates are checked against them"
     )
-    acceleration: LoggedQuantity | None = Field(
+    acceleration: QuantityColumnOrName | None = Field(
         default=None,
         description="column of the specific force along the z axis, in either sign. The median of its "
         "magnitude is about 1 g, m/s2",
         examples=["az_m_s2"],
     )
-    airspeed: LoggedQuantity | None = Field(
+    airspeed: QuantityColumnOrName | None = Field(
         default=None,
         description="column of the airspeed. The model is valid only in the range of airspeeds that the fit "
         "used, m/s",
         examples=["airspeed_m_s"],
     )
-    energy: Energy | None = Field(
+    energy: EnergyColumns | None = Field(
         default=None,
         description="columns of altitude and airspeed. They prevent an engine failure from being named as a "
         "surface",
     )
-    flow: dict[str, LoggedQuantity] = Field(
+    flow: dict[str, QuantityColumnOrName] = Field(
         default={},
         description="columns of further inputs for `diagnose --aircraft`. The names are those of the "
         "aircraft file",
@@ -219,7 +221,7 @@ class Vehicle(Section):
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
-    outputs: dict[str, LoggedQuantity] = Field(
+    outputs: dict[str, QuantityColumnOrName] = Field(
         default={},
         description="columns of the servo outputs. Only the freeze rule, a published detector in "
         "`compare --flights`, uses them",
@@ -228,7 +230,7 @@ class Vehicle(Section):
     false_alarms_per_hour: Number | None = number(
         None,
         gt=0,
-        le=MAX_FALSE_ALARMS_PER_HOUR,
+        le=MAX_SETTABLE_FALSE_ALARMS_PER_HOUR,
         unit="1/h",
         says="accepted number of false alarms in each hour of healthy flight; left out: 1, if the logs have "
         "no labels",
@@ -267,9 +269,9 @@ class Vehicle(Section):
     def _check_keys_agree(self) -> "Vehicle":
         says = "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
         bad_names = [name for name in self.surfaces if not _VEHICLE_NAME_PATTERN.fullmatch(name)]
-        conflicts: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad_names]
+        file_mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad_names]
         for surface, command_shares in self.surfaces.items():
-            conflicts += _unknown_name_conflicts(
+            file_mistakes += _unknown_name_mistakes(
                 ("surfaces", surface), command_shares, "command", self.command_columns
             )
         tables_by_surface: dict[str, Collection[str]] = {
@@ -279,18 +281,18 @@ class Vehicle(Section):
             "airspeed_powers": self.airspeed_powers,
         }
         for key, table in tables_by_surface.items():
-            conflicts += _unknown_name_conflicts((key,), table, "surface", self.surfaces)
+            file_mistakes += _unknown_name_mistakes((key,), table, "surface", self.surfaces)
         for location, kind, one in self.quantities_of_known_kind():
-            if one.unit is not None and UNITS[one.unit][0] != kind:
+            if one.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[one.unit][0] != kind:
                 says = f"{one.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
-                conflicts.append(((*location, "unit"), says))
-        conflicts += self._duplicate_column_conflicts()
-        refuse(conflicts)
+                file_mistakes.append(((*location, "unit"), says))
+        file_mistakes += self._columns_read_in_two_ways()
+        refuse(file_mistakes)
         return self
 
-    def quantities_of_known_kind(self) -> list[tuple[Location, str, Quantity]]:
+    def quantities_of_known_kind(self) -> list[tuple[Location, str, QuantityColumn]]:
         """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        quantities: list[tuple[Location, str, Quantity]] = [
+        quantities: list[tuple[Location, str, QuantityColumn]] = [
             (("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"
         ]
         if self.attitude is not None:
@@ -310,22 +312,24 @@ class Vehicle(Section):
                 quantities.append((("flow", name), ANGLE, self.flow[name]))
         return quantities
 
-    def _duplicate_column_conflicts(self) -> list[Conflict]:
+    def _columns_read_in_two_ways(self) -> list[Conflict]:
         """One column read in two ways."""
-        first_quantity: dict[str, Quantity] = {}
+        first_quantity_of_column: dict[str, QuantityColumn] = {}
         for location, one in [
             *self.model_quantities(),
             *((location, one) for location, _, one in self.quantities_of_known_kind()),
         ]:
-            if first_quantity.setdefault(one.column, one) != one:
+            if first_quantity_of_column.setdefault(one.column, one) != one:
                 return [
                     (location, f"{one.column!r} is read in two ways, allowed: one unit, scale and offset")
                 ]
         return []
 
-    def model_quantities(self) -> list[tuple[Location, Quantity]]:
+    def model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
-        quantities: list[tuple[Location, Quantity]] = [(("rates", x), getattr(self.rates, x)) for x in "pqr"]
+        quantities: list[tuple[Location, QuantityColumn]] = [
+            (("rates", x), getattr(self.rates, x)) for x in "pqr"
+        ]
         quantities += [(("commands", i), one) for i, one in enumerate(self.commands)]
         return quantities + [(("signals", i), one) for i, one in enumerate(self.signals)]
 
@@ -374,10 +378,10 @@ class Vehicle(Section):
         return list(dict.fromkeys(one.column for one in quantities))
 
 
-def _unknown_name_conflicts(
+def _unknown_name_mistakes(
     location: Location, names: Iterable[str], name_kind: str, known: Collection[str]
 ) -> list[Conflict]:
-    """The conflicts of names below a location that are not known."""
+    """One mistake for each name below a location that is not known."""
     unknown = [name for name in names if name not in known]
     return [((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known)}") for name in unknown]
 
@@ -412,7 +416,7 @@ def load_vehicle(path_or_name: str | Path) -> Vehicle:
 
 def with_false_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
     """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
-    if not 0.0 < false_alarms_per_hour <= MAX_FALSE_ALARMS_PER_HOUR:
-        says = f"allowed: more than 0, up to {MAX_FALSE_ALARMS_PER_HOUR:g} an hour"
+    if not 0.0 < false_alarms_per_hour <= MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:
+        says = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
         raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {says}")
     return vehicle.model_copy(update={"false_alarms_per_hour": false_alarms_per_hour})

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, rows_in_time_order
+from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, rows_with_increasing_time
 
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"
 _GYRO_TOPIC = "mavros-imu-data_raw"
-_FAILURE_STATUS_PREFIX = "failure_status-"
+_FAILURE_TOPIC_PREFIX = "failure_status-"
 
 TopicTable = dict[str, Floats]
 
@@ -56,7 +56,7 @@ def read(path: Path) -> RecordedFlight:
     topics = dict(_read_topic_tables(path))
     if _GYRO_TOPIC not in topics:
         raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
-    ordered = {topic: rows_in_time_order(topic, table[_TIME_FIELD]) for topic, table in topics.items()}
+    ordered = {topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()}
     origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][ordered[_GYRO_TOPIC][0][0]])
     columns = dict(_read_columns(topics, ordered, origin_ns))
     _add_attitude_errors(columns)
@@ -69,18 +69,20 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
     wanted = {topic for topic, _, _ in _load_column_and_failure_topics()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
-        if topic in wanted or topic.startswith(_FAILURE_STATUS_PREFIX):
+        if topic in wanted or topic.startswith(_FAILURE_TOPIC_PREFIX):
             table = read_numbers(file)
             if np.isfinite(table.get(_TIME_FIELD, np.empty(0))).any():
                 yield topic, table
 
 
 def _read_columns(
-    topics: dict[str, TopicTable], rows_in_order: dict[str, tuple[NDArray[np.int64], str]], origin_ns: float
+    topics: dict[str, TopicTable],
+    rows_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
+    origin_ns: float,
 ) -> Iterator[tuple[str, Column]]:
     for name, (topic, field, unit) in _load_column_and_failure_topics()["columns"].items():
         if field in topics.get(topic, {}):
-            kept_rows, note = rows_in_order[topic]
+            kept_rows, note = rows_and_note_by_topic[topic]
             t_s = (topics[topic][_TIME_FIELD][kept_rows] - origin_ns) * _S_PER_NS
             yield name, Column(t_s, _CONVERSION_OF_UNIT[unit](topics[topic][field])[kept_rows], note)
 
@@ -110,8 +112,8 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
 
 def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
     for topic, table in topics.items():
-        if topic.startswith(_FAILURE_STATUS_PREFIX):
-            part = topic.removeprefix(_FAILURE_STATUS_PREFIX)
+        if topic.startswith(_FAILURE_TOPIC_PREFIX):
+            part = topic.removeprefix(_FAILURE_TOPIC_PREFIX)
             stamps = table[_TIME_FIELD]
             codes = np.where(np.isfinite(stamps), table.get("field.data", np.nan), np.nan)
             for code in sorted(set(codes[np.isfinite(codes)])):

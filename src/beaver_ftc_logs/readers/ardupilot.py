@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, open_log_with_package
+from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, refuse_log_unreadable_by_package
 
 _TIME_FIELD, _INSTANCE_FIELDS = "TimeUS", ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
@@ -38,7 +38,7 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
     values_of_message: dict[str, ValuesByField] = {}
     with (
-        open_log_with_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
+        refuse_log_unreadable_by_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
     ):
         from pymavlink import DFReader
@@ -51,13 +51,13 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
             if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numbers:
                 name = _message_name(message.get_type(), fields)
                 for field, values in values_of_message.setdefault(
-                    name, _empty_columns(name, numbers, wanted_columns)
+                    name, _empty_arrays_of_wanted_fields(name, numbers, wanted_columns)
                 ).items():
                     values.append(numbers.get(field, nan))
     return values_of_message
 
 
-def _empty_columns(
+def _empty_arrays_of_wanted_fields(
     name: str, numbers: ValuesByField, wanted_columns: Collection[str] | None
 ) -> ValuesByField:
     kept = [

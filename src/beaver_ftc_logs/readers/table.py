@@ -59,7 +59,7 @@ def read_parts(
         says = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_names(name, names)}")
     for part_number, (cells, remarks, has_more) in enumerate(parts, 1):
-        table = _with_unread_columns(names, cells)
+        table = _with_unread_columns_as_nan(names, cells)
         notes: dict[str, str] = {}
         for column, line in remarks:
             notes[column] = f"{notes[column]}\n{line}" if column in notes else line
@@ -78,7 +78,7 @@ def read_parts(
         )
 
 
-def _with_unread_columns(names: Sequence[str], cells: TableCells) -> NumberTable:
+def _with_unread_columns_as_nan(names: Sequence[str], cells: TableCells) -> NumberTable:
     """All columns, those that were not read nan."""
     nothing = np.broadcast_to(np.nan, cells.n_rows)
     return {name: cells.numbers.get(name, nothing) for name in names}
@@ -100,7 +100,7 @@ def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTabl
     """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
     it is no table, or larger than any flight."""
     names, parts = _table_parts(path, columns, None)
-    table = _with_unread_columns(names, next(parts)[0])
+    table = _with_unread_columns_as_nan(names, next(parts)[0])
     return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
@@ -153,7 +153,7 @@ def _table_parts(
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
     with _refuse_unreadable(path):
         names, number_columns = (
-            _stored_columns(path, columns)
+            _parquet_and_number_columns(path, columns)
             if layout is None
             else (list(layout.column_names), list(layout.column_names))
         )
@@ -164,10 +164,10 @@ def _table_parts(
         if layout is None
         else read_cells(path, layout, wanted_columns)
     )
-    return names, _join_blocks(path, layout, blocks, rows_per_part)
+    return names, _join_blocks_into_parts(path, layout, blocks, rows_per_part)
 
 
-def _join_blocks(
+def _join_blocks_into_parts(
     path: Path, layout: TableLayout | None, blocks: Iterator[TableCells], rows_per_part: int | None
 ) -> Iterator[TablePart]:
     held_blocks: list[TableCells] = []
@@ -183,7 +183,10 @@ def _join_blocks(
                     joined.select_rows(0, rows_per_part),
                     joined.select_rows(rows_per_part - round(_OVERLAP_SHARE * rows_per_part)),
                 )
-                first_rows.text_cells, first_rows.broken_lines = joined.text_cells, joined.broken_lines
+                first_rows.text_cell_summaries, first_rows.broken_lines = (
+                    joined.text_cell_summaries,
+                    joined.broken_lines,
+                )
                 held_blocks, n_held_rows = [rest], rest.n_rows
                 yield first_rows, list(text_cell_remarks(layout, first_rows)) if layout else [], True
         joined = join_blocks(held_blocks)
@@ -192,7 +195,7 @@ def _join_blocks(
         yield joined, list(text_cell_remarks(layout, joined)) if layout else [], False
 
 
-def _stored_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
+def _parquet_and_number_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
     """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
     cell may be any size."""
     from pyarrow import parquet
@@ -200,7 +203,9 @@ def _stored_columns(path: Path, columns: Collection[str] | None) -> tuple[list[s
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
         numbers = [field.name for field in schema if _is_number_type(field.type)]
-        _check_size(path, file.metadata, [name for name in numbers if columns is None or name in columns])
+        _check_parquet_size(
+            path, file.metadata, [name for name in numbers if columns is None or name in columns]
+        )
     return list(schema.names), numbers
 
 
@@ -224,7 +229,7 @@ def _check_names_unique(path: Path, names: Sequence[str]) -> None:
         raise BadInput(f"{path}: has two columns {twice}, allowed: one of a name")
 
 
-def _check_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
+def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
     """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
     if metadata.num_rows > _MAX_ROWS:
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")

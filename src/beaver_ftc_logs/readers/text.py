@@ -43,7 +43,7 @@ class TableCells:
     numbers: dict[str, Floats]
     n_rows: int
     n_rows_before: int = 0
-    text_cells: dict[str, tuple[int, int, str]] = field(default_factory=dict)
+    text_cell_summaries: dict[str, tuple[int, int, str]] = field(default_factory=dict)
     broken_lines: list[str] = field(default_factory=list)
 
     def select_rows(self, first: int, end: int | None = None) -> "TableCells":
@@ -60,9 +60,9 @@ def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     joined = TableCells(numbers, sum(one.n_rows for one in blocks), first.n_rows_before)
     for one in blocks:
         joined.broken_lines += one.broken_lines
-        for name, (n_cells, row, cell) in one.text_cells.items():
-            earlier = joined.text_cells.get(name, (0, row, cell))
-            joined.text_cells[name] = (earlier[0] + n_cells, *earlier[1:])
+        for name, (n_cells, row, cell) in one.text_cell_summaries.items():
+            earlier = joined.text_cell_summaries.get(name, (0, row, cell))
+            joined.text_cell_summaries[name] = (earlier[0] + n_cells, *earlier[1:])
     return joined
 
 
@@ -189,31 +189,31 @@ def _all_text_conversion(names: Sequence[str], wanted_columns: Sequence[str]) ->
     )
 
 
-def _column_as_numbers(cells: Any, decimal: str, column_name: str, counted_in: TableCells) -> Floats:
+def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, recorded_in: TableCells) -> Floats:
     """A block's column as numbers; text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
 
     cells = compute.utf8_trim_whitespace(cells)
-    if decimal == ",":
+    if decimal_mark == ",":
         cells = compute.replace_substring(cells, ",", ".")
     try:
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
         is_number = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
-        _count_text_cells(column_name, cells, is_number, counted_in)
+        _record_text_cells(column_name, cells, is_number, recorded_in)
         numbers = compute.cast(compute.if_else(is_number, cells, None), pa.float64())
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _count_text_cells(column_name: str, cells: Any, is_number: Any, counted_in: TableCells) -> None:
+def _record_text_cells(column_name: str, cells: Any, is_number: Any, recorded_in: TableCells) -> None:
     places = np.flatnonzero(~is_number.to_numpy(zero_copy_only=False))
     text_places = [place for place in places.tolist() if cells[place].as_py()]
     if text_places:
-        counted_in.text_cells[column_name] = (
+        recorded_in.text_cell_summaries[column_name] = (
             len(text_places),
-            counted_in.n_rows_before + text_places[0] + 1,
+            recorded_in.n_rows_before + text_places[0] + 1,
             str(cells[text_places[0]]),
         )
 
@@ -221,7 +221,7 @@ def _count_text_cells(column_name: str, cells: Any, is_number: Any, counted_in: 
 def text_cell_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
-    for name, (n_cells, row, first) in table_cells.text_cells.items():
+    for name, (n_cells, row, first) in table_cells.text_cell_summaries.items():
         if np.isfinite(table_cells.numbers[name]).any():
             cells = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
             yield name, f"{name}: {cells} no number, the first in row {row}: {first[:30]!r}"

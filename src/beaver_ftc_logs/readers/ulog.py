@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, open_log_with_package
+from beaver_ftc_logs.recording import RecordedFlight, columns_of_topics, refuse_log_unreadable_by_package
 
 _TIME_FIELD = "timestamp"
 _MAX_MESSAGE_BYTES = 65535
@@ -47,7 +47,7 @@ def _select_wanted_fields(name: str, data: dict[str, Any], wanted_columns: Colle
 
 def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any]:
     """Read the topics of the wanted columns, of any instance; all where none of these is in the log."""
-    with open_log_with_package(path, "ULog", "pyulog", "a .ulg file of PX4"):
+    with refuse_log_unreadable_by_package(path, "ULog", "pyulog", "a .ulg file of PX4"):
         from pyulog import ULog
 
         formats = ULog(str(path), parse_header_only=True).message_formats

@@ -21,18 +21,18 @@ from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, mar
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import detector_names, diagnose_by_freeze_rule, diagnose_with_detector
 from beaver_ftc_logs.diagnose import DiagnosisRows
+from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.fitting import (
-    Stretch,
+    FlightWithUsableRows,
     add_fitted_ranges_and_alarm_threshold,
     fit_model,
+    flights_with_usable_rows,
     score_folds_and_choose_credible_mass,
-    usable_stretches,
     validation_folds,
 )
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
 from beaver_ftc_logs.samples import Samples, read_for_vehicle, resample
-from beaver_ftc_logs.scoring import ENGINE
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
@@ -83,12 +83,8 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():
-        score_tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
-        return (
-            _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), score_tables)
-            if score_tables
-            else None
-        )
+        tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
+        return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), tables) if tables else None
     alfa = sorted(
         flight for flight in path.iterdir() if flight.is_dir() and any(flight.glob(_ALFA_GYRO_FILE_PATTERN))
     )
@@ -115,17 +111,17 @@ def result_files(document: Document) -> Files:
 
 
 def _compare_methods(data_set: FlightDataSet) -> Document:
-    stretches, is_single_flight = usable_stretches(data_set.flights), len(data_set.flights) == 1
+    usable_flights, is_single_flight = flights_with_usable_rows(data_set.flights), len(data_set.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    shared = settings_of_whole_flight(stretches, data_set) if is_single_flight else None
+    shared = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
     flights: list[Document] = []
-    for fitted, kept, name in validation_folds(stretches):
+    for fitted, held_out, name in validation_folds(usable_flights):
         model = add_fitted_ranges_and_alarm_threshold(fitted, fit_model(fitted, data_set.vehicle, shared))
-        recording = next(one for one in data_set.recordings if one.name == kept.samples.name)
+        recording = next(one for one in data_set.recordings if one.name == held_out.samples.name)
         flights += [
-            {"left_out": name, "method": method, **_score_against_log(kept, rows, model)}
-            for method, rows in _diagnosis_rows_of_methods(recording, kept, model)
+            {"left_out": name, "method": method, **_score_against_log(held_out, rows, model)}
+            for method, rows in _diagnosis_rows_of_methods(recording, held_out, model)
         ]
     labelled = "classes" in flights[0]
     summarise = summarize_labels if labelled else summarize_failures
@@ -143,7 +139,7 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
 
 
 def _diagnosis_rows_of_methods(
-    recording: RecordedFlight, held_out: Stretch, model: Model
+    recording: RecordedFlight, held_out: FlightWithUsableRows, model: Model
 ) -> Iterator[tuple[str, DiagnosisRows]]:
     """Every detector's rows, and the freeze rule's where the log has servo outputs."""
     for name in detector_names():
@@ -156,24 +152,27 @@ def _diagnosis_rows_of_methods(
         yield FREEZE_RULE_TITLE, frozen
 
 
-def settings_of_whole_flight(stretches: list[Stretch], data_set: FlightDataSet) -> FilterSettings:
+def settings_of_whole_flight(
+    usable_flights: list[FlightWithUsableRows], data_set: FlightDataSet
+) -> FilterSettings:
     """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
-    model = fit_model(stretches, data_set.vehicle)
-    if len(stretches) > 1:
+    model = fit_model(usable_flights, data_set.vehicle)
+    if len(usable_flights) > 1:
         return model.settings
     return model.settings.model_copy(
-        update={"credible_mass": score_folds_and_choose_credible_mass(stretches, model)[1]}
+        update={"credible_mass": score_folds_and_choose_credible_mass(usable_flights, model)[1]}
     )
 
 
-def _score_against_log(held_out: Stretch, rows: DiagnosisRows, model: Model) -> Document:
+def _score_against_log(held_out: FlightWithUsableRows, rows: DiagnosisRows, model: Model) -> Document:
     if np.isfinite(held_out.samples.labels).any():
         return scoring.score_against_labels(rows, labels_in_usable_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)
 
 
-def labels_in_usable_span(held_out: Stretch) -> np.ndarray:
-    """Labels in the whole span of what is kept, their edges included: they count in the score; else NaN."""
+def labels_in_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
+    """Labels from the first usable row to the last, those of rows between that the fit does not use included:
+    they count in the score. NaN elsewhere."""
     usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
     if usable_rows.size:
         span = slice(usable_rows[0], usable_rows[-1] + 1)

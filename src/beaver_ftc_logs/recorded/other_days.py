@@ -1,9 +1,9 @@
 """Other days, made of a flight we have: what changes between two flights of one vehicle, put into its log.
 
-The rates are kept and the commands made those that would have given them, or the other way round: the log
-stays one that the vehicle's equation of motion allows. Labels stay as they are. How a model holds on such a
-day: halves of a labelled flight, the other half altered. The settings were chosen on the first drawn days;
-what counts is the others.
+The rates are kept and the commands changed to those that would have given them, or the other way round: the
+log satisfies the equation of motion of the vehicle. Labels stay as they are. A model is identified from one
+half of a labelled flight and scored on the other half, altered. The settings were chosen on the first drawn
+days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,12 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import scoring
 from beaver_ftc_logs.detectors import BANK_OF_FILTERS_DETECTOR, diagnose_with_detector
-from beaver_ftc_logs.fitting import Stretch, fit_model, usable_stretches, validation_folds
+from beaver_ftc_logs.fitting import (
+    FlightWithUsableRows,
+    fit_model,
+    flights_with_usable_rows,
+    validation_folds,
+)
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Floats
@@ -24,7 +29,7 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix
 
 TUNING_SEEDS, TEST_SEEDS = range(8), range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
-_WORST_OF_SCORE = {"mean_error": max}
+_WORST_FUNCTION_BY_SCORE = {"mean_error": max}
 _TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
 
 
@@ -32,12 +37,13 @@ _TRIM_RUNNING_MEAN_S = 30.0  # of the mean that is called slow
 class DayChanges:
     """Changes from the recorded day to another one.
 
-    trim_shift_commands (S,): moment of another loading or rigging, in commands of each surface, behind the
-    fault: a weak surface needs more command for it. neutral_shift_commands (S,): the same ahead of the fault.
-    common_gain: of all surfaces on the motion about trim (airspeed). surface_gains (S,). command_delay_s: by
-    which commands act later. motion_scale: of all motion, at the same noise. noise_ratio: standard deviation
-    of the air's share in the rates, over that of the day we have. trim_drift: wander of the trim, in
-    commands.
+    trim_shift_commands (S,): moment of another loading or rigging, as a command of each surface; a surface
+    with a loss of effectiveness needs more command for it. neutral_shift_commands (S,): the same, not
+    affected by a loss. common_gain: factor on the effect of all surfaces on the motion about trim (airspeed).
+    surface_gains (S,): factor of each surface. command_delay_s: additional delay of the commands.
+    motion_scale: factor on all motion, at the same noise. noise_ratio: standard deviation of the noise in the
+    rates, over that of the recorded day. trim_drift_sd_commands: standard deviation of the drift of the trim,
+    in commands.
     """
 
     name: str
@@ -48,7 +54,7 @@ class DayChanges:
     command_delay_s: float = 0.0
     motion_scale: float = 1.0
     noise_ratio: float = 1.0
-    trim_drift: float = 0.0
+    trim_drift_sd_commands: float = 0.0
 
 
 def unchanged_day(n_surfaces: int) -> DayChanges:
@@ -84,7 +90,7 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
     days += [
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
-        replace(unchanged, name="trim drifts", trim_drift=0.01),
+        replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
     for i, surface in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
@@ -97,10 +103,10 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
 
 def random_days(n_surfaces: int, seeds: range) -> list[DayChanges]:
     """Days on which everything differs a little."""
-    return [_draw_day(n_surfaces, seed) for seed in seeds]
+    return [_random_day(n_surfaces, seed) for seed in seeds]
 
 
-def _draw_day(n_surfaces: int, seed: int) -> DayChanges:
+def _random_day(n_surfaces: int, seed: int) -> DayChanges:
     rng = np.random.default_rng([20, seed])
     return DayChanges(
         name=f"drawn {seed}",
@@ -111,7 +117,7 @@ def _draw_day(n_surfaces: int, seed: int) -> DayChanges:
         command_delay_s=float(0.02 * rng.standard_normal()),
         motion_scale=float(np.exp(0.25 * rng.standard_normal())),
         noise_ratio=float(1.0 + 0.3 * abs(rng.standard_normal())),
-        trim_drift=float(0.006 * abs(rng.standard_normal())),
+        trim_drift_sd_commands=float(0.006 * abs(rng.standard_normal())),
     )
 
 
@@ -127,7 +133,7 @@ def apply_day_changes(
     commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
         day.common_gain * day.surface_gains
     )
-    trim_wander = day.trim_drift * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    trim_wander = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
     commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + trim_wander) / effectiveness
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
@@ -181,37 +187,42 @@ def run_other_days(folder: Path) -> Document:
 
 
 def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
-    stretches = usable_stretches(data_set.flights)
-    settings = benchmark.settings_of_whole_flight(stretches, data_set)
-    models = [
-        (fit_model(fitted, data_set.vehicle, settings), kept)
-        for fitted, kept, _ in validation_folds(stretches)
+    usable_flights = flights_with_usable_rows(data_set.flights)
+    settings = benchmark.settings_of_whole_flight(usable_flights, data_set)
+    models_and_held_out = [
+        (fit_model(fitted, data_set.vehicle, settings), held_out)
+        for fitted, held_out, _ in validation_folds(usable_flights)
     ]
-    whole = fit_model(stretches, data_set.vehicle, settings)
+    whole = fit_model(usable_flights, data_set.vehicle, settings)
     surfaces = len(data_set.vehicle.surfaces)
     kinds = {
         "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_columns),
         "drawn, settings chosen on these": random_days(surfaces, TUNING_SEEDS),
         "drawn, not looked at": random_days(surfaces, TEST_SEEDS),
     }
-    rows = [row for kind, days in kinds.items() for row in _day_scores(kind, days, models, whole)]
+    rows = [
+        row for kind, days in kinds.items() for row in _score_days(kind, days, models_and_held_out, whole)
+    ]
     summaries = [_summarize_days(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
     return {"set": data_set.name, "rows": rows, "summary": summaries}
 
 
-def _day_scores(
-    kind: str, days: Sequence[DayChanges], models: Sequence[tuple[Model, Stretch]], whole_model: Model
+def _score_days(
+    kind: str,
+    days: Sequence[DayChanges],
+    models_and_held_out: Sequence[tuple[Model, FlightWithUsableRows]],
+    whole_flight_model: Model,
 ) -> Iterator[Document]:
     past_coefficients, noise_covariance = (
-        whole_model.coefficient_arrays()[1],
-        whole_model.coefficient_arrays()[3],
+        whole_flight_model.coefficient_arrays()[1],
+        whole_flight_model.coefficient_arrays()[3],
     )
     for day in days:
         scores: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
-        for model, kept in models:
+        for model, held_out in models_and_held_out:
             altered, labels = (
-                apply_day_changes(day, kept.samples, past_coefficients, noise_covariance),
-                benchmark.labels_in_usable_span(kept),
+                apply_day_changes(day, held_out.samples, past_coefficients, noise_covariance),
+                benchmark.labels_in_usable_span(held_out),
             )
             for name, method_scores in scores.items():
                 method_scores.append(
@@ -233,5 +244,5 @@ def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     return {
         "kind": kind,
         "mean": mean,
-        "worst": {k: _WORST_OF_SCORE.get(k, min)(of) for k, of in values.items()},
+        "worst": {k: _WORST_FUNCTION_BY_SCORE.get(k, min)(of) for k, of in values.items()},
     }

@@ -82,7 +82,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     labels = labels if its.labels else np.full_like(labels, np.nan)
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
-        "stretch_number": run, "dt_s": step, "held_column_mean_age_s": {}, "logged_failures": (),
+        "stretch_number": run, "dt_s": step, "mean_age_s_by_held_column": {}, "logged_failures": (),
         "log_stamps_s": t_s,
     }  # fmt: skip
     return Samples(**(given | changes))

@@ -58,7 +58,7 @@ def test_shares_are_those_of_the_settings(name):
         0.2,
         pytest.approx(1.0),
     )
-    assert bank.transition_probability == pytest.approx(9.0 / 36000.0)
+    assert bank.change_probability_per_sample == pytest.approx(9.0 / 36000.0)
     assert bank.no_response_index == len(bank.hypothesis_kind) - 1
     assert bank.hypothesis_kind[[0, -1]].tolist() == [HEALTHY, NO_RESPONSE]
     assert bank.is_fault_hypothesis.tolist() == [

@@ -337,7 +337,7 @@ def test_a_stretch_has_fifty_even_samples_that_are_all_known():
 def test_what_is_at_a_limit_of_the_envelope_is_inside():
     airspeed, alpha = [19.9, 20.0, 50.0, 50.1, np.nan, 30.0], [0.0, -0.1, 0.3, 0.31, -0.11, np.nan]
     signals = np.column_stack([alpha, np.full(6, 9.0), airspeed])
-    found = by_aircraft._rows_outside_envelope(signals, PLANE, np.arange(6) == 5, [(1, 5)])
+    found = by_aircraft._undiagnosable_rows_by_reason(signals, PLANE, np.arange(6) == 5, [(1, 5)])
     assert {says: true(mask) for says, mask in found.items()} == {
         "a number is missing": [5], "samples are not evenly spaced": [0],
         "airspeed is outside 20 to 50 m/s": [0, 3],
@@ -352,7 +352,7 @@ def test_a_stretch_misleads_that_nothing_explains_within_its_first_second():
         verdicts[k] = by_aircraft.Verdict(True, isolated="unanticipated")
     verdicts[5] = by_aircraft.Verdict(True)
     given = SimpleNamespace(verdicts=verdicts)
-    ((says, mask),) = by_aircraft._rows_unexplained_from_start(
+    ((says, mask),) = by_aircraft._unexplained_start_rows_by_reason(
         np.arange(10) * 0.5, [(1, 5), (5, 10)], given
     ).items()
     assert (says.partition(":")[0], true(mask)) == (
@@ -416,7 +416,10 @@ def test_stretches_make_one_flight():
     other = stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
     found = by_aircraft._join_stretch_diagnoses(5, 2, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
-    assert (found.effectiveness_low[:, 1].tolist(), found.effectiveness_high[:, 0].tolist()) == (
+    assert (
+        found.single_fault_effectiveness_low[:, 1].tolist(),
+        found.single_fault_effectiveness_high[:, 0].tolist(),
+    ) == (
         [0, 0.2, 0.2, 0, 0.3],
         [1, 0.7, 0.7, 1, 0.8],
     )
@@ -447,7 +450,7 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     commands = np.arange(18.0).reshape(6, 3)
     samples = SimpleNamespace(
         name="log", t_s=t_s, dt_s=0.1, rates=np.arange(18.0).reshape(6, 3) / 7.0, commands=commands,
-        held_column_mean_age_s={"roll": 0.3},
+        mean_age_s_by_held_column={"roll": 0.3},
     )  # fmt: skip
     recording = RecordedFlight("log", logged)
     given, age_s = by_aircraft._read_sample_inputs(samples, recording, MIXED, PAIR, True)
@@ -471,12 +474,12 @@ def test_the_model_is_given_each_column_in_si_in_its_own_order():
     ([(-0.29, 0.9), (0.5, -0.29)], None),
 ])  # fmt: skip
 def test_a_command_that_works_the_other_way_round_in_a_stretch_is_refused(gains, says):
-    stretches = [SimpleNamespace(command_gain_upper_bounds=np.array(of)) for of in gains]
+    gap_free_stretches = [SimpleNamespace(command_gain_upper_bounds=np.array(of)) for of in gains]
     if says is None:
-        by_aircraft._check_command_signs("log", PAIR, stretches)
+        by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
         return
     with pytest.raises(BadInput, match=f"log: the rates answer the command of {says} .* signs as of pair"):
-        by_aircraft._check_command_signs("log", PAIR, stretches)
+        by_aircraft._check_command_signs("log", PAIR, gap_free_stretches)
 
 
 def test_a_verdict_says_when_the_name_that_stands_at_the_end_was_first_given():

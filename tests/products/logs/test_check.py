@@ -315,7 +315,7 @@ def test_the_unit_of_rates_is_told_by_the_first_name_or_the_largest_of_all(name,
     ([-10.1, 3.0], {"column": "u", "unit": "%"}), ([105.0], {"column": "u", "unit": "%"}), ([105.1], "u"),
 ])  # fmt: skip
 def test_commands_are_pulses_per_cent_or_shares(values, found):
-    assert check._vehicle_file_command("u", np.array(values, dtype=float)) == found
+    assert check._vehicle_file_command_entry("u", np.array(values, dtype=float)) == found
 
 
 def test_names_as_the_patterns_have_them():
@@ -337,7 +337,7 @@ def test_names_as_the_patterns_have_them():
     assert check._command_columns(commands, {"p": "da"}) == ["Aileron", "servo1"]
     assert len(check._command_columns([f"servo{k}" for k in range(9)], {})) == 8
     wide = [*(f"x{k}" for k in range(9)), "p", *(f"servo{k}" for k in range(70))]
-    assert check._candidate_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]
+    assert check._recognized_columns(wide) == ["p", *(f"servo{k}" for k in range(59))]
 
 
 @pytest.mark.parametrize(("correlation", "says"), [

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import small
 
-from beaver_ftc_logs.diagnose import _add_surfaces_of_unknown_effect, _still_names_all_surfaces
-from beaver_ftc_logs.filtering import min_noise_variance_scale
+from beaver_ftc_logs.diagnose import _add_surfaces_of_unknown_effect_to_names, _still_names_all_surfaces
+from beaver_ftc_logs.filtering import recent_noise_variance_scale
 from beaver_ftc_logs.identification import with_assumed_law_and_air
 from beaver_ftc_logs.model import FittedRanges
 
@@ -46,9 +46,9 @@ def test_noise_is_as_much_larger_as_it_is_and_as_its_sums_are(span, times):
     held = np.repeat(RNG.standard_normal((6000 // span, 3)), span, axis=0)
     covariance = np.diag([1.0, 4.0, 9.0])
     residual = 3.0 * held * np.sqrt(np.diag(covariance))
-    scale = min_noise_variance_scale(residual, np.ones(6000, bool), covariance, 100.0)
+    scale = recent_noise_variance_scale(residual, np.ones(6000, bool), covariance, 100.0)
     assert np.median(scale[1000:]) == pytest.approx(9.0 * times, rel=0.15)
-    cut = min_noise_variance_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
+    cut = recent_noise_variance_scale(residual[:500], np.ones(500, bool), covariance, 100.0)
     assert np.allclose(cut, scale[:500])
 
 
@@ -57,8 +57,10 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     rows = small.rows([(20, "", (1.0, 1.0)), (40, "left", (1.0, 0.5))])
     flown = small.flight(model, n=60)
     still = replace(flown, commands=np.column_stack([np.full(60, 0.2), flown.commands[:, 1]]))
-    assert set(_add_surfaces_of_unknown_effect(still, model, rows).isolated_surfaces[20:]) == {"left"}
-    found = _add_surfaces_of_unknown_effect(flown, model, rows)
+    assert set(_add_surfaces_of_unknown_effect_to_names(still, model, rows).isolated_surfaces[20:]) == {
+        "left"
+    }
+    found = _add_surfaces_of_unknown_effect_to_names(flown, model, rows)
     assert set(found.isolated_surfaces[20:]) == {"right+left"}
     assert (found.effectiveness_high[20:] == 1.0).all()
     assert np.array_equal(found.effectiveness_high[:20], rows.effectiveness_high[:20])

@@ -79,14 +79,14 @@ def test_the_evidence_is_what_changes_alone_do_not_bring():
     its odds are tenfold that, log 10."""
     bank = build_hypothesis_bank(small.model(small.TAIL))
     first = float(bank.prior_probability[bank.is_fault_hypothesis].sum())
-    change = bank.transition_probability * float(
+    change = bank.change_probability_per_sample * float(
         bank.transition_share[bank.is_fault_hypothesis].sum() / bank.transition_share.sum()
     )
-    second = (1.0 - bank.transition_probability) * first + change
+    second = (1.0 - bank.change_probability_per_sample) * first + change
     odds = (
         10.0
-        * ((1.0 - bank.transition_probability) * second + change)
-        / (1.0 - ((1.0 - bank.transition_probability) * second + change))
+        * ((1.0 - bank.change_probability_per_sample) * second + change)
+        / (1.0 - ((1.0 - bank.change_probability_per_sample) * second + change))
     )
     posterior = np.zeros((3, len(bank.transition_share)))
     place = int(np.flatnonzero(bank.is_fault_hypothesis)[0])
@@ -109,8 +109,8 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     monkeypatch.setattr(
         fitting, "whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
     )
-    stretches = fitting.usable_stretches([small.flight(model, 60)])
-    found = fitting._trim_drift_sd(stretches, model)
+    usable_flights = fitting.flights_with_usable_rows([small.flight(model, 60)])
+    found = fitting._trim_drift_sd(usable_flights, model)
     assert max(found[:2]) < 0.01
     assert found[2] == pytest.approx(0.05, rel=0.15)
 
@@ -148,7 +148,7 @@ def test_under_other_laws_the_threshold_is_not_below_twice_the_theorem():
         < 3.0
     )
     assert fitting._choose_alarm_threshold(tail, 1.0, other) == pytest.approx(2.0 * np.log(72_000.0))
-    high = tail.model_copy(update={"threshold_level": 50.0})
+    high = tail.model_copy(update={"tail_start_level": 50.0})
     assert (
         fitting._choose_alarm_threshold(high, 1.0, other)
         == extremes.threshold_for_false_alarms(high, 1.0)

@@ -193,7 +193,7 @@ def test_a_colour_is_no_likelier_by_the_size_that_filtering_gives_a_sample(monke
 def test_evidence_is_the_log_of_a_likelihood_ratio():
     """Two of three levels are faults; what a change at random brings is no evidence."""
     bank = SimpleNamespace(
-        is_fault_hypothesis=np.array([False, True, True]), transition_probability=0.1,
+        is_fault_hypothesis=np.array([False, True, True]), change_probability_per_sample=0.1,
         prior_probability=np.array([0.8, 0.15, 0.05]), transition_share=np.array([3.0, 1.0, 2.0]),
     )  # fmt: skip
     fault = np.array([0.3, 0.6, 0.45])

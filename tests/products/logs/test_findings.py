@@ -69,7 +69,7 @@ WORLD = {
     "wing": (small.model(settings={"power": 0.8, "levels": {"left": [0.4]}}), {}),
     "tail": (
         small.model(small.TAIL, settings={"alarm": 0.9}),
-        {"gap": 150, "notes": ("a remark",), "held_column_mean_age_s": {"roll": 0.123456}},
+        {"gap": 150, "notes": ("a remark",), "mean_age_s_by_held_column": {"roll": 0.123456}},
     ),
 }
 

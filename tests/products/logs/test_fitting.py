@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, regression
-from beaver_ftc_logs.fitting import Stretch
+from beaver_ftc_logs.fitting import FlightWithUsableRows
 from beaver_ftc_logs.recording import LoggedFailure
 from beaver_ftc_logs.samples import Samples
 from kept import in_short
@@ -87,7 +87,7 @@ def test_regressors_of_several_flights_stand_in_a_row(model, history, lags):
         small.flight(model, 120, seed=2, lost=((1, 40, 80, 0.6),)),
     ]
     x, y, run = fitting.stacked_regression_data(
-        fitting.usable_stretches(flights), model.vehicle, history, lags
+        fitting.flights_with_usable_rows(flights), model.vehicle, history, lags
     )
     parts = [by_hand(flight, model.vehicle, history, lags) for flight in flights]
     np.testing.assert_allclose(x, np.vstack([part[0] for part in parts]), atol=1e-14)
@@ -100,14 +100,14 @@ def test_a_stretch_ends_where_a_sample_is_left_out():
     samples = small.flight(MODEL, 60)
     use = np.ones(60, dtype=bool)
     use[[20, 40, 41]] = False
-    _, y, run = fitting.stacked_regression_data([Stretch(samples, use)], MODEL.vehicle, 2, 3)
+    _, y, run = fitting.stacked_regression_data([FlightWithUsableRows(samples, use)], MODEL.vehicle, 2, 3)
     assert np.unique(run, return_counts=True)[1].tolist() == [14, 19, 18]
     assert len(y) == 51
 
 
-def score(stretches, vehicle, order):
+def score(usable_flights, vehicle, order):
     """The Bayesian information criterion of an order, of its own fit."""
-    x, y, _ = fitting.stacked_regression_data(stretches, vehicle, *order)
+    x, y, _ = fitting.stacked_regression_data(usable_flights, vehicle, *order)
     rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
     return len(y) * np.linalg.slogdet(rest.T @ rest / len(y))[1] + 3 * x.shape[1] * np.log(len(y))
 
@@ -119,9 +119,11 @@ ORDERS = [(history, lags) for history in (1, 2, 3, 4) for lags in (2, 3, 4, 6)]
 @pytest.mark.parametrize("of", [small.WING, small.TAIL], ids=["wing", "tail"])
 def test_the_order_is_the_one_of_the_least_criterion(of, true):
     model = small.model(of, history=true[0], lags=true[1])
-    stretches = fitting.usable_stretches([small.flight(model, 400), small.flight(model, 300, seed=3)])
-    found = fitting.choose_model_order(stretches, model.vehicle)
-    assert found == min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
+    usable_flights = fitting.flights_with_usable_rows(
+        [small.flight(model, 400), small.flight(model, 300, seed=3)]
+    )
+    found = fitting.choose_model_order(usable_flights, model.vehicle)
+    assert found == min(ORDERS, key=lambda order: score(usable_flights, model.vehicle, order))
     if of is small.WING:
         assert found == true
 
@@ -132,9 +134,9 @@ def test_the_order_of_a_flight_too_short_to_tell(seed):
     rng = np.random.default_rng(seed)
     response = (small.RESPONSE * [[[1.0]], [[1.0]]])[:, :1].repeat(3, axis=1) * rng.uniform(-1, 1, (2, 3, 3))
     model = small.model(response=(3.0 * response).tolist())
-    stretches = fitting.usable_stretches([small.flight(model, 120 + 10 * seed, seed=seed)])
-    least = min(ORDERS, key=lambda order: score(stretches, model.vehicle, order))
-    assert fitting.choose_model_order(stretches, model.vehicle) == least
+    usable_flights = fitting.flights_with_usable_rows([small.flight(model, 120 + 10 * seed, seed=seed)])
+    least = min(ORDERS, key=lambda order: score(usable_flights, model.vehicle, order))
+    assert fitting.choose_model_order(usable_flights, model.vehicle) == least
 
 
 def test_columns_of_an_order():
@@ -150,12 +152,12 @@ def test_a_fit_wants_ten_samples_a_coefficient():
     use = np.ones(146, dtype=bool)
     use[136:] = False
     assert fitting.fit_least_squares_of_order(
-        [Stretch(samples, use)], MODEL.vehicle, 2, 3
+        [FlightWithUsableRows(samples, use)], MODEL.vehicle, 2, 3
     ).coefficients.shape == (13, 3)
     use[135] = False
     says = "129 samples known to be healthy, allowed: at least 130 to fit 13 coefficients an axis"
     with pytest.raises(BadInput, match=says):
-        fitting.fit_least_squares_of_order([Stretch(samples, use)], MODEL.vehicle, 2, 3)
+        fitting.fit_least_squares_of_order([FlightWithUsableRows(samples, use)], MODEL.vehicle, 2, 3)
 
 
 @pytest.mark.parametrize(("size", "moves"), [(0.9e-6, False), (1.1e-6, True)])
@@ -163,30 +165,30 @@ def test_a_rate_that_stands_still_is_refused(size, moves):
     samples = small.flight(MODEL, 200)
     rates = samples.rates.copy()
     rates[6:, 1] = 0.3 + size * np.where(np.arange(194) % 2, 1.0, -1.0)
-    stretches = [Stretch(changed(samples, rates=rates), np.ones(200, dtype=bool))]
+    usable_flights = [FlightWithUsableRows(changed(samples, rates=rates), np.ones(200, dtype=bool))]
     if moves:
-        assert fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3) is not None
+        assert fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3) is not None
         return
     with pytest.raises(BadInput, match="rate q does not move, allowed: flights in which every rate does"):
-        fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
+        fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3)
 
 
 def test_standard_errors_hold_for_colour_of_two_seconds():
-    stretches = fitting.usable_stretches([small.flight(MODEL, 400)])
-    x, y, run = fitting.stacked_regression_data(stretches, MODEL.vehicle, 2, 3)
-    found = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
+    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 400)])
+    x, y, run = fitting.stacked_regression_data(usable_flights, MODEL.vehicle, 2, 3)
+    found = fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3)
     expected = regression.least_squares(x, y, run, 20)
     np.testing.assert_array_equal(found.standard_errors, expected.standard_errors)
 
 
 @pytest.fixture(scope="module")
-def stretches():
-    return fitting.usable_stretches([small.flight(MODEL, 1000, lost=LOST)])
+def usable_flights():
+    return fitting.flights_with_usable_rows([small.flight(MODEL, 1000, lost=LOST)])
 
 
 @pytest.fixture(scope="module")
-def fitted(stretches):
-    return fitting.fit_model(stretches, MODEL.vehicle)
+def fitted(usable_flights):
+    return fitting.fit_model(usable_flights, MODEL.vehicle)
 
 
 def in_numbers(model):
@@ -198,10 +200,10 @@ def in_numbers(model):
 ARRAYS = ("intercept", "past", "response", "response_sd", "noise")
 
 
-def test_a_model_is_what_was_fitted(changed, fitted, stretches):
+def test_a_model_is_what_was_fitted(changed, fitted, usable_flights):
     assert not changed(in_numbers(fitted))
     fit = fitting.fit_least_squares_of_order(
-        stretches, MODEL.vehicle, fitted.n_rate_lags, fitted.n_command_lags
+        usable_flights, MODEL.vehicle, fitted.n_rate_lags, fitted.n_command_lags
     )
     past = 1 + 3 * fitted.n_rate_lags
     assert fitted.intercept == fit.coefficients[0].tolist()
@@ -226,28 +228,34 @@ def test_settings_by_hand(fitted):
     """Two changes to a fault, two repairs, over the time in use; three surfaces of which two move as one."""
     use = sum(fitting.is_usable_for_fit(small.flight(MODEL, 1000, lost=LOST)))
     settings = fitted.settings
-    assert settings.likely_effectiveness_levels == {"right": [0.4], "left": [0.5]}
+    assert settings.likely_effectiveness_levels_by_group == {"right": [0.4], "left": [0.5]}
     assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
     assert settings.command_delay_candidates_s == pytest.approx([-0.04, 0.0, 0.04])
-    stuck = fitting.estimate_filter_settings(fitting.usable_stretches([small.flight(TAIL, 400)]), TAIL)
-    assert (stuck.alarm_probability, stuck.alarm_hold_s, stuck.likely_effectiveness_levels) == (
+    stuck = fitting.estimate_filter_settings(
+        fitting.flights_with_usable_rows([small.flight(TAIL, 400)]), TAIL
+    )
+    assert (
+        stuck.alarm_probability,
+        stuck.alarm_confirmation_time_s,
+        stuck.likely_effectiveness_levels_by_group,
+    ) == (
         0.995,
         0.3,
         {},
     )
     assert 0.0 < stuck.effective_sample_share <= 0.9
     given = settings.model_copy(update={"alarm_probability": 0.7})
-    stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
-    assert fitting.fit_model(stretches, MODEL.vehicle, given).settings == given
-    assert fitting.fit_with_same_order(stretches, fitted).settings == settings
+    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300)])
+    assert fitting.fit_model(usable_flights, MODEL.vehicle, given).settings == given
+    assert fitting.fit_with_same_order(usable_flights, fitted).settings == settings
 
 
 def days(gains):
     """Flights of days on which the right surface acts so many times as the left one does."""
     flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
     told = [changed(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
-    return fitting.usable_stretches(
+    return fitting.flights_with_usable_rows(
         [changed(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
     )
 
@@ -273,9 +281,15 @@ def test_levels_of_a_label_in_their_order():
     values = np.repeat([1.0, 0.4000001, 1.0, np.nan, 0.7, 0.7000004], 3)
     samples = changed(small.flight(MODEL, 18), labels=np.column_stack([values, values]))
     use = np.ones(18, dtype=bool)
-    assert fitting._labelled_effectiveness_levels(Stretch(samples, use), 1) == [1.0, 0.4, 1.0, 0.7, 0.7]
+    assert fitting._labelled_levels_in_order(FlightWithUsableRows(samples, use), 1) == [
+        1.0,
+        0.4,
+        1.0,
+        0.7,
+        0.7,
+    ]
     use[:3] = False
-    assert fitting._labelled_effectiveness_levels(Stretch(samples, use), 0) == [0.4, 1.0, 0.7, 0.7]
+    assert fitting._labelled_levels_in_order(FlightWithUsableRows(samples, use), 0) == [0.4, 1.0, 0.7, 0.7]
 
 
 def test_settings_of_flights_that_change_in_every_way():
@@ -284,19 +298,19 @@ def test_settings_of_flights_that_change_in_every_way():
     weak = changed(rate, labels=np.tile([1.0, 0.5], (400, 1)))
     labels = np.ones((400, 2))
     labels[100:200, 0], labels[200:300, 0], labels[200:, 1] = 0.6, 0.2, 0.8
-    stretches = fitting.usable_stretches([rate, weak, changed(rate, labels=labels)])
-    settings = fitting.estimate_filter_settings(stretches, MODEL)
-    assert settings.likely_effectiveness_levels == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
-    hours = sum(stretch.is_usable.sum() for stretch in stretches) / 36000.0
+    usable_flights = fitting.flights_with_usable_rows([rate, weak, changed(rate, labels=labels)])
+    settings = fitting.estimate_filter_settings(usable_flights, MODEL)
+    assert settings.likely_effectiveness_levels_by_group == {"right": [0.2, 0.6], "left": [0.5, 0.8]}
+    hours = sum(usable_flight.is_usable.sum() for usable_flight in usable_flights) / 36000.0
     assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((3 + 1 + 1) / hours * 12.0))
     assert settings.repair_share == pytest.approx((1 + 10) / (4 + 20))
 
 
 def test_several_flights_are_left_out_in_turn():
-    one, two, three = stretches = fitting.usable_stretches(
+    one, two, three = usable_flights = fitting.flights_with_usable_rows(
         [small.flight(MODEL, 60, name=name) for name in ("a", "b", "c")]
     )
-    assert fitting.validation_folds(stretches) == [
+    assert fitting.validation_folds(usable_flights) == [
         ([two, three], one, "a"),
         ([one, three], two, "b"),
         ([one, two], three, "c"),
@@ -307,21 +321,23 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
     use = np.zeros(20, dtype=bool)
     use[[3, 4, 9, 15, 18]] = True
     ((first,), second, late), ((other,), same, early) = fitting.validation_folds(
-        [Stretch(small.flight(MODEL, 20), use)]
+        [FlightWithUsableRows(small.flight(MODEL, 20), use)]
     )
     assert (late, early) == ("second half", "first half")
     assert np.flatnonzero(first.is_usable).tolist() == np.flatnonzero(same.is_usable).tolist() == [3, 4]
     assert (
         np.flatnonzero(second.is_usable).tolist() == np.flatnonzero(other.is_usable).tolist() == [9, 15, 18]
     )
-    nothing = fitting.validation_folds([Stretch(small.flight(MODEL, 20), np.zeros(20, dtype=bool))])
+    nothing = fitting.validation_folds(
+        [FlightWithUsableRows(small.flight(MODEL, 20), np.zeros(20, dtype=bool))]
+    )
     assert [kept.is_usable.any() for _, kept, _ in nothing] == [False, False]
 
 
-def test_tests_on_what_was_not_fitted(changed, fitted, stretches):
+def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
     quick = fitted.settings.model_copy(update={"command_delay_candidates_s": [0.0]})
     entries, bounds = fitting.score_folds_and_choose_credible_mass(
-        stretches, fitted.model_copy(update={"settings": quick})
+        usable_flights, fitted.model_copy(update={"settings": quick})
     )
     assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
@@ -333,12 +349,14 @@ def test_without_labels_bounds_stay_as_they_are():
     flights = [small.flight(TAIL, 200, seed=seed) for seed in range(3)]
     settings = TAIL.settings.model_copy(update={"credible_mass": 0.77})
     model = TAIL.model_copy(update={"settings": settings})
-    entries, bounds = fitting.score_folds_and_choose_credible_mass(fitting.usable_stretches(flights), model)
+    entries, bounds = fitting.score_folds_and_choose_credible_mass(
+        fitting.flights_with_usable_rows(flights), model
+    )
     assert bounds == 0.77
     assert [set(entry) for entry in entries] == [{"left_out", "samples", "explained", "residual_rad_s"}] * 3
 
 
-def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatch, fitted, stretches):
+def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatch, fitted, usable_flights):
     """Held by the bounds of each mass, as told here: nearest to 0.93 is taken."""
     for told, chosen in (
         ([0.5, 0.6, 0.92, 0.95, 0.96, 0.97], 0.7),
@@ -346,17 +364,19 @@ def test_the_mass_of_the_bounds_is_the_one_that_holds_the_labels_best(monkeypatc
         ([0.5, 0.6, 0.7, 0.8, 0.85, 0.99], 0.95),
     ):
         by_mass = dict(zip((0.5, 0.6, 0.7, 0.8, 0.9, 0.95), told, strict=True))
-        monkeypatch.setattr(fitting, "_diagnosis_by_credible_mass", lambda *given, by_mass=by_mass: by_mass)
+        monkeypatch.setattr(
+            fitting, "_diagnosis_rows_by_credible_mass", lambda *given, by_mass=by_mass: by_mass
+        )
         monkeypatch.setattr(fitting, "score_against_labels", lambda held, labels: {"held_by_bounds": held})
-        assert fitting.score_folds_and_choose_credible_mass(stretches, fitted)[1] == chosen
+        assert fitting.score_folds_and_choose_credible_mass(usable_flights, fitted)[1] == chosen
 
 
-def test_what_one_step_prediction_explains(stretches):
+def test_what_one_step_prediction_explains(usable_flights):
     """By the residual of the model itself, written out from its file."""
-    (stretch,) = stretches
-    samples, use = stretch.samples, stretch.is_usable
+    (usable_flight,) = usable_flights
+    samples, use = usable_flight.samples, usable_flight.is_usable
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    rows, residual = fitting.one_step_residuals(MODEL, stretch)
+    rows, residual = fitting.one_step_residuals(MODEL, usable_flight)
     expected = [k for k in np.flatnonzero(use) if k >= 3]
     assert rows.tolist() == expected
     for i in (0, 100, len(expected) - 1):
@@ -371,13 +391,13 @@ def test_what_one_step_prediction_explains(stretches):
         )
         said = samples.rates[k] - np.array(MODEL.intercept) - past - moved
         np.testing.assert_allclose(residual[i], said, atol=1e-14)
-    found = fitting.one_step_prediction_quality(MODEL, stretch)
+    found = fitting.one_step_prediction_quality(MODEL, usable_flight)
     assert found["samples"] == len(expected)
     for axis, name in enumerate("pqr"):
         share = 1.0 - residual[:, axis].var() / samples.rates[expected, axis].var()
         assert found["explained"][name] == pytest.approx(share)
         assert found["residual_rad_s"][name] == pytest.approx(residual[:, axis].std())
-    nothing = Stretch(samples, np.zeros(len(use), dtype=bool))
+    nothing = FlightWithUsableRows(samples, np.zeros(len(use), dtype=bool))
     assert fitting.one_step_prediction_quality(MODEL, nothing) == {"samples": 0}
 
 
@@ -409,7 +429,9 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
     monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *of: left_out)
     monkeypatch.setattr(
-        fitting, "_healthy_alarm_statistics", lambda tested, one: (noise[one], (np.array([1.0]), one / 60))
+        fitting,
+        "_noise_scale_and_healthy_alarm_peaks",
+        lambda tested, one: (noise[one], (np.array([1.0]), one / 60)),
     )
     monkeypatch.setattr(fitting, "_max_column_mistake_log_likelihood_gain", lambda tested, one: misread[one])
     monkeypatch.setattr(
@@ -419,7 +441,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     monkeypatch.setattr(fitting, "group_gain_standard_error", lambda fit, model: 0.25)
     monkeypatch.setattr(fitting.trust, "effect_share_explained_by_others", lambda used, model: np.zeros(2))
 
-    monkeypatch.setattr(fitting, "column_gain_standard_error", lambda fit, model, between: {"p": between})
+    monkeypatch.setattr(fitting, "gain_standard_error_by_column", lambda fit, model, between: {"p": between})
 
     def copied(known):
         return SimpleNamespace(known=known, model_copy=lambda update: copied(known | update))
@@ -430,7 +452,9 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     monkeypatch.setattr(fitting.trust, "fitted_ranges", fitted_ranges)
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: None)
     vehicle = SimpleNamespace(false_alarms_per_hour=None, other_laws=False)
-    settings = SimpleNamespace(likely_effectiveness_levels={"left": [0.5]}, model_copy=lambda update: update)
+    settings = SimpleNamespace(
+        likely_effectiveness_levels_by_group={"left": [0.5]}, model_copy=lambda update: update
+    )
     model = SimpleNamespace(
         vehicle=vehicle,
         n_rate_lags=2,
@@ -444,7 +468,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
         "alarm_peak_tail": None,
         "max_column_mistake_log_likelihood_gain": 0.6,
         "of": ([0.25], 2.5),
-        "column_gain_standard_error": {"p": 0.0},
+        "gain_standard_error_by_column": {"p": 0.0},
     }
     assert found["fitted_ranges"].known == expected
     assert found["settings"] == {"false_alarms_per_hour": None, "alarm_threshold": None}

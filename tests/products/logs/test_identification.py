@@ -10,7 +10,7 @@ import pytest
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc_logs import fitting, identification
-from beaver_ftc_logs.fitting import Stretch
+from beaver_ftc_logs.fitting import FlightWithUsableRows
 from beaver_ftc_logs.identification import (
     fit_output_error,
     identification_text,
@@ -179,7 +179,9 @@ def test_names_of_the_regressors():
 def test_collinear_is_more_than_tenfold_worst_first(monkeypatch):
     factors = np.array([10.0, 10.1, 1.0, 40.0, np.inf, *[2.0] * 7])
     monkeypatch.setattr(identification, "variance_inflation_factors", lambda x: factors)
-    found = identification.collinear_regressors(fitting.usable_stretches([small.flight(MODEL, 200)]), MODEL)
+    found = identification.collinear_regressors(
+        fitting.flights_with_usable_rows([small.flight(MODEL, 200)]), MODEL
+    )
     assert [(one["regressor"], one["inflation"]) for one in found] == [
         ("q[-2]", None), ("p[-2]", 40.0), ("q[-1]", 10.1),
     ]  # fmt: skip
@@ -190,8 +192,8 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
     model = small.model(small.TAIL)
     samples = small.flight(model, 300)
     samples.signals[:] = 20.0
-    stretches = fitting.usable_stretches([samples])
-    found = identification.collinear_regressors(stretches, model)
+    usable_flights = fitting.flights_with_usable_rows([samples])
+    found = identification.collinear_regressors(usable_flights, model)
     assert found[0] == {"regressor": "airspeed_m_s[-1]", "inflation": None}
     assert json.loads(as_json(found)) == found
     told = model.model_copy(update={"identification_results": FOUND | {"collinear": found}})
@@ -203,10 +205,13 @@ def test_a_signal_that_stands_still_is_told_and_can_be_written():
 
 
 def test_inflation_is_of_the_regressors_without_the_constant():
-    stretches = fitting.usable_stretches([small.flight(MODEL, 200)])
-    x = fitting.stacked_regression_data(stretches, MODEL.vehicle, MODEL.n_rate_lags, MODEL.n_command_lags)[0]
+    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 200)])
+    x = fitting.stacked_regression_data(
+        usable_flights, MODEL.vehicle, MODEL.n_rate_lags, MODEL.n_command_lags
+    )[0]
     found = {
-        one["regressor"]: one["inflation"] for one in identification.collinear_regressors(stretches, MODEL)
+        one["regressor"]: one["inflation"]
+        for one in identification.collinear_regressors(usable_flights, MODEL)
     }
     for i, name in enumerate(regressor_names(MODEL), 1):
         others = np.delete(x, i, axis=1)
@@ -218,9 +223,9 @@ def test_inflation_is_of_the_regressors_without_the_constant():
 
 
 def test_colour_is_the_median_over_the_responses():
-    stretches = fitting.usable_stretches([small.flight(MODEL, 300)])
-    fit = fitting.fit_least_squares_of_order(stretches, MODEL.vehicle, 2, 3)
-    found = identification.standard_error_inflation(stretches, MODEL)
+    usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300)])
+    fit = fitting.fit_least_squares_of_order(usable_flights, MODEL.vehicle, 2, 3)
+    found = identification.median_standard_error_inflation_by_axis(usable_flights, MODEL)
     assert found == dict(zip("pqr", np.median(fit.standard_error_inflation[7:], axis=0), strict=True))
 
 
@@ -230,13 +235,13 @@ def test_a_spectrum_by_bands():
     model = small.model(rate_hz=20.0)
     samples = small.flight(model, 600)
     samples.rates[:, 1] += 0.5 * np.sin(2 * np.pi * 3.0 * samples.t_s)
-    stretches = fitting.usable_stretches([samples])
-    bands = residual_spectrum(stretches, model)
+    usable_flights = fitting.flights_with_usable_rows([samples])
+    bands = residual_spectrum(usable_flights, model)
     ends = [(band["from_hz"], band["to_hz"]) for band in bands]
     assert ends == [(0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0)]
     from scipy import signal
 
-    residual = fitting.one_step_residuals(model, stretches[0])[1]
+    residual = fitting.one_step_residuals(model, usable_flights[0])[1]
     frequency, density = signal.welch(residual, fs=20.0, nperseg=256, axis=0)
     for (low, high), band in zip(ends, bands, strict=True):
         inside = (frequency > low) & (frequency <= high)
@@ -244,7 +249,7 @@ def test_a_spectrum_by_bands():
             white = residual[:, axis].var() / 10.0
             assert band[name] == pytest.approx(density[inside, axis].mean() / white)
     assert max(bands, key=lambda band: band["q"])["from_hz"] == 2.0
-    low = residual_spectrum(fitting.usable_stretches([small.flight(MODEL, 300)]), MODEL)
+    low = residual_spectrum(fitting.flights_with_usable_rows([small.flight(MODEL, 300)]), MODEL)
     assert [band["to_hz"] for band in low] == [0.1, 0.5, 1.0, 2.0, 5.0]
 
 
@@ -265,7 +270,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
 
 
 def test_servo_lag_and_delay_are_found(changed):
-    found = fit_output_error(fitting.usable_stretches([lagged()]), [[0], [1]])
+    found = fit_output_error(fitting.flights_with_usable_rows([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
     assert min(found["explained_of_windows_not_fitted"].values()) > 0.98
@@ -282,7 +287,9 @@ def _short(value):
 
 
 def test_a_servo_faster_than_the_rate_tells_is_said():
-    found = fit_output_error(fitting.usable_stretches([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]])
+    found = fit_output_error(
+        fitting.flights_with_usable_rows([lagged(700, lag_s=5e-3, delay_s=0.2)]), [[0], [1]]
+    )
     assert found["shorter_than_can_be_told"] is True
 
 
@@ -299,13 +306,13 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         return SimpleNamespace(x=x, jac=jac, fun=fun)
 
     monkeypatch.setattr("scipy.optimize.least_squares", fitted)
-    stretches = fitting.usable_stretches([lagged(600)])
-    found = fit_output_error(stretches, [[0], [1]])
+    usable_flights = fitting.flights_with_usable_rows([lagged(600)])
+    found = fit_output_error(usable_flights, [[0], [1]])
     assert found["shorter_than_can_be_told"] is short
     errors = np.sqrt(np.diag(np.linalg.inv(jac.T @ jac)) * (fun @ fun) / 1000)
     assert [found["servo_lag_sd_s"], found["delay_sd_s"]] == pytest.approx(errors[:2])
     assert (found["servo_lag_s"], found["delay_s"]) == (lag_s, 0.13)
-    commands, rates = identification._cut_free_run_windows(stretches, [[0], [1]], 20, 7)
+    commands, rates = identification._cut_free_run_windows(usable_flights, [[0], [1]], 20, 7)
     run = identification._simulate_free_runs(x, commands, rates, 0.1)
     np.testing.assert_allclose(
         given["first"], ((run - rates) / rates.std(axis=(0, 1)))[::2].ravel(), rtol=1e-6
@@ -324,12 +331,14 @@ def test_too_few_windows_are_said():
     """Of 2 s, after 0.7 s of the past: 20 want 407 samples; windows that end with the log are not taken."""
     says = "too few gap-free windows in which every rate moves"
     samples = lagged(407, noise=0.01)
-    found = fit_output_error([Stretch(samples, np.ones(407, dtype=bool))], [[0], [1]])
+    found = fit_output_error([FlightWithUsableRows(samples, np.ones(407, dtype=bool))], [[0], [1]])
     assert found == {"windows": 19, "says": says}
     samples = lagged(408, noise=0.01)
-    assert "delay_s" in fit_output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
+    assert "delay_s" in fit_output_error(
+        [FlightWithUsableRows(samples, np.ones(408, dtype=bool))], [[0], [1]]
+    )
     samples.rates[:, 1] = 0.01
-    still = fit_output_error([Stretch(samples, np.ones(408, dtype=bool))], [[0], [1]])
+    still = fit_output_error([FlightWithUsableRows(samples, np.ones(408, dtype=bool))], [[0], [1]])
     assert still == {"windows": 20, "says": says}
 
 
@@ -348,7 +357,9 @@ def test_windows_with_their_past():
     use[22] = False
     rates[29, 1] = np.nan
     commands[35, 0] = np.nan
-    found, measured = identification._cut_free_run_windows([Stretch(samples, use)], [[0], [1]], 3, 2)
+    found, measured = identification._cut_free_run_windows(
+        [FlightWithUsableRows(samples, use)], [[0], [1]], 3, 2
+    )
     scaled = commands * [1.0, 0.5]
     lost = {
         *range(14, 18),
@@ -359,7 +370,7 @@ def test_windows_with_their_past():
     ends = [end for end in range(5, n, 3) if end - 1 not in lost]
     np.testing.assert_array_equal(found, [scaled[end - 5 : end] for end in ends])
     np.testing.assert_array_equal(measured, [rates[end - 3 : end] for end in ends])
-    together, _ = identification._cut_free_run_windows([Stretch(samples, use)], [[0, 1]], 3, 2)
+    together, _ = identification._cut_free_run_windows([FlightWithUsableRows(samples, use)], [[0, 1]], 3, 2)
     np.testing.assert_array_equal(together[:, :, 0], found.sum(axis=2))
 
 
@@ -367,7 +378,7 @@ def test_windows_with_their_past():
 def test_of_many_windows_every_so_many_is_kept(n, kept_of):
     samples = small.flight(MODEL, n)
     commands, rates = identification._cut_free_run_windows(
-        [Stretch(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1
+        [FlightWithUsableRows(samples, np.ones(n, dtype=bool))], [[0], [1]], 2, 1
     )
     every = range(3, n, 2)
     np.testing.assert_array_equal(rates, [samples.rates[end - 2 : end] for end in every][::kept_of])

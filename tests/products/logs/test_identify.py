@@ -33,7 +33,7 @@ def test_what_is_left_of_white_noise_is_white_in_every_band_up_to_half_the_rate(
 
 
 def test_what_the_labels_say_becomes_the_prior(wing_model):
-    assert wing_model.settings.likely_effectiveness_levels == {"right": [0.4], "left": [0.5]}
+    assert wing_model.settings.likely_effectiveness_levels_by_group == {"right": [0.4], "left": [0.5]}
 
 
 def test_edges_of_labels_are_not_fitted(wing, wing_folder):

@@ -54,7 +54,7 @@ VEHICLE = small.vehicle(
 
 def first_response(flights):
     """Of the roll rate to its own command, by the order that the criterion takes."""
-    model = fitting.fit_model(fitting.usable_stretches(flights), VEHICLE)
+    model = fitting.fit_model(fitting.flights_with_usable_rows(flights), VEHICLE)
     return model.command_response[0][0][0]
 
 
@@ -77,7 +77,7 @@ def test_a_model_of_two_colours_takes_the_likelier():
     """Each flight through the noise it has, picked at once, is as if the other had never been seen."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5, 3000, i) for i in range(4)]
     white = identification.whiten_flights(flights, VEHICLE)
-    model = fitting.fit_model(fitting.usable_stretches(white), VEHICLE)
+    model = fitting.fit_model(fitting.flights_with_usable_rows(white), VEHICLE)
     assert len(model.noise_models) == 2
     assert all(one.covariance_inflation >= 1.0 for one in model.noise_models)
     for i in (0, 1):
@@ -182,18 +182,18 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
     """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
     plain = small.model(small.WING | {"moving_air": True})
     colour = NoiseModel(average=list(average), noise=plain.residual_covariance)
-    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *_: [(model, stretches)])
+    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *_: [(model, usable_flights)])
     found = []
     for laws in (False, True):
         vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
         model = plain.model_copy(update={"noise_models": [colour], "vehicle": vehicle})
         flight = replace(small.flight(model, 400, seed=5), noise_ma_coefficients=average)
-        stretches = [fitting.Stretch(flight, np.ones(400, dtype=bool))]
-        found.append(fitting._with_inflated_noise(stretches, model).noise_inflation(average))
+        usable_flights = [fitting.FlightWithUsableRows(flight, np.ones(400, dtype=bool))]
+        found.append(fitting._with_inflated_noise(usable_flights, model).noise_inflation(average))
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
-    monkeypatch.setattr(fitting, "_normalized_squared_gain_error", lambda *_: (1e6, 1))
-    assert fitting._with_inflated_noise(stretches, model).noise_inflation(average) == pytest.approx(
+    monkeypatch.setattr(fitting, "_normalized_squared_gain_error_and_rank", lambda *_: (1e6, 1))
+    assert fitting._with_inflated_noise(usable_flights, model).noise_inflation(average) == pytest.approx(
         200.0 * factor
     )
 
@@ -203,7 +203,7 @@ def moving():
     """A model of two colours, identified from flights of a law that answers rates."""
     flights = [flown(AVERAGE if i % 2 else (1.0,), 0.5 + 0.2 * i, 4000, i) for i in range(4)]
     white = identification.whiten_flights(flights, VEHICLE)
-    return fitting.fit_model(fitting.usable_stretches(white), VEHICLE)
+    return fitting.fit_model(fitting.flights_with_usable_rows(white), VEHICLE)
 
 
 @pytest.mark.parametrize("colour", [AVERAGE, (1.0,)])
@@ -229,7 +229,7 @@ def test_columns_are_compared_in_white(moving, colour):
 def test_a_signal_of_other_size_is_told_in_moving_air_too(moving):
     flight = flown((1.0,), 0.5, 4000, 22)
     known = FittedRanges(
-        commands=trust.central_range(flight.commands), rates=trust.central_range(flight.rates)
+        commands=trust.central_ranges(flight.commands), rates=trust.central_ranges(flight.rates)
     )
     moving = moving.model_copy(update={"fitted_ranges": known})
     trust.check_columns_as_identified(flight, moving)
@@ -262,7 +262,7 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
         tuple(model.noise_models[0].ma_coefficients)
     }
     for one in others:
-        white = fitting.usable_stretches([whiten_samples(flights[0], one.ma_coefficients)])[0]
+        white = fitting.flights_with_usable_rows([whiten_samples(flights[0], one.ma_coefficients)])[0]
         assert np.allclose(one.residual_covariance, np.cov(fitting.one_step_residuals(model, white)[1].T))
     assert (np.diff([np.linalg.det(one.residual_covariance) for one in gyros]) > 0.0).all()
     assert {one.covariance_inflation for one in gyros} == {model.noise_models[0].covariance_inflation}

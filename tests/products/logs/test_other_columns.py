@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
 from beaver_ftc_logs.samples import load_flights_for_fit
-from beaver_ftc_logs.trust import central_range, check_columns_as_identified
+from beaver_ftc_logs.trust import central_ranges, check_columns_as_identified
 from products.logs import small, synthetic
 
 
@@ -55,7 +55,7 @@ def n_signal_lags():
     past = [*small.model(small.TAIL).past_coefficients[:-1], [0.3, 0.2, -0.1]]
     model = small.model(small.TAIL, past=past)
     flight = small.flight(model, n=1200, seed=7)
-    known = FittedRanges(commands=central_range(flight.commands), rates=central_range(flight.rates))
+    known = FittedRanges(commands=central_ranges(flight.commands), rates=central_ranges(flight.rates))
     return model.model_copy(update={"fitted_ranges": known}), flight
 
 

@@ -164,18 +164,18 @@ class Footer:
 ], ids=["rows", "too many", "bytes", "too much"])  # fmt: skip
 def test_no_more_is_read_than_a_flight_has(tmp_path, footer, says):
     if says is None:
-        assert table._check_size(tmp_path, footer, ["a", "b"]) is None
+        assert table._check_parquet_size(tmp_path, footer, ["a", "b"]) is None
         return
     with pytest.raises(BadInput, match=says):
-        table._check_size(tmp_path, footer, ["a", "b"])
+        table._check_parquet_size(tmp_path, footer, ["a", "b"])
 
 
 def test_numbers_count_by_eight_bytes(tmp_path):
     """Of 10 million rows 25 columns are 2 GB, one more is too much."""
     footer = Footer(10_000_000, a=10)
-    assert table._check_size(tmp_path, footer, ["a"] * 25) is None
+    assert table._check_parquet_size(tmp_path, footer, ["a"] * 25) is None
     with pytest.raises(BadInput, match=r"holds 2\.1 GB"):
-        table._check_size(tmp_path, footer, ["a"] * 26)
+        table._check_parquet_size(tmp_path, footer, ["a"] * 26)
 
 
 def test_what_counts_as_a_number():
@@ -229,11 +229,11 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     assert [one.n_rows_before for one in blocks] == [
         sum(each.n_rows for each in blocks[:k]) for k in range(len(blocks))
     ]
-    assert {name: found for one in reversed(blocks) for name, found in one.text_cells.items()} == {
+    assert {name: found for one in reversed(blocks) for name, found in one.text_cell_summaries.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
     whole = text.join_blocks(blocks)
-    assert whole.text_cells == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
+    assert whole.text_cell_summaries == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
         400,
         2,
@@ -254,9 +254,9 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     path, seen = tmp_path / "x.parquet", []
     columns = {"t": [0.0], "a": [1.0], "words": ["x"], "lists": [[1.0, 2.0]], "b": [3]}
     parquet.write_table(pa.table(columns), path)
-    monkeypatch.setattr(table, "_check_size", lambda path, footer, names: seen.append(names))
+    monkeypatch.setattr(table, "_check_parquet_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._stored_columns(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._parquet_and_number_columns(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
 
 

@@ -99,7 +99,7 @@ def test_a_fast_log_is_averaged_and_its_delay_said(tmp_path, wing):
     columns = {name: np.sin(t_s) for name in synthetic.fly(5.0)} | {"t_s": t_s}
     samples = load_flights_for_fit([synthetic.write_csv(tmp_path / "fast.csv", columns)], wing)[0]
     assert samples.dt_s == pytest.approx(0.05)
-    assert samples.held_column_mean_age_s["p_rad_s"] == pytest.approx(0.025)
+    assert samples.mean_age_s_by_held_column["p_rad_s"] == pytest.approx(0.025)
     late = np.sin(samples.t_s - 0.02)  # five stamps, 0 to 0.04 s old
     np.testing.assert_allclose(samples.rates[5:, 0], late[5:], atol=2e-3)
 

@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.fitting import fit_model, usable_stretches, validation_folds
+from beaver_ftc_logs.fitting import fit_model, flights_with_usable_rows, validation_folds
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
 from beaver_ftc_logs.vehicle import load_vehicle
@@ -26,9 +26,9 @@ def enac(real_flights):
 
 def test_halves_of_a_flying_wing(enac):
     vehicle, samples = enac
-    stretches = usable_stretches([samples])
-    whole = fit_model(stretches, vehicle)
-    for fitted, kept, _ in validation_folds(stretches):
+    usable_flights = flights_with_usable_rows([samples])
+    whole = fit_model(usable_flights, vehicle)
+    for fitted, kept, _ in validation_folds(usable_flights):
         model = fit_model(fitted, vehicle, whole.settings)
         labels = np.where(kept.is_usable[:, None], samples.labels, np.nan)
         found = score_against_labels(diagnose(samples, model), labels)
@@ -40,7 +40,7 @@ def test_halves_of_a_flying_wing(enac):
 
 def test_cutting_a_real_flight_short_changes_no_earlier_row(enac):
     vehicle, samples = enac
-    model = fit_model(usable_stretches([samples]), vehicle)
+    model = fit_model(flights_with_usable_rows([samples]), vehicle)
     whole = diagnose(samples, model)
     for n in (2873, 9071):
         fields = ("t_s", "rates", "commands", "signals", "labels", "stretch_number", "log_stamps_s")
@@ -57,7 +57,7 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
     folders = sorted(path for path in (real_flights / "alfa").iterdir() if path.is_dir())
     flights = load_flights_for_fit(folders, vehicle)
     kept = next(one for one in flights if one.name == ALFA)
-    model = fit_model(usable_stretches([one for one in flights if one is not kept]), vehicle)
+    model = fit_model(flights_with_usable_rows([one for one in flights if one is not kept]), vehicle)
     read = {*model.vehicle.command_columns, *model.vehicle.signal_columns}
     assert not read & {one.column for one in model.vehicle.outputs.values()}
     found = score_against_failures(diagnose(kept, model), kept.logged_failures, model.groups)
@@ -69,10 +69,10 @@ def test_a_rudder_hard_over_is_found_by_its_effect_alone(real_flights):
 def test_another_day_of_the_wing_is_read_whole_and_its_columns_are_not_doubted(enac, real_flights):
     """17 July: the wing is twisted, and the residual's variance is six times that of the model's day."""
     vehicle, trained = enac
-    model = fit_model(usable_stretches([trained]), vehicle)
+    model = fit_model(flights_with_usable_rows([trained]), vehicle)
     other = load_flights_for_fit([real_flights / "enac" / "flight-17.csv"], vehicle)[0]
     rows = diagnose(other, model)
-    assert all("nothing answers the commands" in reason for reason in rows.reasons_not_credible)
+    assert all("nothing answers the commands" in reason for reason in rows.not_credible_rows_by_reason)
     assert score_against_labels(rows, other.labels)["classes"] > 0.93
     mistakes = {
         "exchanged": replace(other, commands=other.commands[:, ::-1]),

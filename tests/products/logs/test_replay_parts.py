@@ -119,9 +119,10 @@ def test_a_loss_is_bounded_by_the_frames_of_the_last_second():
                 explains &= (left <= 1e-9).all(axis=1)
             ends = 1.0 + thetas[explains][[0, -1]] if explains.any() else (0.0, 1.0)
             bounded += 0.0 < ends[0] < ends[1] < 1.0
-            assert (found.effectiveness_low[k, s], found.effectiveness_high[k, s]) == pytest.approx(
-                ends, abs=1e-3
-            )
+            assert (
+                found.single_fault_effectiveness_low[k, s],
+                found.single_fault_effectiveness_high[k, s],
+            ) == pytest.approx(ends, abs=1e-3)
     assert bounded > 2
 
 

@@ -174,7 +174,7 @@ def test_names_under_other_laws(monkeypatch):
         update={
             "isolation_evidence_factor": 4.0,
             "isolation_change_hold_s": 1.0,
-            "isolates_single_group": True,
+            "assumes_one_group_at_fault": True,
         }
     )
     model = WING.model_copy(update={"settings": asks})

@@ -32,9 +32,9 @@ def stamps(step, n=60):
 def test_rates_that_a_log_may_have(t_s, rate_hz, says):
     if says:
         with pytest.raises(BadInput, match=says):
-            of._sample_times("log", t_s, 20.0)
+            of._time_base("log", t_s, 20.0)
         return
-    found, run, step = of._sample_times("log", t_s, 20.0)
+    found, run, step = of._time_base("log", t_s, 20.0)
     assert 1.0 / step == pytest.approx(rate_hz)
     assert set(run.tolist()) == {0}
     assert (found is t_s) is (rate_hz != 20.0)
@@ -45,7 +45,7 @@ def test_a_gap_is_more_than_three_and_a_half_steps(gap, gaps):
     t_s = stamps(0.125)
     t_s[20:] += (gap - 1.0) * 0.125
     t_s[40:] += (gap - 1.0) * 0.125
-    run = of._sample_times("log", t_s, 20.0)[1]
+    run = of._time_base("log", t_s, 20.0)[1]
     assert run.tolist() == [0] * 20 + [gaps] * 20 + [2 * gaps] * 20
 
 
@@ -60,21 +60,21 @@ def test_the_usual_step_is_that_of_the_first_fifty_stamps():
 def test_a_fast_log_is_sampled_over_each_stretch_from_its_first_stamp():
     """To the last stamp, or half a step beyond it; no sample in a gap."""
     t_s = np.array([0.0, 0.1, 0.2, 0.28, 1.0, 1.15, 1.28, 5.0])
-    found, run, step = of._regular_times(t_s, 0.2)
+    found, run, step = of._regular_time_base(t_s, 0.2)
     np.testing.assert_allclose(found, [0.0, 0.2, 1.0, 1.2, 5.0])
     assert (run.tolist(), step) == ([0, 0, 1, 1, 2], 0.2)
-    longer, run, _ = of._regular_times(np.array([0.0, 0.31, 2.0]), 0.2)
+    longer, run, _ = of._regular_time_base(np.array([0.0, 0.31, 2.0]), 0.2)
     np.testing.assert_allclose(longer, [0.0, 0.2, 0.4, 2.0])
-    edge = of._regular_times(np.array([0.0, 3.49 * 0.2, 2.0]), 0.2)[1]
+    edge = of._regular_time_base(np.array([0.0, 3.49 * 0.2, 2.0]), 0.2)[1]
     assert edge.tolist() == [0] * 4 + [1]
 
 
 def test_a_column_with_these_very_stamps_is_as_it_is():
     t_s = stamps(0.1, 5)
     same = column(t_s.copy(), np.arange(5.0))
-    assert of.values_at(same, t_s, 0.1) == (same.values, None)
+    assert of.values_and_age_at(same, t_s, 0.1) == (same.values, None)
     other = column(t_s + 0.01, np.arange(5.0))
-    values, age_s = of.values_at(other, t_s, 0.1)
+    values, age_s = of.values_and_age_at(other, t_s, 0.1)
     np.testing.assert_array_equal(values, [np.nan, 0.0, 1.0, 2.0, 3.0])
     assert age_s == pytest.approx(0.09)
 
@@ -83,7 +83,7 @@ def test_a_column_with_these_very_stamps_is_as_it_is():
 def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
     fast = column(stamps(step, 40), np.arange(40.0))
     t_s = stamps(0.1, 10) + 0.3
-    found = of.values_at(fast, t_s, 0.1)
+    found = of.values_and_age_at(fast, t_s, 0.1)
     expected = (of._averaged_values if averaged else of._held_values)(
         fast, *((t_s, 0.1) if averaged else (t_s,))
     )
@@ -139,7 +139,7 @@ def test_a_log_on_one_time_base():
     label = np.where(t_s < 0.99, np.nan, np.where(t_s < 2.99, 1.0, 0.5))
     np.testing.assert_array_equal(found.labels[:, 1], label)
     assert (found.name, found.dt_s, found.signals.shape) == ("log", pytest.approx(0.1), (60, 0))
-    assert found.held_column_mean_age_s == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
+    assert found.mean_age_s_by_held_column == {"pitch": pytest.approx((30 * 0.05 + 29 * 0.15) / 59)}
     assert found.notes == ("said of the log", "a row is left out")
     assert (found.logged_failures, found.log_stamps_s is given.columns["p_rad_s"].t_s) == (
         given.logged_failures,

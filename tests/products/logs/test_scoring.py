@@ -62,7 +62,7 @@ def test_a_setting_is_what_holds_for_a_two_hundredth_of_the_flight(count, is_one
 def test_the_nearest_setting_is_the_first_of_two():
     settings = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]])
     estimate = np.array([[0.9, 0.9], [0.4, 1.0], [0.5, 0.5], [0.6, 0.3]])
-    assert scoring.nearest_label_setting(estimate, settings).tolist() == [0, 1, 0, 2]
+    assert scoring.nearest_label_setting_index(estimate, settings).tolist() == [0, 1, 0, 2]
 
 
 FAILURE = (

@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.recording import rows_in_time_order
+from beaver_ftc_logs.recording import rows_with_increasing_time
 from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import limited, synthetic
 
@@ -199,7 +199,7 @@ def test_what_was_left_out_is_in_the_verdict(wing_model, tmp_path):
     ],
 )
 def test_which_rows_are_in_order(t_s, kept, says):
-    found, note = rows_in_time_order("x", np.array(t_s, dtype=float))
+    found, note = rows_with_increasing_time("x", np.array(t_s, dtype=float))
     assert found.tolist() == kept
     assert note == says
 
@@ -209,7 +209,7 @@ def test_no_row_more_than_needed_is_left_out():
     rng = np.random.default_rng(2)
     for _ in range(200):
         t_s = rng.integers(0, 8, 8).astype(float)
-        kept, _ = rows_in_time_order("x", t_s)
+        kept, _ = rows_with_increasing_time("x", t_s)
         assert (np.diff(t_s[kept]) > 0).all()
         masks = ((np.arange(256)[:, None] >> np.arange(8)) & 1).astype(bool)
         longest = max(mask.sum() for mask in masks if (np.diff(t_s[mask]) > 0).all())

@@ -9,10 +9,10 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
 from beaver_ftc_logs.bank import build_trim_and_gain_state_model
+from beaver_ftc_logs.column_mistakes import CorrectedLog
 from beaver_ftc_logs.diagnose import blank_rows_not_credible, diagnose
 from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
 from beaver_ftc_logs.model import FittedRanges
-from beaver_ftc_logs.readings import CorrectedReading
 from products.logs import small
 from telling import apart
 
@@ -22,8 +22,8 @@ HEALTHY = small.flight(small.model(), n=1200, seed=2)
 def trusted(flown=HEALTHY, **changes):
     """A model by hand that knows what it was fitted on."""
     model = small.model(**changes)
-    stretches = fitting.usable_stretches([flown])
-    return fitting.add_fitted_ranges_and_alarm_threshold(stretches, model)
+    usable_flights = fitting.flights_with_usable_rows([flown])
+    return fitting.add_fitted_ranges_and_alarm_threshold(usable_flights, model)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def silent(rows):
 def test_a_flight_like_those_fitted_is_credible(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 300, 600, 0.3),), seed=8), model)
     assert rows.credible.mean() == 1.0
-    assert rows.reasons_not_credible == {}
+    assert rows.not_credible_rows_by_reason == {}
     assert "left" in set(rows.isolated_surfaces[450:])
 
 
@@ -61,7 +61,7 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
     out = rows.credible == 0
     assert out[-50:].all()
     assert silent(rows)[out].all()
-    assert any(says in reason for reason in rows.reasons_not_credible)
+    assert any(says in reason for reason in rows.not_credible_rows_by_reason)
     verdict = verdict_document(flown, model, rows) | {"score": {}}
     assert verdict["credible"]["share"] == pytest.approx(1.0 - out.mean())
     assert says in as_text(verdict)
@@ -84,7 +84,7 @@ def test_a_signal_that_stands_still_is_named_and_not_learnt_from(model):
     flown = small.flight(model, n=600, seed=4, time_since_change_s={"q_rad_s": still})
     rows = diagnose(flown, model)
     assert (rows.credible == 0).tolist() == (still > 1.5).tolist()
-    assert list(rows.reasons_not_credible) == ["q_rad_s stands still, for longer than 1.5 s"]
+    assert list(rows.not_credible_rows_by_reason) == ["q_rad_s stands still, for longer than 1.5 s"]
 
 
 @pytest.mark.parametrize(("usual", "most"), [(0.0, 0.5), (0.25, 0.75)])
@@ -93,7 +93,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
     known = model.model_copy(
         update={
             "fitted_ranges": model.fitted_ranges.model_copy(
-                update={"longest_unchanged_time_s": {"q_rad_s": usual}}
+                update={"longest_unchanged_time_s_by_column": {"q_rad_s": usual}}
             )
         }
     )
@@ -104,7 +104,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
 
 
 def test_a_command_may_stand_still_thrice_as_long_as_it_did(model):
-    trained = model.fitted_ranges.model_copy(update={"longest_unchanged_time_s": {"roll": 4.0}})
+    trained = model.fitted_ranges.model_copy(update={"longest_unchanged_time_s_by_column": {"roll": 4.0}})
     known = model.model_copy(update={"fitted_ranges": trained})
     for longest, share in ((11.9, 1.0), (12.5, 0.98)):
         flown = small.flight(
@@ -185,11 +185,11 @@ def test_few_minutes_mean_wide_bounds():
     errors = []
     for n in (400, 6400):
         flown = small.flight(small.model(), n=n, seed=6)
-        model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle())
+        model = fitting.fit_model(fitting.flights_with_usable_rows([flown]), small.vehicle())
         errors.append(
             np.array(
                 fitting.add_fitted_ranges_and_alarm_threshold(
-                    fitting.usable_stretches([flown]), model
+                    fitting.flights_with_usable_rows([flown]), model
                 ).fitted_ranges.group_gain_standard_error
             )
         )
@@ -200,13 +200,13 @@ def test_few_minutes_mean_wide_bounds():
 def test_under_other_laws_the_gain_is_known_as_a_factor_of_the_whole_response():
     """As of one regressor, the response to the commands, with what the others make up of it taken off."""
     flown = small.flight(small.model(), n=3000, seed=6)
-    model = fitting.fit_model(fitting.usable_stretches([flown]), small.vehicle(other_laws=True))
-    stretches = fitting.usable_stretches([flown])
+    model = fitting.fit_model(fitting.flights_with_usable_rows([flown]), small.vehicle(other_laws=True))
+    usable_flights = fitting.flights_with_usable_rows([flown])
     x, _, _ = fitting.stacked_regression_data(
-        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     fit = fitting.fit_least_squares_of_order(
-        stretches, model.vehicle, model.n_rate_lags, model.n_command_lags
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     white = replace(fit, standard_errors=fit.standard_errors / fit.standard_error_inflation)
     sd = np.sqrt(np.diag(fit.residual_covariance))
@@ -225,15 +225,17 @@ def test_a_model_that_explains_less_than_the_mean_is_refused():
         {"samples": 300, "explained": {"p": 0.5, "q": -0.1, "r": 0.1}},
     ]
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
-    stretches = fitting.usable_stretches([frozen])
+    usable_flights = fitting.flights_with_usable_rows([frozen])
     with pytest.raises(BadInput) as error:
-        identification.check_explained_variance(tests, stretches, small.model())
+        identification.check_explained_variance(tests, usable_flights, small.model())
     said = str(error.value)
     assert "explains less of p than the mean does (p -17.375)" in said
     assert said.endswith("follows; q_rad_s: stands still for 600 s")
     assert "more than these 1.9 min" in said
     identification.check_explained_variance(
-        tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3, stretches, small.model()
+        tests[1:] + [tests[1] | {"explained": {"p": 0.5, "q": 0.2, "r": 0.1}}] * 3,
+        usable_flights,
+        small.model(),
     )
 
 
@@ -265,14 +267,16 @@ def test_commands_that_nothing_follows_are_not_credible(model):
     rows = blank_rows_not_credible(flown, model, diagnose(flown, model), has_no_response=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
-    assert [reason.split(":")[0] for reason in rows.reasons_not_credible] == ["nothing answers the commands"]
+    assert [reason.split(":")[0] for reason in rows.not_credible_rows_by_reason] == [
+        "nothing answers the commands"
+    ]
 
 
 def test_after_a_clipped_rate_nothing_is_said_for_half_a_minute(model):
     clipped = np.arange(600) == 100
     rows = diagnose(small.flight(model, n=600, seed=4, is_rate_clipped=clipped), model)
     assert np.flatnonzero(rows.credible == 0).tolist() == list(range(100, 401))
-    assert list(rows.reasons_not_credible) == ["a rate was clipped in the last 30 s"]
+    assert list(rows.not_credible_rows_by_reason) == ["a rate was clipped in the last 30 s"]
 
 
 def test_a_model_that_claims_nothing_says_nothing(model):
@@ -282,7 +286,9 @@ def test_a_model_that_claims_nothing_says_nothing(model):
     rows = diagnose(small.flight(model, n=600, lost=((1, 200, 600, 0.0),), seed=8), known)
     assert silent(rows).all()
     assert not rows.credible.any()
-    assert list(rows.reasons_not_credible) == ["of no surface is the effect known from the flights fitted"]
+    assert list(rows.not_credible_rows_by_reason) == [
+        "of no surface is the effect known from the flights fitted"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -294,7 +300,7 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     n = np.arange(2000)
     rates = np.column_stack([np.sin(0.01 * (k + 1) * n) for k in range(3)])
     commands = np.column_stack([np.sin(0.03 * n), np.cos(0.02 * n)])
-    fitted = FittedRanges(commands=trust.central_range(commands), rates=trust.central_range(rates))
+    fitted = FittedRanges(commands=trust.central_ranges(commands), rates=trust.central_ranges(rates))
     flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
@@ -348,8 +354,8 @@ def test_for_how_long_each_column_may_stand_still():
     known = {"p_rad_s": 0.4, "r_rad_s": 0.1, "roll": 2.0, "pitch": 0.3, "other": 9.0}
     model = small.model(fitted={"commands": [], "rates": [], "still_s": known})
     most = dict(zip(names, [pytest.approx(1.2), 1.5, 0.5, 6.0, 1.5, np.inf], strict=True))
-    assert trust._max_unchanged_time_s(samples, model) == most
-    assert trust._max_unchanged_time_s(samples, small.model()) == dict(
+    assert trust._max_unchanged_time_s_by_column(samples, model) == most
+    assert trust._max_unchanged_time_s_by_column(samples, small.model()) == dict(
         zip(names, [1.5] * 3 + [np.inf] * 3, strict=True)
     )
     still_s = {"q_rad_s": np.array([1.5, 1.51, 0.0]), "air": np.full(3, 99.0)}
@@ -392,15 +398,15 @@ def test_what_is_kept_of_the_flights_fitted():
     flights = [(other, use), (one, use)]
     assert trust._unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)
     assert trust._unpowered_energy_height_rate_mps(flights[:1]) is None
-    assert trust._longest_unchanged_times_s(flights) == {"roll": 0.4, "air": 0.7}
+    assert trust._longest_unchanged_time_s_by_column(flights) == {"roll": 0.4, "air": 0.7}
     model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
     commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)
     flown = replace(other, commands=commands)
     assert trust._relative_command_motion(flown, model, ["left"]) == pytest.approx(2.994 / 2.0)
     assert trust._relative_command_motion(flown, model, ["left", "right"]) == pytest.approx(3.992)
     assert trust._relative_command_motion(flown, small.model(), ["left"]) == 0.0
-    assert trust.central_range(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
-    assert trust.central_range(np.empty((3, 0))) == []
+    assert trust.central_ranges(np.array([[np.nan, 2.0], [np.nan, 2.0]])) == [[0.0, 0.0], [2.0, 2.0]]
+    assert trust.central_ranges(np.empty((3, 0))) == []
 
 
 def test_reasons_come_with_their_shares_the_largest_first():
@@ -416,13 +422,13 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     """Of two readings by more than 2000 times: in the part that gains least 0.3, and 0.1 by its unit."""
     likely = np.array([0.9, 0.3, 0.5, 0.7])
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
-    read = [CorrectedReading(*one) for one in (("A", "short"), ("B", "other", 0.1))]
-    monkeypatch.setattr(trust, "_part_log_likelihoods", lambda samples, _: parts[samples])
-    monkeypatch.setattr(trust, "corrected_readings", lambda *_: read)
+    read = [CorrectedLog(*one) for one in (("A", "short"), ("B", "other", 0.1))]
+    monkeypatch.setattr(trust, "_log_likelihood_by_flight_part", lambda samples, _: parts[samples])
+    monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
-    assert trust._likelier_column_mistake("as it is", small.model()) == told
+    assert trust._likelier_column_mistake_text("as it is", small.model()) == told
     parts["as it is"] = None
-    assert trust._likelier_column_mistake("as it is", small.model()) is None
+    assert trust._likelier_column_mistake_text("as it is", small.model()) is None
 
 
 def test_what_each_column_brings_to_the_axes_of_others():
@@ -451,15 +457,15 @@ def test_an_answer_is_wrong_in_its_sign_or_by_its_unit(monkeypatch, most, least,
     """A unit shows where the command moves otherwise by as much as the rates answer otherwise."""
     monkeypatch.setattr(trust, "_relative_command_motion", lambda samples, model, group: moved)
     model = SimpleNamespace(groups=[["right", "left"]], fitted_ranges=None)
-    found = trust._FlightPartGains([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
-    wrong = trust._column_mistakes(None, model, found)
+    found = trust._GainBoundsOverFlight([most], [least], {"V": 0.5, "p": 0.6}, 1.0, np.zeros(4))
+    wrong = trust._column_mistake_texts(None, model, found)
     if not says:
         assert wrong == {}
         return
     ((what, line),) = wrong.items()
     assert what == ("sign right+left" if says == "sign" else "unit right+left")
     assert says == "sign" or (says in line and f"moves {moved:.3g} times" in line)
-    faint = trust._column_mistakes(
+    faint = trust._column_mistake_texts(
         None, model, found._replace(column_gain_upper_bounds={"V": 0.49, "p": 0.5})
     )
     assert list(faint) == [what, "columns"]
@@ -475,13 +481,13 @@ def test_a_gain_that_the_model_may_have_wrong_by_all_of_it_refuses_no_log(monkey
     known = SimpleNamespace(
         effect_share_explained_by_others=[0.9],
         group_gain_standard_error=[sd],
-        column_gain_standard_error={"V": sd},
+        gain_standard_error_by_column={"V": sd},
     )
     model = SimpleNamespace(groups=[["wing"]], fitted_ranges=known, vehicle=SimpleNamespace(other_laws=True))
     found: dict[str, str] = {}
     for most in (-0.31, 0.19):
-        found |= trust._column_mistakes(
-            None, model, trust._FlightPartGains([most], [0.0], {"V": 0.1}, 1.0, np.zeros(4))
+        found |= trust._column_mistake_texts(
+            None, model, trust._GainBoundsOverFlight([most], [0.0], {"V": 0.1}, 1.0, np.zeros(4))
         )
     assert [what for what in ("sign wing", "unit wing", "columns") if what in found] == refused
 

@@ -119,7 +119,7 @@ def _called_file(section: Section) -> str:
     return "the top of the file" if heading == "The file" else heading
 
 
-_HEADINGS = {"Quantity": "A column (`rates.p`, `commands[]`, `labels.NAME`, ...)"}
+_HEADINGS = {"QuantityColumn": "A column (`rates.p`, `commands[]`, `labels.NAME`, ...)"}
 
 
 def _anchor(title: str) -> str:

@@ -47,7 +47,7 @@ CHANGES = {
     "calmer": {"motion_scale": 0.6},
     "noise": {"noise_ratio": 1.5},
     "noise, calmer": {"noise_ratio": 1.2, "motion_scale": 0.8},
-    "drift": {"trim_drift": 0.01},
+    "drift": {"trim_drift_sd_commands": 0.01},
 }
 
 
@@ -157,7 +157,7 @@ def data():
 def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     """As it was: the benchmark's own figures of its halves. Quick settings: one delay, few levels."""
     quick = FilterSettings(delays_s=[0.0], level_step=0.25, levels={"right": [0.4], "left": [0.5]})
-    monkeypatch.setattr(benchmark, "settings_of_whole_flight", lambda stretches, data: quick)
+    monkeypatch.setattr(benchmark, "settings_of_whole_flight", lambda usable_flights, data: quick)
     monkeypatch.setattr(other_days, "one_change_days", lambda mixer, commands: [unchanged_day(2)])
     monkeypatch.setattr(other_days, "random_days", lambda surfaces, seeds: random_days(surfaces, seeds[:1]))
     document = other_days._test_data_set_on_days(data)
@@ -197,7 +197,13 @@ def test_a_day_that_nothing_changes_is_its_defaults():
         [1.0] * 3,
     ]
     bare = DayChanges("x", same.trim_shift_commands, same.neutral_shift_commands, same.surface_gains)
-    assert (bare.common_gain, bare.command_delay_s, bare.motion_scale, bare.noise_ratio, bare.trim_drift) == (
+    assert (
+        bare.common_gain,
+        bare.command_delay_s,
+        bare.motion_scale,
+        bare.noise_ratio,
+        bare.trim_drift_sd_commands,
+    ) == (
         1.0,
         0.0,
         1.0,

@@ -41,7 +41,7 @@ def test_drawn_days_differ_as_much_as_is_said():
         values = of([getattr(day, name) for day in days])
         assert np.std(values) == pytest.approx(spread, rel=0.1), name
         assert np.mean(values) == pytest.approx(0.0, abs=0.15 * spread), name
-    for name, least, spread in (("noise_ratio", 1.0, 0.3), ("trim_drift", 0.0, 0.006)):
+    for name, least, spread in (("noise_ratio", 1.0, 0.3), ("trim_drift_sd_commands", 0.0, 0.006)):
         more = np.array([getattr(day, name) for day in days]) - least
         assert more.min() >= 0.0, name
         assert np.sqrt(np.mean(more**2)) == pytest.approx(spread, rel=0.1), name

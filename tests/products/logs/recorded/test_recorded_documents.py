@@ -8,7 +8,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting
-from beaver_ftc_logs.fitting import Stretch
+from beaver_ftc_logs.fitting import FlightWithUsableRows
 from beaver_ftc_logs.recorded import benchmark
 from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from beaver_ftc_logs.samples import Samples
@@ -150,11 +150,11 @@ def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_metho
         for method in ("bank of filters (ours)", "sliding least squares, 20 s")
     ]
     assert document["rows"][0]["classes"] > document["rows"][1]["classes"] > 0.4
-    stretches = fitting.usable_stretches([flight])
-    whole = fitting.fit_model(stretches, MODEL.vehicle)
-    bounds = fitting.score_folds_and_choose_credible_mass(stretches, whole)[1]
+    usable_flights = fitting.flights_with_usable_rows([flight])
+    whole = fitting.fit_model(usable_flights, MODEL.vehicle)
+    bounds = fitting.score_folds_and_choose_credible_mass(usable_flights, whole)[1]
     expected = whole.settings.model_copy(update={"credible_mass": bounds})
-    assert benchmark.settings_of_whole_flight(stretches, data) == expected
+    assert benchmark.settings_of_whole_flight(usable_flights, data) == expected
 
 
 def test_flights_with_a_failure_are_left_out_in_turn(changed, monkeypatch, two_methods):
@@ -178,16 +178,16 @@ def test_settings_of_several_flights_are_those_of_the_fit():
     flights = [
         small.flight(MODEL, 500, seed=seed, name=str(seed), lost=((1, 100, 200, 0.5),)) for seed in (1, 2)
     ]
-    stretches = fitting.usable_stretches(flights)
-    settings = benchmark.settings_of_whole_flight(stretches, data_set(MODEL, flights))
-    assert settings == fitting.fit_model(stretches, MODEL.vehicle).settings
+    usable_flights = fitting.flights_with_usable_rows(flights)
+    settings = benchmark.settings_of_whole_flight(usable_flights, data_set(MODEL, flights))
+    assert settings == fitting.fit_model(usable_flights, MODEL.vehicle).settings
 
 
 def test_a_detector_of_the_loop_is_told_from_ours(monkeypatch):
     monkeypatch.setattr(benchmark, "detector_names", lambda: ["forgetting-least-squares", "other"])
     monkeypatch.setattr(benchmark, "diagnose_with_detector", lambda name, samples, model: name)
-    stretch = Stretch(small.flight(MODEL, 10), np.ones(10, dtype=bool))
-    found = list(benchmark._diagnosis_rows_of_methods(recording(stretch.samples), stretch, MODEL))
+    usable_flight = FlightWithUsableRows(small.flight(MODEL, 10), np.ones(10, dtype=bool))
+    found = list(benchmark._diagnosis_rows_of_methods(recording(usable_flight.samples), usable_flight, MODEL))
     assert found == [
         ("forgetting least squares, 20 s", "forgetting-least-squares"), ("other, of the loop", "other"),
     ]  # fmt: skip
@@ -197,22 +197,26 @@ def test_labels_count_in_the_span_of_what_is_kept():
     samples = small.flight(MODEL, 10)
     use = np.zeros(10, dtype=bool)
     use[[2, 3, 7]] = True
-    labels = benchmark.labels_in_usable_span(Stretch(samples, use))
+    labels = benchmark.labels_in_usable_span(FlightWithUsableRows(samples, use))
     assert np.flatnonzero(np.isfinite(labels).all(axis=1)).tolist() == [2, 3, 4, 5, 6, 7]
     np.testing.assert_array_equal(labels[2:8], samples.labels[2:8])
-    assert np.isnan(benchmark.labels_in_usable_span(Stretch(samples, np.zeros(10, dtype=bool)))).all()
+    assert np.isnan(
+        benchmark.labels_in_usable_span(FlightWithUsableRows(samples, np.zeros(10, dtype=bool)))
+    ).all()
 
 
 def test_a_flight_is_scored_by_what_its_log_has():
     rows = small.rows([(10, "left", [1.0, 0.5])], step_s=0.1)
     use = np.ones(10, dtype=bool)
-    assert "classes" in benchmark._score_against_log(Stretch(small.flight(MODEL, 10), use), rows, MODEL)
+    assert "classes" in benchmark._score_against_log(
+        FlightWithUsableRows(small.flight(MODEL, 10), use), rows, MODEL
+    )
     bare = changed(
         small.flight(MODEL, 10),
         labels=np.full((10, 2), np.nan),
         logged_failures=(LoggedFailure(10.2, "left"),),
     )
-    assert benchmark._score_against_log(Stretch(bare, use), rows, MODEL)["failure"] == "left"
+    assert benchmark._score_against_log(FlightWithUsableRows(bare, use), rows, MODEL)["failure"] == "left"
 
 
 def test_data_sets_below_a_folder(tmp_path):

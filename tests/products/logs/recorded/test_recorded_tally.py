@@ -3,8 +3,8 @@
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.recorded import benchmark
-from beaver_ftc_logs.scoring import ENGINE
 
 
 def score(failure=None, detected=False, delay_s=None, false_alarms=0, healthy_s=900.0, right_group=None):

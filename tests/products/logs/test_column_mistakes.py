@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.readings import corrected_readings
+from beaver_ftc_logs.column_mistakes import logs_with_one_mistake_corrected
 from products.logs import small
 from telling import apart
 
@@ -32,7 +32,7 @@ def column(samples, vehicle, name):
 
 def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
     vehicle, samples = log
-    found = {one.correction_text: one for one in corrected_readings(samples, vehicle)}
+    found = {one.correction_text: one for one in logs_with_one_mistake_corrected(samples, vehicle)}
     for name in ("q_rad_s", "beta"):
         scaled = found[f"`scale: 57.3` on {name}"]
         assert scaled.log_jacobian == pytest.approx(np.log(57.29578) if name == "q_rad_s" else 0.0)
@@ -45,7 +45,7 @@ def test_a_factor_is_of_a_column_and_of_what_the_airspeed_makes_of_it(log):
 
 def test_what_is_exchanged_is_exchanged_in_all_of_its_columns(log):
     vehicle, samples = log
-    found = {one.correction_text: one.samples for one in corrected_readings(samples, vehicle)}
+    found = {one.correction_text: one.samples for one in logs_with_one_mistake_corrected(samples, vehicle)}
     rates, turned = (
         found["p_rad_s and r_rad_s exchanged"],
         found["the commands of left_aileron and right_aileron exchanged"],

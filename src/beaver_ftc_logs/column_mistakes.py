@@ -19,7 +19,7 @@ _UNIT_SIZE_RATIOS = (180.0 / np.pi, 1000.0)
 """Sizes of units in one another: degrees in a radian, thousandths in one."""
 
 
-class CorrectedReading(NamedTuple):
+class CorrectedLog(NamedTuple):
     """A log with one mistake mended.
 
     correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
@@ -32,9 +32,9 @@ class CorrectedReading(NamedTuple):
     log_jacobian: float = 0.0
 
 
-def corrected_readings(
+def logs_with_one_mistake_corrected(
     samples: Samples, vehicle: Vehicle, surfaces_of_unknown_effect: Collection[str] = ()
-) -> Iterator[CorrectedReading]:
+) -> Iterator[CorrectedLog]:
     """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit.
     surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
     commands."""
@@ -45,18 +45,18 @@ def corrected_readings(
         order = list(range(len(surfaces)))
         order[a], order[b] = b, a
         exchanged = replace(samples, commands=samples.commands[:, order])
-        yield CorrectedReading(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged)
+        yield CorrectedLog(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged)
     for one, other in combinations(rates, 2):
-        exchanged = _with_columns_from(samples, vehicle, {one: other, other: one}, {})
-        yield CorrectedReading(f"{one} and {other} exchanged", exchanged)
+        exchanged = _with_exchanged_or_scaled_columns(samples, vehicle, {one: other, other: one}, {})
+        yield CorrectedLog(f"{one} and {other} exchanged", exchanged)
     for name in [*rates, *vehicle.signal_columns]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit for unit in _UNIT_SIZE_RATIOS)):
-            scaled = _with_columns_from(samples, vehicle, {}, {name: factor})
+            scaled = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
             log_jacobian = float(np.log(abs(factor))) if name in rates else 0.0
-            yield CorrectedReading(f"`scale: {factor:.4g}` on {name}", scaled, log_jacobian)
+            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, log_jacobian)
 
 
-def _with_columns_from(
+def _with_exchanged_or_scaled_columns(
     samples: Samples,
     vehicle: Vehicle,
     source_of_column: Mapping[str, str],

@@ -142,16 +142,17 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     assert allowed == pytest.approx(correlation_bound_by_constant_uncertainty + swings + last)
 
 
-def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
+@pytest.mark.parametrize("tolerance", [(), (0.1,), (0.1, 0.2), (0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.4, 0.5)])
+def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     """Every onset test by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its
-    share."""
+    share. Of even and odd numbers of regressors."""
     rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
     kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=tolerance)
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
     block["K_x"], block["K_d"], block["S_inverse"], block["drift_decay_factor"] = K_x, K_d, S, kept
-    seen, regressors = rng.normal(size=2), rng.normal(size=(2, 2))
-    block["innovation"], block["regressor_response"][:2] = seen, regressors
+    seen, regressors = rng.normal(size=2), rng.normal(size=(len(tolerance), 2))
+    block["innovation"], block["regressor_response"][: len(tolerance)] = seen, regressors
     for name in (
         "signature_for_onset",
         "signature_filter_state",
@@ -185,11 +186,13 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say():
     assert lane["correlation_weight"] == pytest.approx(w)
     assert lane["correlation"] == pytest.approx(keep * before["correlation"] + seen @ w)
     assert lane["information"] == pytest.approx(keep * before["information"] + (w * r).sum(axis=0))
-    overlaps = keep * before["regressor_correlation"][:2] + regressors @ w
-    assert lane["regressor_correlation"][:2] == pytest.approx(overlaps)
-    assert lane["regressor_correlation"][2:] == pytest.approx(before["regressor_correlation"][2:])
+    overlaps = keep * before["regressor_correlation"][: len(tolerance)] + regressors @ w
+    assert lane["regressor_correlation"][: len(tolerance)] == pytest.approx(overlaps)
+    assert lane["regressor_correlation"][len(tolerance) :] == pytest.approx(
+        before["regressor_correlation"][len(tolerance) :]
+    )
     assert lane["correlation_bound_by_coefficient_errors"] == pytest.approx(
-        np.array([0.1, 0.2]) @ np.abs(overlaps)
+        np.array(tolerance) @ np.abs(overlaps)
     )
 
 

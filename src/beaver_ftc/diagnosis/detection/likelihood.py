@@ -481,19 +481,25 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay):
 def accumulate_regressor_correlation(block, onset_tests, overlap, n_tests, evidence_decay):
     """Add the frame to R_j of n onset tests, `overlap` (regressors, tests), and fill their
     `correlation_bound_by_coefficient_errors`."""
-    weight, correlation_bound_by_coefficient_errors = (
-        onset_tests.correlation_weight,
-        onset_tests.correlation_bound_by_coefficient_errors,
-    )
-    correlation_bound_by_coefficient_errors[:n_tests] = 0.0
-    for j in range(block.n_regressors):
-        r0, r1 = block.regressor_response[j, 0], block.regressor_response[j, 1]
-        overlap_of_regressor, tolerance = overlap[j], block.regressor_tolerance[j]
+    weight, bound = onset_tests.correlation_weight, onset_tests.correlation_bound_by_coefficient_errors
+    response, tolerance = block.regressor_response, block.regressor_tolerance
+    n_in_pairs = block.n_regressors - block.n_regressors % 2
+    bound[:n_tests] = 0.0
+    for a in range(0, n_in_pairs, 2):  # in pairs: weight and bound pass through memory half as often
+        b = a + 1
+        a0, a1, b0, b1 = response[a, 0], response[a, 1], response[b, 0], response[b, 1]
+        overlap_a, tolerance_a, overlap_b, tolerance_b = overlap[a], tolerance[a], overlap[b], tolerance[b]
         for k in range(n_tests):
-            overlap_of_regressor[k] = evidence_decay * overlap_of_regressor[k] + (
-                weight[0, k] * r0 + weight[1, k] * r1
-            )
-            correlation_bound_by_coefficient_errors[k] += tolerance * abs(overlap_of_regressor[k])
+            w0, w1 = weight[0, k], weight[1, k]
+            R_a = evidence_decay * overlap_a[k] + (w0 * a0 + w1 * a1)
+            R_b = evidence_decay * overlap_b[k] + (w0 * b0 + w1 * b1)
+            overlap_a[k], overlap_b[k] = R_a, R_b
+            bound[k] = bound[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+    for j in range(n_in_pairs, block.n_regressors):
+        r0, r1 = response[j, 0], response[j, 1]
+        for k in range(n_tests):
+            overlap[j, k] = evidence_decay * overlap[j, k] + (weight[0, k] * r0 + weight[1, k] * r1)
+            bound[k] += tolerance[j] * abs(overlap[j, k])
 
 
 @kernel
@@ -557,11 +563,10 @@ def max_log_likelihood_ratio(is_loss, evidence, information):
 
     It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
     """
-    if evidence <= 0.0:
-        return 0.0
+    llr = 0.5 * evidence * evidence / information
     if is_loss and evidence > information:
-        return evidence - 0.5 * information
-    return 0.5 * evidence * evidence / information
+        llr = evidence - 0.5 * information
+    return llr if evidence > 0.0 else 0.0  # not earlier: each way out would be a division of its own
 
 
 @kernel

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 
 from beaver_ftc import compiled
 from beaver_ftc.compiled import direct, kernel, plain, record, sized, target
-from beaver_ftc.compiled.records import Room, shape_of
+from beaver_ftc.compiled.records import LINE_BYTES, Room, shape_of
 from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE, BlockCapacity, StatisticalRecordSize
-from beaver_ftc.loop.assembly import frame_dtype
+from beaver_ftc.loop.assembly import frame_dtype, taken
 
 of_known = pytest.mark.skipif(
     numba.config.DISABLE_JIT or not compiled.borrows(), reason="records have sizes to this compiler"
@@ -99,7 +99,7 @@ def check(records):
     expected, totals = as_plain(records)
     found = np.zeros(6)
     everything(records, found)
-    assert records.tobytes() == expected.tobytes()
+    assert np.array_equal(records, expected)
     assert found == pytest.approx(totals)
 
 
@@ -140,7 +140,7 @@ def test_a_copy_is_as_good_as_the_record():
     for name, other in copies(records).items():
         found = np.zeros(6)
         everything(other, found)
-        assert other.tobytes() == expected.tobytes(), name
+        assert np.array_equal(other, expected), name
         assert found == pytest.approx(totals), name
 
 
@@ -163,7 +163,7 @@ def test_a_record_sent_to_a_worker_and_back_is_as_good():
     expected, totals = as_plain(records)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         back, found = pool.apply(_in_a_worker, (records,))
-    assert back.tobytes() == expected.tobytes()
+    assert np.array_equal(back, expected)
     assert found == pytest.approx(totals)
     check(back)
 
@@ -211,6 +211,25 @@ def test_what_changes_in_size_stands_last():
     assert starts[:4] == starts[4:]
     assert shape_of(TEST) is None
     assert shape_of(dtype) == shape_of(whole_dtype(1, 7)) != shape_of(block_dtype(4, 2))
+
+
+def begins(array):
+    return array.__array_interface__["data"][0]
+
+
+@pytest.mark.parametrize("n", [3, 17])
+def test_what_fills_several_lines_of_the_cache_begins_with_one(n):
+    """In a flight's memory, of whatever size; what is smaller stands close, without a gap before it."""
+    frames = taken(
+        (3,), frame_dtype(n, StatisticalRecordSize(BlockCapacity(9, 5), BlockCapacity(7, 6), 2, 3))
+    )
+    for frame in frames:
+        for block in frame["fdi"]["statistical"]["block"]:
+            assert begins(block["onset_tests"]) % LINE_BYTES == 0
+            assert begins(block["regressor_correlation"]) % LINE_BYTES == 0
+    close = record(k=int, few=Room(3), other=Room(5))
+    assert [close.fields[name][1] for name in close.names] == [0, 8, 32]
+    assert close.itemsize == 72
 
 
 def test_a_room_stays_one_in_sums_products_and_quotients():

@@ -8,10 +8,13 @@ these numbers (`places`) when Python calls it, and is the same for all sizes: co
 import functools
 import hashlib
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple, Union
 
 import numpy as np
+
+LINE_BYTES = 64  # a line of a processor's cache
+FEWEST_LINES = 4  # fewer are not worth the gap before them
 
 
 class Room(int):
@@ -79,11 +82,31 @@ def record(**fields: Any) -> np.dtype:
     given = {name: _kind_and_shape(field) for name, field in fields.items()}
     changing = {name for name, field in given.items() if _changes(*field)}
     order = sorted(given, key=changing.__contains__)
-    dtype = np.dtype([(name, given[name][0], tuple(map(int, given[name][1]))) for name in order], align=True)
+    formats = [np.dtype((kind, tuple(map(int, shape)))) for kind, shape in map(given.__getitem__, order)]
+    dtype = np.dtype({"names": order, "formats": formats}, align=True)
     if changing:
+        dtype = _on_lines(dtype, changing)
         fixed = np.dtype([(name, *given[name]) for name in given if name not in changing], align=True)
         _shapes[dtype] = Shape(fixed, tuple(_part(name, *given[name]) for name in order if name in changing))
     return dtype
+
+
+def _on_lines(dtype: np.dtype, parts: Collection[str]) -> np.dtype:
+    """The same record, each of these parts on a line of the processor's cache if it fills several: of an
+    array that begins between two, each access of a vector instruction touches both."""
+    offsets, end = [], 0
+    for name in dtype.names or ():
+        of = dtype[name]
+        apart = LINE_BYTES if name in parts and of.itemsize >= FEWEST_LINES * LINE_BYTES else of.alignment
+        offsets.append(_up_to(apart, end))
+        end = offsets[-1] + of.itemsize
+    named = {"names": dtype.names, "formats": [dtype[name] for name in dtype.names or ()], "offsets": offsets}
+    whole = LINE_BYTES if end >= FEWEST_LINES * LINE_BYTES else dtype.alignment
+    return np.dtype(named | {"itemsize": _up_to(whole, end)}, align=True)
+
+
+def _up_to(step: int, size: int) -> int:
+    return -(-size // step) * step
 
 
 def _kind_and_shape(given: Any) -> tuple[Any, tuple[int, ...]]:

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.compiled import record, sized
+from beaver_ftc.compiled.records import LINE_BYTES
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import SUPERVISOR
 from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS, set_up_autopilot
@@ -68,7 +69,14 @@ def taken(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.nda
     for i, memory in enumerate(_spare):
         if memory.size >= n_bytes:
             return np.ndarray(shape, kind, _spare.pop(i))
-    return np.ndarray(shape, kind, np.empty(n_bytes, np.uint8))
+    return np.ndarray(shape, kind, _new_memory(n_bytes))
+
+
+def _new_memory(n_bytes: int) -> np.ndarray:
+    """New bytes, from the beginning of a line of the processor's cache: see compiled/records.py."""
+    bytes_and_gap = np.empty(n_bytes + LINE_BYTES, np.uint8)
+    gap = -bytes_and_gap.__array_interface__["data"][0] % LINE_BYTES
+    return np.frombuffer(memoryview(bytes_and_gap), np.uint8, n_bytes, gap)
 
 
 def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:

@@ -250,11 +250,12 @@ def alarm_axis(flown):
 def loudest(flown, until_s=np.inf):
     """Largest share of the threshold that a filter reached before an instant."""
     rows = (flown.t > 0) & (flown.t < until_s - DUST_S)
-    shares = [
-        np.abs(flown[f"{a}_alarm_residual_rad_s"][rows]) / flown[f"{a}_alarm_threshold_rad_s"][rows]
-        for a in AXES
-    ]
-    return float(np.max(shares)) if rows.any() else 0.0
+    if not rows.any():
+        return 0.0
+    residual, threshold = (
+        np.array([flown[f"{a}_alarm_{of}_rad_s"][rows] for a in AXES]) for of in ("residual", "threshold")
+    )
+    return float(np.max(np.abs(residual) / np.where(residual == 0.0, 1.0, threshold)))  # 0 of 0 is none
 
 
 # What the log shows of the flight.

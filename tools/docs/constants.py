@@ -7,6 +7,7 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from warnings import catch_warnings
 
 import numpy as np
 
@@ -61,7 +62,8 @@ def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
         if names:
             parts = path.relative_to(ROOT / "src").with_suffix("").parts
             dotted = ".".join(part for part in parts if part != "__init__")
-            with suppress(ImportError, BeaverFtcError):  # what an optional library would bring
+            # what an optional library would bring; what has moved, and says so
+            with suppress(ImportError, BeaverFtcError), catch_warnings(action="ignore"):
                 module = import_module(dotted)
                 found = {name: getattr(module, name, None) for name in names}
                 shown = {name: value for name, value in found.items() if _is_shown(value)}

@@ -7,7 +7,7 @@ from math import atan2, cos, degrees, radians, sin
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import fsolve
+from scipy.optimize import fsolve, root
 
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
@@ -245,7 +245,7 @@ def spin(spec: Specification) -> Manoeuvre:
         return spec.rates_of_change(state.array(), controls, 0)[:6]
 
     tries = ((V, rudder) for V in (90.0, 110.0, 130.0) for rudder in (-20.0, 20.0))
-    found = [fsolve(off, [V, -15.0, 0.0, rudder, 0.0, 0.0]) for V, rudder in tries]
+    found = [root(off, [V, -15.0, 0.0, rudder, 0.0, 0.0]).x for V, rudder in tries]  # not each gets there
     state, controls = made(min(found, key=lambda x: float(np.abs(off(x)).max())))
     return Manoeuvre("spin", state, lambda t: controls, 5.0)
 

@@ -124,7 +124,7 @@ def _save_in_short(picture):
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
-    bears, shown = PngInfo(), [picture.view, picture.instants, picture.subtitle]
+    bears, shown = PngInfo(), [picture.view, picture.event_marks, picture.subtitle]
     columns = {name: values.tobytes() for name, values in picture.series.items()}
     bears.add_text("Software", "beaver-ftc")
     bears.add_text("Description", hashlib.sha256(repr([*shown, columns]).encode()).hexdigest())

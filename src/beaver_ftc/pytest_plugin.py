@@ -171,11 +171,11 @@ class ScenarioFile(FlownFile):
     """One scenario."""
 
     def _read(self) -> tuple[str, list[str]]:
-        from beaver_ftc.results.metrics import names
+        from beaver_ftc.results.metrics import expectation_names
         from beaver_ftc.scenario.schema import load
 
         self.scenario = load(self.path)
-        return self.scenario.name, names(self.scenario.expect)
+        return self.scenario.name, expectation_names(self.scenario.expect)
 
     def _fly(self, out: Path) -> Flown:
         from beaver_ftc.results.flight import fly

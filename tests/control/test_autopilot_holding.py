@@ -10,7 +10,7 @@ from beaver_ftc.control import autopilot as holding
 from beaver_ftc.control.autopilot import AUTOPILOT, FASTEST, SPEED, elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
-from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.verdict import verdict_lines
 from beaver_ftc.scenario.schema import Scenario
 from flying import Memory
 from law_records import new_control
@@ -116,7 +116,7 @@ class TestFlights:
         assert np.abs(log["airspeed_mps"][late] - log["airspeed_limited_mps"][late]).max() < 2.0
         assert np.abs(log["altitude_m"][late] - log["altitude_command_m"][late]).max() < 5.0
         assert np.abs(np.diff(log["airspeed_limited_mps"])).max() < 0.0101  # no bump: 1 m/s2 at 100 Hz
-        said = dict(facts(measure(flight)))["limited"]
+        said = dict(verdict_lines(measure(flight)))["limited"]
         assert said.startswith(f"airspeed to at most {limits[0]['value']:.1f} m/s from 2")
 
     def test_a_jam_that_can_be_held_limits_nothing(self):

@@ -18,7 +18,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import measure, metrics
-from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.verdict import verdict_lines
 from beaver_ftc.results.views import views
 from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.scenario.schema import load_text
@@ -375,7 +375,7 @@ def test_it_is_reported():
     assert document["in_charge_s"] == pytest.approx(17.0, abs=0.05)
     assert document["lowest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].min())
     assert document["highest_inhg"] == pytest.approx(log["manifold_pressure_inhg"].max())
-    assert "took over pitch at 12.99 s" in dict(facts(measure(flight)))["engine power"]
+    assert "took over pitch at 12.99 s" in dict(verdict_lines(measure(flight)))["engine power"]
     names = [view.name for view in views(log.columns, power=True)]
     assert "engine" in names
     assert "engine" not in [view.name for view in views(log.columns)]

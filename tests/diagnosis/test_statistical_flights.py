@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.verdict import verdict_lines
 from flying import flown, loss
 
 NOISY = {
@@ -209,7 +209,7 @@ def test_a_scheme_that_is_not_ours_leaves_it_off():
 @pytest.mark.parametrize("given", [{"statistical": {}}, {}])
 def test_a_run_says_what_it_would_have_said_by_itself(given):
     flight, _ = flown(duration_s=6, faults=[loss(at_s=4)], fdi=given)
-    said = dict(facts(measure(flight)))
+    said = dict(verdict_lines(measure(flight)))
     if given:
         assert said["statistical"].startswith("alarm at 4.0")
         assert "threshold 6.62 σ" in said["statistical"]

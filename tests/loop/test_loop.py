@@ -13,7 +13,7 @@ from beaver_ftc.loop import assembly, frame, loop, outcome
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.verdict import facts
+from beaver_ftc.results.verdict import verdict_lines
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import load_scenario
@@ -94,7 +94,7 @@ class TestEveryBuiltInScenario:
         first = min((fault.at_s for fault in flight.scenario.faults), default=0.0)
         after = log["t_s"] >= first
         fastest = max(np.abs(log[f"{axis}_rad_s"][after]).max() for axis in "pqr")
-        why = dict(facts(measure(flight))).get("authority", "")
+        why = dict(verdict_lines(measure(flight))).get("authority", "")
         flies = flight.departure is None and fastest < np.deg2rad(15)
         assert flies or "no deflection could hold the rate" in why
 

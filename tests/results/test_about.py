@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.results.metrics import faults_of, hints
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.results.verdict import facts, outcome_class, title
+from beaver_ftc.results.verdict import outcome_class, title, verdict_lines
 from beaver_ftc.scenario.schema import Scenario
 
 LOSS = {"type": "loss_of_effectiveness", "actuator": "elevator", "magnitude": 0.4, "at_s": 12}
@@ -88,7 +88,7 @@ def test_every_type_of_fault_has_a_size_in_words():
         {"type": "float", "actuator": "rudder", "at_s": 5},
     ]  # fmt: skip
     document = _document(faults=faults_of(Scenario.model_validate({"name": "x", "faults": faults})))
-    said = [how for what, how in facts(Metrics.of(document)) if what in ("fault", "")]
+    said = [how for what, how in verdict_lines(Metrics.of(document)) if what in ("fault", "")]
     assert said == [
         "flap hardover (to the lower stop) at 1.00 s",
         "flap rate limit (10 % of its rate) at 2.00 s to 3.00 s",

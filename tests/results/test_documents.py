@@ -311,7 +311,7 @@ def test_the_page_of_a_report(folders, changed):
 
 
 def test_a_section_is_shown_once_of_each_run(folders, monkeypatch):
-    monkeypatch.setattr(report, "_SECTIONS", [])
+    monkeypatch.setattr(report, "_REGISTERED_SECTIONS", [])
     for _ in range(2):
         register_section(_say_where)
     assert render(folders).count("<em>in ") == 2

@@ -77,7 +77,9 @@ def test_flight_without_alarm_says_that_the_isolation_never_ran(tmp_path):
         log.write(data)
     view = next(view for view in views(quiet.columns) if view.name == "isolation")
     series = read_series(tmp_path / "log.parquet", view.columns)
-    assert all(axes.texts[0].get_text() == view.absent for axes in _panels(quiet, series, "isolation"))
+    assert all(
+        axes.texts[0].get_text() == view.text_without_data for axes in _panels(quiet, series, "isolation")
+    )
     assert closeup_window(marks(measure(quiet))) is None
 
 
@@ -93,7 +95,7 @@ def test_fault_that_never_came_is_not_marked():
 
 def test_no_two_curves_of_one_figure_look_the_same():
     for view in views(Flight().columns):
-        if view.across > 1:
+        if view.n_panel_columns > 1:
             continue
         looks = {}
         for trace in (trace for panel in view.panels for trace in panel.traces if trace.label):

@@ -75,7 +75,7 @@ def test_a_log_in_memory_is_one_table_whatever_its_pieces():
     kept = _filled(MemoryLog(), _rows(2), _rows(3, 2), _rows(1, 5))
     assert kept.row_count() == 6
     assert [chunk["y"].size for chunk in kept.read_chunks()] == [2, 3, 1]
-    then = kept.so_far()
+    then = kept.frozen_copy()
     assert list(next(then.read_chunks(["y", "t_s"]))) == ["y", "t_s"]
     assert np.array_equal(kept.rows, _rows(6))
     kept.write(_rows(1))
@@ -97,8 +97,8 @@ def test_columns_of_a_flight_all_or_some():
 def test_part_of_a_column_is_read_from_where_it_begins():
     whole = pa.array([1.0, 2.0, 3.0, 4.0])
     parts = pa.chunked_array([whole.slice(1, 2), whole.slice(3)])
-    assert list(log._values(parts)) == [2.0, 3.0, 4.0]
-    assert log._values(pa.chunked_array([], pa.float64())).size == 0
+    assert list(log._column_values(parts)) == [2.0, 3.0, 4.0]
+    assert log._column_values(pa.chunked_array([], pa.float64())).size == 0
 
 
 @pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
@@ -144,13 +144,13 @@ def test_folders_are_exchanged_in_one_step_where_a_system_can(tmp_path, monkeypa
         Path(name).mkdir()
         Path(name, name).touch()
     can = hasattr(ctypes.CDLL(None), "renameat2")
-    assert writer._exchange(Path("one"), Path("two")) is can
+    assert writer._swap_folders(Path("one"), Path("two")) is can
     assert Path("one", "two" if can else "one").exists()
     if can:
         with pytest.raises(FileNotFoundError):
-            writer._exchange(Path("one"), Path("three"))
+            writer._swap_folders(Path("one"), Path("three"))
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
-    assert writer._exchange(Path("one"), Path("two")) is False
+    assert writer._swap_folders(Path("one"), Path("two")) is False
 
 
 @pytest.mark.parametrize("number", [errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.EACCES])
@@ -166,9 +166,9 @@ def test_a_kernel_or_a_file_system_that_cannot_exchange_is_no_error(monkeypatch,
     monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: SimpleNamespace(renameat2=renameat2))
     if number == errno.EACCES:
         with pytest.raises(PermissionError):
-            writer._exchange(Path("one"), Path("two"))
+            writer._swap_folders(Path("one"), Path("two"))
     else:
-        assert writer._exchange(Path("one"), Path("two")) is False
+        assert writer._swap_folders(Path("one"), Path("two")) is False
     assert [each[1:4:2] for each in asked] == [(b"one", b"two")]
 
 

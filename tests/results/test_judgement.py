@@ -126,10 +126,10 @@ def test_two_surfaces_are_beyond_one_fault_once_the_second_fails():
         Truth.of(load({"name": "x", "faults": [LOSS, second], "fdi": {"fault_class": "all", "pairs": pairs}}))
         for pairs in (False, True)
     )
-    assert not one.meant_by("unanticipated", 6.9)
-    assert [fault.at_s for fault in one.meant_by("unanticipated", 7.0)] == [7.0]
-    assert not several.meant_by("unanticipated", 7.0)
-    assert [fault.actuator for fault in several.meant_by("rudder", 7.0)] == ["rudder"]
+    assert not one.faults_named_rightly_by("unanticipated", 6.9)
+    assert [fault.at_s for fault in one.faults_named_rightly_by("unanticipated", 7.0)] == [7.0]
+    assert not several.faults_named_rightly_by("unanticipated", 7.0)
+    assert [fault.actuator for fault in several.faults_named_rightly_by("rudder", 7.0)] == ["rudder"]
 
 
 def test_a_fault_at_the_end_of_a_flight_never_struck():

@@ -62,13 +62,13 @@ def test_a_spooled_log_is_kept_in_a_file_and_reads_as_it_was(tmp_path):
     rows = np.random.default_rng(2).standard_normal((40, 3))
     log = SpooledLog()
     log.open(COLUMNS)
-    assert log.so_far().row_count() == 0
+    assert log.frozen_copy().row_count() == 0
     buffer = rows[:25].copy()
     log.write(buffer)
     buffer[:] = -1.0  # the loop reuses its buffer
-    then = log.so_far()
+    then = log.frozen_copy()
     log.write(rows[25:])
-    now = log.so_far()
+    now = log.frozen_copy()
     log.open(COLUMNS)  # a new flight
     log.write(rows[:3])
     assert then.rows.tobytes() == rows[:25].tobytes()

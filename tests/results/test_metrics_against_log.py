@@ -645,7 +645,7 @@ def test_an_airspeed_that_is_within_what_is_expected_as_a_mean_alone():
     assert mean < judged["expected"] < at_once
     assert judged["actual"] == pytest.approx(mean, rel=2e-3)
     said = f"airspeed {judged['actual']:.3g} m/s (10 s mean; largest at one instant {at_once:.3g})"
-    assert said in dict(verdict.facts(model.Metrics.of(flight.metrics)))["profile"]
+    assert said in dict(verdict.verdict_lines(model.Metrics.of(flight.metrics)))["profile"]
 
 
 def test_the_flights_show_what_is_compared():

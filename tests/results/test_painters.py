@@ -13,7 +13,7 @@ from beaver_ftc.results import figures
 from beaver_ftc.results import painters as module
 from beaver_ftc.results.figures import pictures_of, save
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.results.painters import drawing, painters, share
+from beaver_ftc.results.painters import drawing, painters, shares_of_equal_work
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="processes are forked on Linux")
 
@@ -77,7 +77,7 @@ def test_a_failure_is_raised_here_once_all_have_ended(pictures, tmp_path):
 
 def test_whoever_has_least_draws_the_next_largest(pictures):
     sizes = sorted(len(p.view.panels) for p in pictures)
-    assert [[len(p.view.panels) for p in each] for each in share(pictures, 2)] == [
+    assert [[len(p.view.panels) for p in each] for each in shares_of_equal_work(pictures, 2)] == [
         [sizes[2]],
         [sizes[1], sizes[0]],
     ]

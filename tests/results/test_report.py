@@ -12,7 +12,7 @@ from synthetic import COLUMNS, Expect, Flight, Scenario, rows
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.report import _words, parts, render, write_report
+from beaver_ftc.results.report import _verdict_words, render, script_style_and_data, write_report
 
 NASTY = "</script><script>throw 1</script> <b>&amp;"
 
@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_scenario_without_a_description_has_none():
-    assert _words(metrics(Flight()), "name: a\n")["description"] == ""
+    assert _verdict_words(metrics(Flight()), "name: a\n")["description"] == ""
 
 
 def test_report_needs_nothing_but_itself(folder):
@@ -299,9 +299,9 @@ def test_a_page_has_each_run_whole_and_at_full_rate_around_its_events(tmp_path, 
     flight = Flight(frames=6000, columns=columns, guaranteed_delay_s=None)
     case = {"actuator": None, "type": "damage", "at_s": 12.0, "end_s": 40.0, "size": {"case": "fin-off"}}
     run = _folder(tmp_path / "a", flight, more={"faults": [case, {**case, "type": "stuck"}]})
-    (found,) = json.loads(parts([run], [json.loads((run / "metrics.json").read_text())], [NASTY])["data"])[
-        "runs"
-    ]
+    (found,) = json.loads(
+        script_style_and_data([run], [json.loads((run / "metrics.json").read_text())], [NASTY])["data"]
+    )["runs"]
     assert (found["name"], found["jet"], found["window"]) == (NASTY, jet, [11.5, 14.12])
     assert found["damage"] == [{"part": "fin", "at_s": 12.0, "end_s": 40.0}]
     whole, near = (np.frombuffer(base64.b64decode(level["t_s"])) for level in found["levels"])
@@ -319,7 +319,7 @@ def test_many_runs_have_fewer_points_each_and_a_quiet_one_is_looked_at_whole(tmp
     run = _folder(tmp_path / "a", quiet)
     document = json.loads((run / "metrics.json").read_text())
     for count, most in ((2, 4000), (3, 2666), (14, 600)):
-        found = json.loads(parts([run] * count, [document] * count)["data"])["runs"]
+        found = json.loads(script_style_and_data([run] * count, [document] * count)["data"])["runs"]
         assert [(one["name"], one["window"], len(one["levels"])) for one in found] == [
             ("quiet", [0.0, pytest.approx(39.99, abs=0.1)], 1)
         ] * count

@@ -4,7 +4,7 @@ import pytest
 
 from beaver_ftc.results import verdict
 from beaver_ftc.results.model import Certified, Change, DeclaredFault, Metrics
-from beaver_ftc.results.verdict import expectations
+from beaver_ftc.results.verdict import expectations_in_words
 from beaver_ftc.scenario.schema import Expect
 
 # Each key of `expect:` with what the metrics say of it, whether it passes, and the sentence
@@ -42,7 +42,7 @@ SAID = [
 @pytest.mark.parametrize(("name", "expected", "actual", "passed", "said"), SAID)
 def test_an_expectation_in_words(name, expected, actual, passed, said):
     found = {"name": name, "expected": expected, "actual": actual, "passed": passed}
-    (held,) = expectations(Metrics.of({"expectations": [found]}))
+    (held,) = expectations_in_words(Metrics.of({"expectations": [found]}))
     assert (held.name, held.sentence, held.passed) == (name, said, passed)
 
 
@@ -66,7 +66,8 @@ DETECTION = {"detected": True, "time_s": 12.5, "delay_s": 0.5, "guaranteed_delay
 )
 def test_the_alarm_in_words(changes, false_alarm, said):
     assert (
-        verdict._detection(Metrics.of({"detection": DETECTION | changes, "false_alarm": false_alarm})) == said
+        verdict._detection_text(Metrics.of({"detection": DETECTION | changes, "false_alarm": false_alarm}))
+        == said
     )
 
 
@@ -79,8 +80,8 @@ def test_the_alarm_in_words(changes, false_alarm, said):
 )
 def test_the_statistical_detector_in_words(time_s, said):
     found = {"time_s": time_s, "alarm_level": 6.5, "closest_approach": 0.81}
-    assert verdict._statistical(Metrics.of({"detection": {"statistical": found}})) == said
-    assert verdict._statistical(Metrics.of({"detection": {}})) == ""
+    assert verdict._statistical_text(Metrics.of({"detection": {"statistical": found}})) == said
+    assert verdict._statistical_text(Metrics.of({"detection": {}})) == ""
 
 
 NAMED = {
@@ -132,7 +133,7 @@ FAULTS = [
     ],
 )
 def test_a_named_fault_in_words(changes, said):
-    assert verdict._isolation(Metrics.of({"isolation": NAMED | changes, "faults": FAULTS})) == said
+    assert verdict._isolation_text(Metrics.of({"isolation": NAMED | changes, "faults": FAULTS})) == said
 
 
 @pytest.mark.parametrize(
@@ -181,57 +182,57 @@ FIRST, AGAIN, OTHER = (
 )
 def test_what_was_named_before_in_words(gone, said):
     document = {"isolation": NAMED | {"withdrawn": gone}, "faults": FAULTS}
-    assert verdict._isolation(Metrics.of(document)) == f"elevator after 0.25 s; correct, stuck{said}"
+    assert verdict._isolation_text(Metrics.of(document)) == f"elevator after 0.25 s; correct, stuck{said}"
     nothing = {"isolated": False, "candidates": [], "withdrawn": gone}
     assert (
-        verdict._isolation(Metrics.of({"isolation": nothing, "detection": {"detected": True}}))
+        verdict._isolation_text(Metrics.of({"isolation": nothing, "detection": {"detected": True}}))
         == f"none{said}"
     )
 
 
 def test_modes_left_out_are_counted_before_the_last():
     modes = [{"mode": "nominal", "time_s": 0.0}, {"mode": "adaptive", "time_s": 2.0}]
-    assert verdict._supervisor(Metrics.of({"supervisor": modes})) == "nominal 0.00 s → adaptive 2.00 s"
-    said = verdict._supervisor(Metrics.of({"supervisor": modes, "mode_changes_left_out": 7}))
+    assert verdict._supervisor_text(Metrics.of({"supervisor": modes})) == "nominal 0.00 s → adaptive 2.00 s"
+    said = verdict._supervisor_text(Metrics.of({"supervisor": modes, "mode_changes_left_out": 7}))
     assert said == "nominal 0.00 s → (7 more) → adaptive 2.00 s"
 
 
 def test_engine_and_authority_in_words():
     power = {"from_s": 13.2, "in_charge_s": 0.9, "lowest_inhg": 20.04, "highest_inhg": 22.26}
-    assert verdict._engine_power(Metrics.of({"engine_power": power})) == (
+    assert verdict._engine_power_text(Metrics.of({"engine_power": power})) == (
         "took over pitch at 13.20 s, for 0.90 s in all, 20.0 to 22.3 inHg"
     )
-    assert verdict._engine_power(Metrics.of({"engine_power": None})) == ""
-    least = verdict.LEAST_BEYOND_S
+    assert verdict._engine_power_text(Metrics.of({"engine_power": None})) == ""
+    least = verdict.MIN_SHOWN_BEYOND_S
     axes = {"p": {"beyond_s": 0.5 * least}, "q": {"beyond_s": 1.89}, "r": {"beyond_s": least}}
-    assert verdict._authority(Metrics.of({"authority": axes})) == (
+    assert verdict._insufficient_authority_text(Metrics.of({"authority": axes})) == (
         f"no deflection could hold the rate: q for 1.89 s, r for {least:.2f} s"
     )
-    assert verdict._authority(Metrics.of({"authority": None})) == ""
+    assert verdict._insufficient_authority_text(Metrics.of({"authority": None})) == ""
 
 
 def test_a_probing_in_words():
     said = "flap and elevator moved from 14.00 s to 18.50 s"
-    assert verdict._probing(Metrics.of({"isolation": {"probing_s": [14.0, 18.5]}})) == said
-    assert verdict._probing(Metrics.of({"isolation": {"probing_s": None}})) == ""
+    assert verdict._probing_text(Metrics.of({"isolation": {"probing_s": [14.0, 18.5]}})) == said
+    assert verdict._probing_text(Metrics.of({"isolation": {"probing_s": None}})) == ""
 
 
 def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
     change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
-    assert verdict._changed(Change.of(change)) == "law adaptive at 6.00 s"
-    assert verdict._changed(Change.of({**change, "law": None})) == "declared sensors at 6.00 s"
+    assert verdict._change_text(Change.of(change)) == "law adaptive at 6.00 s"
+    assert verdict._change_text(Change.of({**change, "law": None})) == "declared sensors at 6.00 s"
     found = {"sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None, "false_alarm": False}
-    said = verdict._changed(Change.of({**change, **found}))
+    said = verdict._change_text(Change.of({**change, **found}))
     assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, not isolated"
-    said = verdict._changed(Change.of({**change, **found, "isolated": "rudder", "false_alarm": True}))
+    said = verdict._change_text(Change.of({**change, **found, "isolated": "rudder", "false_alarm": True}))
     assert said.endswith("the diagnosis before: FALSE ALARM at 2.50 s, rudder")
 
 
 def test_stays_outside_the_envelope_are_counted_from_the_first():
     exits = [{"start_s": 3.0, "end_s": 4.5}, {"start_s": 8.0, "end_s": 9.0}]
     metrics = {"envelope_exits": exits, "envelope": {"exits": 2, "outside_s": 2.5}}
-    assert verdict._envelope(Metrics.of(metrics)) == "left 2 times, 2.50 s in all, first at 3.00 s"
-    assert verdict._envelope(Metrics.of({**metrics, "envelope_exits": []})) == ""
+    assert verdict._envelope_text(Metrics.of(metrics)) == "left 2 times, 2.50 s in all, first at 3.00 s"
+    assert verdict._envelope_text(Metrics.of({**metrics, "envelope_exits": []})) == ""
 
 
 @pytest.mark.parametrize(
@@ -245,10 +246,10 @@ def test_stays_outside_the_envelope_are_counted_from_the_first():
 )
 def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said):
     declared = DeclaredFault.of(fault | {"at_s": 2.0, "end_s": 5.0})
-    assert verdict._sizes(declared) == said
+    assert verdict._fault_size_texts(declared) == said
     size = f" ({said[0]})" if said else ""
     expected = f"sensor {fault['sensor']} {fault['type']}{size} at 2.00 s to 5.00 s"
-    assert verdict._fault(declared) == expected
+    assert verdict._fault_text(declared) == expected
 
 
 @pytest.mark.parametrize(
@@ -256,7 +257,7 @@ def test_the_size_of_an_instruments_fault_is_in_the_instruments_unit(fault, said
     [(0.125, "0.12 s"), (999.994, "999.99 s"), (1000.0, "1000.0 s"), (1000.5, "1000.5 s")],
 )
 def test_long_times_are_told_to_a_tenth(seconds, said):
-    assert verdict._time(seconds) == said
+    assert verdict._seconds_text(seconds) == said
 
 
 def flown(**changes):
@@ -285,7 +286,7 @@ def test_the_verdict_is_a_line_for_each_thing_worth_knowing():
     assert "expected      MISSED detection delay ≤ 0.5 s, got none" in text
     assert text.splitlines()[-1] == " results       runs/a-flight"
     assert "\x1b" not in text
-    for what, how in verdict.facts(Metrics.of(flown())):
+    for what, how in verdict.verdict_lines(Metrics.of(flown())):
         assert f" {what:13} {how}" in text
     after = verdict.verdict_text(Metrics.of(flown()), "runs/a-flight")
     assert "tracking RMS  p 0.1  q 0.25  r 1 deg/s after the fault" in after
@@ -321,7 +322,7 @@ def test_a_limit_that_was_lifted_is_said_to_be_gone(limit, said):
     """Only of a limit that is not in force when the flight ends is it said that it is gone."""
     keys = ("limits", "side", "value", "in_force")
     entry = {"time_s": 20.0, "because": "trim", **dict(zip(keys, limit, strict=True))}
-    assert ("limited", said) in list(verdict.facts(Metrics.of(flown(limits=[entry]))))
+    assert ("limited", said) in list(verdict.verdict_lines(Metrics.of(flown(limits=[entry]))))
 
 
 LINK = {
@@ -366,7 +367,7 @@ NEARLY = {
     ],
 )
 def test_the_rest_of_a_flight_in_words(changes, what, said):
-    assert dict(verdict.facts(Metrics.of(flown(**changes)))).get(what) == said
+    assert dict(verdict.verdict_lines(Metrics.of(flown(**changes)))).get(what) == said
 
 
 @pytest.mark.parametrize(
@@ -379,7 +380,7 @@ def test_the_rest_of_a_flight_in_words(changes, what, said):
     ],
 )
 def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, without, said):
-    assert verdict._certificate(Certified(statements, without), "runs/x") == said
+    assert verdict._certificate_text(Certified(statements, without), "runs/x") == said
 
 
 @pytest.mark.parametrize(

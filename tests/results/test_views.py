@@ -15,12 +15,12 @@ from beaver_ftc.results.views import (
     Panel,
     Trace,
     View,
-    _share_of_bound,
+    _residual_over_threshold,
     estimators,
-    kinds,
     series_of,
-    sources,
+    source_columns,
     surfaces,
+    surfaces_by_kind,
     views,
 )
 from kept import picture
@@ -92,7 +92,7 @@ def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it
 
 
 def test_what_a_shown_column_is_made_from():
-    assert sources(["p_ratio", "fie_a_q_ratio", "mode", "p_ratio"]) == (
+    assert source_columns(["p_ratio", "fie_a_q_ratio", "mode", "p_ratio"]) == (
         "p_residual_rad_s", "p_threshold_rad_s",
         "fie_a_q_residual_rad_s", "fie_a_q_lower_rad_s", "fie_a_q_upper_rad_s", "mode",
     )  # fmt: skip
@@ -106,7 +106,7 @@ def test_many_panels_are_set_side_by_side(estimators, across):
     others = [name for name in COLUMNS if not name.startswith("fie_")]
     known = views([*others, *columns, *(f"fie_{name}_excluded" for name in names)])
     (view,) = (view for view in known if view.name == "ratio")
-    assert (len(view.panels), view.across) == (1 + estimators, across)
+    assert (len(view.panels), view.n_panel_columns) == (1 + estimators, across)
 
 
 T_S = np.arange(0.0, 20.0, 0.5)
@@ -138,11 +138,13 @@ SMALL = View(
     "Side by side",
     (
         Panel("first (of two)", (Trace("x_rad", "one", "actual"), Trace("x_rad", "", "bound", -1.0))),
-        Panel("second", (Trace("y", "two", "target"),), limits=(-0.5, 2.0), level=0.25),
-        Panel("third", (Trace("y", "third", "p"),), shade="flag", shade_label="shaded", log_scale=True),
+        Panel("second", (Trace("y", "two", "target"),), limits=(-0.5, 2.0), line_at=0.25),
+        Panel(
+            "third", (Trace("y", "third", "p"),), shade_column="flag", shade_label="shaded", log_scale=True
+        ),
     ),
-    across=2,
-    absent="nothing to see",
+    n_panel_columns=2,
+    text_without_data="nothing to see",
 )
 
 
@@ -189,7 +191,7 @@ def test_the_curves_of_modes_are_steps_and_dashes_are_in_points():
 
 def test_a_figure_is_laid_out_in_inches():
     """Panels of the supervisor are a quarter of an inch, and one more a step, high; the others the same."""
-    figure, grid = figures._laid_out(ALL["supervisor"], figures.figure_class())
+    figure, grid = figures._empty_figure_and_axes(ALL["supervisor"], figures.figure_class())
     heights = [1.25, 0.75, 0.75]
     height = 0.9 + 0.85 + sum(heights) + 2 * 0.42
     assert list(figure.get_size_inches()) == pytest.approx([10.0, height])
@@ -200,10 +202,10 @@ def test_a_figure_is_laid_out_in_inches():
     assert boxes[0].y1 * height == pytest.approx(height - 0.9)
     assert boxes[2].y0 * height == pytest.approx(0.85)
     assert (boxes[0].y0 - boxes[1].y1) * height == pytest.approx(0.42)
-    figure, grid = figures._laid_out(ALL["isolation"], figures.figure_class())
+    figure, grid = figures._empty_figure_and_axes(ALL["isolation"], figures.figure_class())
     assert list(figure.get_size_inches()) == pytest.approx([12.0, 0.9 + 0.85 + 3 * 1.5 + 2 * 0.42])
     assert grid[0, 0].get_position().x0 * 12 == pytest.approx(0.75)
-    figure, _ = figures._laid_out(ALL["tracking"], figures.figure_class())
+    figure, _ = figures._empty_figure_and_axes(ALL["tracking"], figures.figure_class())
     assert figure.get_size_inches()[1] == pytest.approx(0.9 + 0.85 + 3 * 1.75 + 2 * 0.42)
 
 
@@ -258,7 +260,7 @@ def test_up_to_4000_points_are_shown_as_they_are(rows, points):
 
 def test_of_a_residual_of_nothing_the_upper_bound_counts():
     chunk = {"a": np.array([0.0, -1.0]), "b": np.array([0.0, -4.0]), "c": np.array([2.0, 2.0])}
-    assert list(_share_of_bound(chunk, "abc")) == [0.0, 0.25]
+    assert list(_residual_over_threshold(chunk, "abc")) == [0.0, 0.25]
 
 
 MANY = (
@@ -277,9 +279,9 @@ def test_of_more_than_eight_surfaces_those_of_a_kind_share_a_panel_and_none_is_l
     )
     columns = [f"{name}_{each}" for name in MANY for each in what]
     known = {view.name: view for view in views([*columns, *(f"{a}_step_likelihood_share" for a in "pqr")])}
-    assert list(kinds(MANY)) == ["elevator", "flap", "rudder", "aileron", "stabiliser"]
+    assert list(surfaces_by_kind(MANY)) == ["elevator", "flap", "rudder", "aileron", "stabiliser"]
     labels = [panel.label for panel in known["surfaces"].panels]
-    assert labels[::2] == [f"{kind}: commanded" for kind in kinds(MANY)]
+    assert labels[::2] == [f"{kind}: commanded" for kind in surfaces_by_kind(MANY)]
     where = [("surfaces", "cmd_rad"), ("surfaces", "effective_rad"), ("likelihood", "loss_likelihood_share")]
     for name, ending in (*where, *(("effectiveness", each) for each in what[:2])):
         shown = [t.column for panel in known[name].panels for t in panel.traces if t.column.endswith(ending)]

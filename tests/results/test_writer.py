@@ -48,7 +48,7 @@ def test_failure_leaves_no_trace_not_even_of_its_parents(tmp_path):
 @pytest.mark.parametrize("can_exchange", [True, False])
 def test_new_result_replaces_the_old_one_entirely(tmp_path, monkeypatch, can_exchange):
     if not can_exchange:
-        monkeypatch.setattr(writer, "_exchange", lambda one, other: False)
+        monkeypatch.setattr(writer, "_swap_folders", lambda one, other: False)
     with result_folder(tmp_path, "case") as folder:
         (folder / "metrics.json").write_text("old")
         (folder / "report.html").write_text("old")
@@ -70,7 +70,7 @@ def test_a_run_of_the_same_name_may_end_just_before(tmp_path, monkeypatch, can_e
         return rename(path, target)
 
     if not can_exchange:
-        monkeypatch.setattr(writer, "_exchange", lambda one, other: False)
+        monkeypatch.setattr(writer, "_swap_folders", lambda one, other: False)
     monkeypatch.setattr(writer.Path, "rename", late)
     with result_folder(tmp_path, "case") as folder:
         (folder / "metrics.json").write_text("of this one")

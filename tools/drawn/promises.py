@@ -337,7 +337,7 @@ def _tracking_alike(log: Any, metrics: Document, scenario: bf.Scenario) -> Itera
 
 def _words_alike(metrics: Document) -> Iterator[str]:
     """The verdict in words says what the document has."""
-    facts, detection = verdict.facts(Metrics.of(metrics)), metrics["detection"]
+    facts, detection = verdict.verdict_lines(Metrics.of(metrics)), metrics["detection"]
     words = dict(facts)
     false = [line for _, line in facts if "FALSE ALARM" in line]
     if bool(false) != metrics["false_alarm"]:
@@ -377,6 +377,6 @@ def _page_alike(page: str, metrics: Document) -> Iterator[str]:
     from markupsafe import escape
 
     said = " ".join(page.split())
-    for what, how in verdict.facts(Metrics.of(metrics)):
+    for what, how in verdict.verdict_lines(Metrics.of(metrics)):
         if " ".join(str(escape(how)).split()) not in said:
             yield f"page: does not say {what}: {how!r:.80}"

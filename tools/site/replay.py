@@ -56,5 +56,5 @@ def page() -> str:
             marks=marks(Metrics.of(metrics)),
             start_s=metrics["fault"]["at_s"] - LEAD_S,
             span_s=SPAN_S,
-            **report.parts([folder], [kept], shown=[VIEW]),
+            **report.script_style_and_data([folder], [kept], shown=[VIEW]),
         )

@@ -25,23 +25,23 @@ from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
 FLAP = "flap"  # a surface of this name is shown as a share of its travel
-_AIRCRAFT = "b1"
-_REFERENCE_TIME = "2005-06-27T12:00:00Z"  # any will do; the same for every run, so that runs overlay
+_ACMI_OBJECT_ID = "b1"
+_ACMI_REFERENCE_TIME = "2005-06-27T12:00:00Z"  # any will do; the same for every run, so that runs overlay
 _ACMI_COLUMNS = (
     "t_s", "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad",
     "airspeed_mps", "alpha_rad", "beta_rad",
 )  # fmt: skip
 
-Columns = dict[str, NDArray[np.float64]]
-Topics = dict[str, Columns]
+ValuesByColumn = dict[str, NDArray[np.float64]]
+ColumnsByTopic = dict[str, ValuesByColumn]
 """Fields of each message; every message has the stamps `t_s`."""
 
 RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
-_RATES, _ATTITUDE = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
-_PRESSURE = "qdyn_pa"
-_FLOW = ("alpha_rad", "beta_rad", _PRESSURE)
-_ANGLES = ("roll", "pitch", "yaw")
-_BOOT_US = 1_000_000
+_RATE_AXES, _ANGLE_OF_ARDUPILOT_FIELD = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
+_DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
+_FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
+_ANGLE_NAMES = ("roll", "pitch", "yaw")
+_FIRST_STAMP_US = 1_000_000
 """A clock on board does not start with the log."""
 
 
@@ -51,7 +51,7 @@ def write_csv(log_path: Path, path: Path) -> None:
 
     # pyarrow quotes the names in its header whatever it is told: ours is written by hand
     options = WriteOptions(include_header=False, quoting_style="none")
-    with log.opened(log_path) as source:
+    with log.open_parquet_log(log_path) as source:
         schema = source.schema_arrow
         with path.open("wb") as file:
             file.write((",".join(schema.names) + "\n").encode())
@@ -66,17 +66,19 @@ def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft 
     title = aircraft.file.description.partition(",")[0] or aircraft.name
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("FileType=text/acmi/tacview\nFileVersion=2.2\n")
-        file.write(f"0,ReferenceTime={_REFERENCE_TIME}\n0,DataSource=JSBSim\n0,DataRecorder=beaver-ftc\n")
-        file.write(f"0,Title={_escaped(metrics.scenario)}\n")
-        file.write(f"{_AIRCRAFT},Type=Air+FixedWing,Name={_escaped(title)},Color=Blue\n")
-        file.writelines(_frames(log_path, metrics, aircraft))
+        file.write(
+            f"0,ReferenceTime={_ACMI_REFERENCE_TIME}\n0,DataSource=JSBSim\n0,DataRecorder=beaver-ftc\n"
+        )
+        file.write(f"0,Title={_escape_acmi_text(metrics.scenario)}\n")
+        file.write(f"{_ACMI_OBJECT_ID},Type=Air+FixedWing,Name={_escape_acmi_text(title)},Color=Blue\n")
+        file.writelines(_acmi_frames(log_path, metrics, aircraft))
 
 
-def _escaped(text: str) -> str:
+def _escape_acmi_text(text: str) -> str:
     return text.replace("\\", "\\\\").replace(",", "\\,").replace("\n", " ")
 
 
-def _frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
+def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
     start_m = float(next(log.read_chunks(log_path, ["altitude_m"]))["altitude_m"][0])
@@ -84,15 +86,15 @@ def _frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[st
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
     if full_rad is not None:
         columns += (f"{FLAP}_pos_rad",)
-    for row in _thinned(log_path, columns):
-        place = _place(row, EARTH_RADIUS_M + start_m)
-        yield f"#{row['t_s']:.3f}\n{_AIRCRAFT},T={place},{_properties(row, full_rad)}\n"
+    for row in _rows_at_acmi_rate(log_path, columns):
+        place = _acmi_position(row, EARTH_RADIUS_M + start_m)
+        yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
         while events and events[0].time_s <= row["t_s"] + 1e-9:
-            yield f"0,Event=Bookmark|{_AIRCRAFT}|{_escaped(events.pop(0).label)}\n"
+            yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
-def _thinned(log_path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
-    every, seen = _every(log_path), 0
+def _rows_at_acmi_rate(log_path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
+    every, seen = _acmi_row_stride(log_path), 0
     for chunk in log.read_chunks(log_path, columns):
         rows = len(chunk["t_s"])
         for i in range(-seen % every, rows, every):
@@ -100,12 +102,12 @@ def _thinned(log_path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, flo
         seen += rows
 
 
-def _every(log_path: Path) -> int:
+def _acmi_row_stride(log_path: Path) -> int:
     first = next(log.read_chunks(log_path, ["t_s"]))["t_s"][:2]
     return max(1, ceil(1.0 / (ACMI_RATE_HZ * float(np.diff(first)[0])) - 1e-9)) if len(first) == 2 else 1
 
 
-def _place(row: dict[str, float], radius_m: float) -> str:
+def _acmi_position(row: dict[str, float], radius_m: float) -> str:
     """From the log's local plane back to longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg)."""
     latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
     longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
@@ -113,7 +115,7 @@ def _place(row: dict[str, float], radius_m: float) -> str:
     return f"{longitude:.8f}|{latitude:.8f}|{row['altitude_m']:.3f}|{attitude}"
 
 
-def _properties(row: dict[str, float], full_flap_rad: float | None) -> str:
+def _acmi_properties(row: dict[str, float], full_flap_rad: float | None) -> str:
     alpha, beta = degrees(row["alpha_rad"]), degrees(row["beta_rad"])
     air = f"TAS={row['airspeed_mps']:.3f},AOA={alpha:.3f},AOS={beta:.3f}"
     return air if full_flap_rad is None else f"{air},Flaps={row[f'{FLAP}_pos_rad'] / full_flap_rad:.4f}"
@@ -126,26 +128,26 @@ def write_recording(
 
     travel_rad: the farther stop of each surface. signals: what the aircraft measures beside rates and flow.
     """
-    names = [*(f"{axis}_measured_rad_s" for axis in _RATES), "phi_rad", "theta_rad", "psi_rad"]
+    names = [*(f"{axis}_measured_rad_s" for axis in _RATE_AXES), "phi_rad", "theta_rad", "psi_rad"]
     commands = [f"{surface}_cmd_rad" for surface in travel_rad]
-    further = [*_FLOW, *signals]
+    further = [*_FLOW_COLUMNS, *signals]
     chunks = list(log.read_chunks(log_path, ["t_s", *names, "airspeed_mps", *further, *commands]))
     known = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}
     shares = {s: known[f"{s}_cmd_rad"] / travel for s, travel in travel_rad.items()}
-    write, named = _FORMATS[kind]
+    write, named = _WRITER_AND_TOPICS_OF_KIND[kind]
     topics = named(known, shares)
-    for topic, fields in _further(known, further, kind).items():
+    for topic, fields in _further_topics(known, further, kind).items():
         topics[topic] = topics.get(topic, {}) | fields
-    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _BOOT_US
+    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
     write(folder / RECORDINGS[kind], t_us, topics)
-    flow = _flow_columns(further, kind)
-    felt = ", ".join(column for name, column in flow.items() if name != _PRESSURE)
-    text = _vehicle(topics, travel_rad, kind) + f"signals: [{felt}]\n"
+    flow = _recorded_name_of_flow_column(further, kind)
+    felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
+    text = _vehicle_file_text(topics, travel_rad, kind) + f"signals: [{felt}]\n"
     text += f"flow: {{{', '.join(f'{k}: {v}' for k, v in flow.items())}}}\n"
     (folder / "vehicle.yaml").write_text(text, encoding="utf-8")
 
 
-def _further(known: Columns, names: Sequence[str], kind: str) -> Topics:
+def _further_topics(known: ValuesByColumn, names: Sequence[str], kind: str) -> ColumnsByTopic:
     """What the aircraft's own model is given besides, in a message of its own each; in a table as columns."""
     found = {name: known[name] for name in names}
     if kind == "table":
@@ -155,62 +157,66 @@ def _further(known: Columns, names: Sequence[str], kind: str) -> Topics:
     return {f"FL{i}": {"V": values} for i, values in enumerate(found.values())}
 
 
-def _flow_columns(names: Sequence[str], kind: str) -> dict[str, str]:
-    """Where `_further` has put each."""
+def _recorded_name_of_flow_column(names: Sequence[str], kind: str) -> dict[str, str]:
+    """For each column that `_further_topics` wrote, its name in the recording."""
     forms = {"table": "{name}", "ulog": "flow.{name}", "ardupilot": "FL{i}.V"}
     return {name: forms[kind].format(name=name, i=i) for i, name in enumerate(names)}
 
 
-def _as_table(known: Columns, shares: Columns) -> Topics:
-    rates = {f"{axis}_rad_s": known[f"{axis}_measured_rad_s"] for axis in _RATES}
+def _table_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
+    rates = {f"{axis}_rad_s": known[f"{axis}_measured_rad_s"] for axis in _RATE_AXES}
     commands = {f"{surface}_command": share for surface, share in shares.items()}
-    return {"": rates | commands | _attitude(known) | {"airspeed_mps": known["airspeed_mps"]}}
+    return {"": rates | commands | _attitude_columns(known) | {"airspeed_mps": known["airspeed_mps"]}}
 
 
-def _as_px4(known: Columns, shares: Columns) -> Topics:
-    rates = {f"xyz[{i}]": known[f"{axis}_measured_rad_s"] for i, axis in enumerate(_RATES)}
+def _px4_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
+    rates = {f"xyz[{i}]": known[f"{axis}_measured_rad_s"] for i, axis in enumerate(_RATE_AXES)}
     controls = {f"control[{i}]": share for i, share in enumerate(shares.values())}
     return {
         "vehicle_angular_velocity": rates,
         "actuator_servos": controls,
         "airspeed": {"true_airspeed_m_s": known["airspeed_mps"]},
-        "attitude": _attitude(known),
+        "attitude": _attitude_columns(known),
     }
 
 
-def _as_ardupilot(known: Columns, shares: Columns) -> Topics:
-    gyros = {f"Gyr{x}": known[f"{axis}_measured_rad_s"] for x, axis in zip("XYZ", _RATES, strict=True)}
-    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ATTITUDE.items()}
+def _ardupilot_topics(known: ValuesByColumn, shares: ValuesByColumn) -> ColumnsByTopic:
+    gyros = {f"Gyr{x}": known[f"{axis}_measured_rad_s"] for x, axis in zip("XYZ", _RATE_AXES, strict=True)}
+    attitude = {name: np.rad2deg(known[f"{of}_rad"]) for name, of in _ANGLE_OF_ARDUPILOT_FIELD.items()}
     controls = {f"C{i + 1}": share for i, share in enumerate(shares.values())}
     return {"IMU": gyros, "SRFC": controls, "ARSP": {"Airspeed": known["airspeed_mps"]}, "ATT": attitude}
 
 
-def _attitude(known: Columns) -> Columns:
-    return {f"{name.lower()}_rad": known[f"{of}_rad"] for name, of in _ATTITUDE.items()}
+def _attitude_columns(known: ValuesByColumn) -> ValuesByColumn:
+    return {f"{name.lower()}_rad": known[f"{of}_rad"] for name, of in _ANGLE_OF_ARDUPILOT_FIELD.items()}
 
 
-def _write_table(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+def _write_table(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
-    csv.write_csv(pa.table({"t_s": (t_us - _BOOT_US) * 1e-6, **topics[""]}), path)
+    csv.write_csv(pa.table({"t_s": (t_us - _FIRST_STAMP_US) * 1e-6, **topics[""]}), path)
 
 
-def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
     """Definitions and subscriptions, then every message in the order of time."""
     head = [b"ULog\x01\x12\x35\x01" + np.uint64(t_us[0]).tobytes()]
     for topic, fields in topics.items():
-        head.append(_ulog_message("F", f"{topic}:uint64_t timestamp;{_layout(list(fields))}".encode()))
+        head.append(
+            _ulog_message(
+                "F", f"{topic}:uint64_t timestamp;{_ulog_field_declarations(list(fields))}".encode()
+            )
+        )
     for number, topic in enumerate(topics):
         head.append(_ulog_message("A", b"\x00" + np.uint16(number).tobytes() + topic.encode()))
     packed = []
     for number, fields in enumerate(topics.values()):
         length, header = 10 + 8 * len(fields), b"D" + np.uint16(number).tobytes()
-        packed.append(_packed(np.uint16(length).tobytes() + header, t_us, fields))
-    path.write_bytes(b"".join(head) + _in_turn(packed))
+        packed.append(_packed_messages(np.uint16(length).tobytes() + header, t_us, fields))
+    path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
 
-def _layout(fields: Sequence[str]) -> str:
+def _ulog_field_declarations(fields: Sequence[str]) -> str:
     """Fields of one format; `xyz[0]`, `xyz[1]`, ... are one array."""
     arrays: dict[str, int] = {}
     for field in fields:
@@ -225,25 +231,27 @@ def _ulog_message(kind: str, body: bytes) -> bytes:
     return np.uint16(len(body)).tobytes() + kind.encode() + body
 
 
-def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: Topics) -> None:
+def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
     """FMT messages (the first describes FMT itself), then every message in the order of time."""
-    head = [_fmt(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
+    head = [_dataflash_fmt_message(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     packed = []
     for number, (name, fields) in enumerate(topics.items(), start=140):
-        rows = _packed(bytes([0xA3, 0x95, number]), t_us, fields)
+        rows = _packed_messages(bytes([0xA3, 0x95, number]), t_us, fields)
         labels = ",".join(["TimeUS", *fields])
-        head.append(_fmt(number, rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels))
+        head.append(
+            _dataflash_fmt_message(number, rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels)
+        )
         packed.append(rows)
-    path.write_bytes(b"".join(head) + _in_turn(packed))
+    path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
 
-def _fmt(number: int, length: int, name: str, layout: str, labels: str) -> bytes:
+def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, labels: str) -> bytes:
     """One FMT message, 89 bytes."""
     padded = (text.encode().ljust(size, b"\0") for text, size in ((name, 4), (layout, 16), (labels, 64)))
     return bytes([0xA3, 0x95, 128, number, length]) + b"".join(padded)
 
 
-def _packed(head: bytes, t_us: NDArray[np.int64], fields: Columns) -> np.ndarray:
+def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: ValuesByColumn) -> np.ndarray:
     """The messages of one topic: each its head, the stamp, and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)
@@ -251,25 +259,26 @@ def _packed(head: bytes, t_us: NDArray[np.int64], fields: Columns) -> np.ndarray
     return rows
 
 
-def _in_turn(topics: Sequence[np.ndarray]) -> bytes:
+def _interleave_messages(topics: Sequence[np.ndarray]) -> bytes:
     """Records of several topics, one of each a stamp."""
     rows = [topic.view(np.uint8).reshape(len(topic), -1) for topic in topics]
     return np.hstack(rows).tobytes()
 
 
-def _vehicle(topics: Topics, travel_rad: dict[str, float], kind: str) -> str:
+def _vehicle_file_text(topics: ColumnsByTopic, travel_rad: dict[str, float], kind: str) -> str:
     """The vehicle file: which column is what."""
     columns = [f"{topic}.{field}" if topic else field for topic, fields in topics.items() for field in fields]
     commands = [name for name in columns if re.search(r"command|\.control\[|^SRFC", name)]
     full = ", ".join(f"{surface}: {stop!r}" for surface, stop in travel_rad.items())
-    rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATES, columns, strict=False))
+    attitude = ", ".join(f"{angle}: {_angle_column_entry(columns, angle, kind)}" for angle in _ANGLE_NAMES)
+    rates = ", ".join(f"{axis}: {name!r}" for axis, name in zip(_RATE_AXES, columns, strict=False))
     lines = [
         "# Written with the log beside it: which column is what. Commands are shares of travel.",
         f"name: {kind}-of-a-simulated-flight",
         f"reader: {kind}",
         f"rates: {{{rates}}}",
         f"commands: [{', '.join(map(repr, commands))}]",
-        f"attitude: {{{', '.join(f'{axis}: {_angle(columns, axis, kind)}' for axis in _ANGLES)}}}",
+        f"attitude: {{{attitude}}}",
         f"airspeed: {next(name for name in columns if 'airspeed' in name.lower())!r}",
         "surfaces:",
         *(f"  {s}: {{{command!r}: 1.0}}" for s, command in zip(travel_rad, commands, strict=True)),
@@ -278,15 +287,17 @@ def _vehicle(topics: Topics, travel_rad: dict[str, float], kind: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _angle(columns: list[str], axis: str, kind: str) -> str:
+def _angle_column_entry(columns: list[str], angle: str, kind: str) -> str:
     """The column of an attitude angle, with its unit where it is not rad."""
-    name = next(one for one in columns if re.search(rf"(^|\.){axis}(_rad)?$", one.lower()))
+    name = next(one for one in columns if re.search(rf"(^|\.){angle}(_rad)?$", one.lower()))
     return f"{{column: {name}, unit: deg}}" if kind == "ardupilot" else repr(name)
 
 
-Write = Callable[[Path, NDArray[np.int64], Topics], None]
-_FORMATS: dict[str, tuple[Write, Callable[[Columns, Columns], Topics]]] = {
-    "table": (_write_table, _as_table),
-    "ulog": (_write_ulog, _as_px4),
-    "ardupilot": (_write_dataflash, _as_ardupilot),
+TopicsWriter = Callable[[Path, NDArray[np.int64], ColumnsByTopic], None]
+_WRITER_AND_TOPICS_OF_KIND: dict[
+    str, tuple[TopicsWriter, Callable[[ValuesByColumn, ValuesByColumn], ColumnsByTopic]]
+] = {
+    "table": (_write_table, _table_topics),
+    "ulog": (_write_ulog, _px4_topics),
+    "ardupilot": (_write_dataflash, _ardupilot_topics),
 }

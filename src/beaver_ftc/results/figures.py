@@ -12,7 +12,16 @@ import numpy as np
 from beaver_ftc.results import log
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, SHADES, Mark, closeup_window, marks
-from beaver_ftc.results.views import CLIPPED, WHOLE, Panel, Series, Trace, View, read_series, views_of_flight
+from beaver_ftc.results.views import (
+    AXIS_QUANTILES,
+    WHOLE_FLIGHT_S,
+    Panel,
+    Trace,
+    ValuesOfColumns,
+    View,
+    read_series,
+    views_of_flight,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,9 +29,9 @@ if TYPE_CHECKING:
 
 DPI = 110
 LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
-LEGEND_LINE = 0.17  # inches, of one more line of the legend
-COMPRESSION = 1  # of a PNG: a tenth larger than with zlib's 6, in two thirds of the time
-LOWEST_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
+LEGEND_LINE_INCHES = 0.17  # inches, of one more line of the legend
+PNG_COMPRESSION_LEVEL = 1  # of a PNG: a tenth larger than with zlib's 6, in two thirds of the time
+MIN_SHOWN_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
 STYLES = ("screen", "paper")
 PAPER_WIDTH, PAPER_DPI, PAPER_FONT = 8.4 / 2.54, 300, 8  # inches: a column of a journal
 
@@ -33,8 +42,8 @@ class Picture:
 
     path: Path
     view: View
-    series: Series
-    instants: Sequence[Mark]
+    series: ValuesOfColumns
+    event_marks: Sequence[Mark]
     subtitle: str
 
 
@@ -55,17 +64,20 @@ def pictures_of(
     formats: png, pdf, svg; PDF and SVG are drawn for papers.
     """
     shown = views_of_flight(log.column_names(log_path), metrics)
-    instants = marks(metrics)
-    window = closeup_window(instants)
+    event_marks = marks(metrics)
+    window = closeup_window(event_marks)
     closeups = [view for view in shown if view.closeup] if window else []
     found = []
-    for drawn, span, ending in ((shown, WHOLE, ""), (closeups, window or WHOLE, "-closeup")):
+    for drawn, span, ending in (
+        (shown, WHOLE_FLIGHT_S, ""),
+        (closeups, window or WHOLE_FLIGHT_S, "-closeup"),
+    ):
         series = read_series(log_path, [name for view in drawn for name in view.columns], span)
         for view in drawn:
             own = {name: series[name] for name in ("t_s", *view.columns)}
             for kind in formats:
                 path = folder / f"{view.name}{ending}.{kind}"
-                found.append(Picture(path, view, own, instants, metrics.scenario))
+                found.append(Picture(path, view, own, event_marks, metrics.scenario))
     return found
 
 
@@ -74,14 +86,14 @@ def save(picture: Picture) -> None:
     kind = picture.path.suffix.removeprefix(".")
     raster = kind == "png"
     style = "screen" if raster else "paper"
-    shown = picture.view, picture.series, picture.instants, picture.subtitle
+    shown = picture.view, picture.series, picture.event_marks, picture.subtitle
     figure = draw(*shown, style=style)
-    how: dict[str, Any] = {"pil_kwargs": {"compress_level": COMPRESSION}} if raster else {}
-    figure.savefig(picture.path, metadata=_SIGNED[kind], **how)
+    how: dict[str, Any] = {"pil_kwargs": {"compress_level": PNG_COMPRESSION_LEVEL}} if raster else {}
+    figure.savefig(picture.path, metadata=_METADATA_OF_FORMAT[kind], **how)
 
 
 # No date: the same flight gives the same file.
-_SIGNED: dict[str, Any] = {
+_METADATA_OF_FORMAT: dict[str, Any] = {
     "png": {"Software": "beaver-ftc"},
     "pdf": {"Creator": "beaver-ftc", "CreationDate": None},
     "svg": {"Creator": "beaver-ftc", "Date": None},
@@ -89,14 +101,14 @@ _SIGNED: dict[str, Any] = {
 
 
 def draw(
-    view: View, series: Series, instants: Sequence[Mark], subtitle: str, style: str = "screen"
+    view: View, series: ValuesOfColumns, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
 ) -> "Figure":
     """One view as a matplotlib figure, over the time that `series` covers; style: of STYLES."""
-    figure = _drawn(view, series, instants, subtitle)
-    return _for_paper(figure) if style == "paper" else figure
+    figure = _draw_for_screen(view, series, event_marks, subtitle)
+    return _restyle_for_paper(figure) if style == "paper" else figure
 
 
-def _for_paper(figure: "Figure") -> "Figure":
+def _restyle_for_paper(figure: "Figure") -> "Figure":
     """As wide as a column of a journal, letters of 8 points and less; no title, which the caption has."""
     from matplotlib.text import Text
 
@@ -120,7 +132,7 @@ def _for_paper(figure: "Figure") -> "Figure":
 
 def _draw_legend_outside(figure: "Figure") -> None:
     """The legend of a figure that lays itself out."""
-    shown = _entries(figure.axes)
+    shown = _legend_handle_of_label(figure.axes)
     figure.legend(
         shown.values(),
         shown.keys(),
@@ -131,11 +143,13 @@ def _draw_legend_outside(figure: "Figure") -> None:
     )
 
 
-def _drawn(view: View, series: Series, instants: Sequence[Mark], subtitle: str) -> "Figure":
-    figure, grid = _laid_out(view, figure_class())
+def _draw_for_screen(
+    view: View, series: ValuesOfColumns, event_marks: Sequence[Mark], subtitle: str
+) -> "Figure":
+    figure, grid = _empty_figure_and_axes(view, figure_class())
     for axes, panel in zip(grid.flat, view.panels, strict=False):
-        _draw_panel(axes, panel, series, instants)
-    _say_absent(view, series, list(grid.flat))
+        _draw_panel(axes, panel, series, event_marks)
+    _write_absent_text(view, series, list(grid.flat))
     for axes in grid[-1]:
         axes.set_xlabel("time (s)", fontsize=9)
     top = 1 - 0.12 / figure.get_figheight()
@@ -149,7 +163,7 @@ def figure_class() -> "type[Figure]":
     """matplotlib's Figure, made to show itself in a notebook without pyplot and its global state."""
     from matplotlib.figure import Figure
 
-    class Shown(Figure):
+    class NotebookFigure(Figure):
         """A figure that a notebook can draw."""
 
         def _repr_png_(self) -> bytes:
@@ -157,19 +171,21 @@ def figure_class() -> "type[Figure]":
             self.savefig(picture, format="png")
             return picture.getvalue()
 
-    return Shown
+    return NotebookFigure
 
 
-def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
+def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
-    down = -(-len(view.panels) // view.across)
-    heights = [_height(panel, view.across) for panel in view.panels[:: view.across]]
-    width = 10.0 if view.across == 1 else 12.0
+    down = -(-len(view.panels) // view.n_panel_columns)
+    heights = [
+        _panel_height_inches(panel, view.n_panel_columns) for panel in view.panels[:: view.n_panel_columns]
+    ]
+    width = 10.0 if view.n_panel_columns == 1 else 12.0
     height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
     figure = new_figure(figsize=(width, height), dpi=DPI)
-    left = STEPS_LEFT if view.panels[0].steps or view.panels[0].bars else LEFT
+    left = STEPS_LEFT if view.panels[0].value_names or view.panels[0].bars else LEFT
     grid = figure.subplots(
-        down, view.across, sharex=True, squeeze=False, height_ratios=heights,
+        down, view.n_panel_columns, sharex=True, squeeze=False, height_ratios=heights,
         gridspec_kw={
             "left": left / width, "right": 1 - RIGHT / width, "top": 1 - TOP / height,
             "bottom": BOTTOM / height, "hspace": GAP * down / sum(heights), "wspace": 0.19,
@@ -178,42 +194,44 @@ def _laid_out(view: View, new_figure: Any) -> tuple["Figure", Any]:
     return figure, grid
 
 
-def _height(panel: Panel, across: int) -> float:
+def _panel_height_inches(panel: Panel, across: int) -> float:
     """Height of a panel's axes in inches."""
-    if panel.steps or panel.bars:
-        return 0.25 + 0.25 * len(panel.steps or panel.rows)
+    if panel.value_names or panel.bars:
+        return 0.25 + 0.25 * len(panel.value_names or panel.rows)
     return 1.75 if across == 1 else 1.5
 
 
-def _draw_panel(axes: "Axes", panel: Panel, series: Series, instants: Sequence[Mark]) -> None:
+def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks: Sequence[Mark]) -> None:
     for trace in () if panel.bars else panel.traces:
-        _draw_trace(axes, trace, series, bool(panel.steps))
+        _draw_trace(axes, trace, series, bool(panel.value_names))
     _draw_bars(axes, panel, series)
     _draw_shade(axes, panel, series)
-    _draw_marks(axes, instants, series["t_s"])
-    title = panel.label if panel.steps or panel.bars or not panel.unit else f"{panel.label} ({panel.unit})"
+    _draw_event_marks(axes, event_marks, series["t_s"])
+    title = (
+        panel.label if panel.value_names or panel.bars or not panel.unit else f"{panel.label} ({panel.unit})"
+    )
     axes.set_title(title, fontsize=9, y=1.0)  # at this height: looking for one takes a third of the time
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.ticklabel_format(axis="x", useOffset=False)
     if series["t_s"].size > 1:
         axes.set_xlim(series["t_s"][0], series["t_s"][-1])
-    if panel.steps:
-        axes.set_yticks(range(len(panel.steps)), panel.steps)
-        axes.set_ylim(-0.4, len(panel.steps) - 0.6)
+    if panel.value_names:
+        axes.set_yticks(range(len(panel.value_names)), panel.value_names)
+        axes.set_ylim(-0.4, len(panel.value_names) - 0.6)
     elif panel.limits:
         axes.set_ylim(*panel.limits)
     elif panel.clipped:
-        _clip(axes, panel, series)
+        _limit_axis_to_quantiles(axes, panel, series)
     if panel.log_scale:
         axes.set_yscale("log")
-        axes.set_ylim(bottom=max(axes.get_ylim()[0], LOWEST_RATIO))
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], MIN_SHOWN_RATIO))
         axes.minorticks_off()
-    if panel.level is not None:
-        axes.axhline(panel.level, color=GREY, linewidth=1.0, zorder=1)
+    if panel.line_at is not None:
+        axes.axhline(panel.line_at, color=GREY, linewidth=1.0, zorder=1)
 
 
-def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> None:
+def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bool) -> None:
     look = LOOKS[trace.role]
     axes.plot(
         series["t_s"],
@@ -227,13 +245,13 @@ def _draw_trace(axes: "Axes", trace: Trace, series: Series, stepped: bool) -> No
     )
 
 
-def _draw_bars(axes: "Axes", panel: Panel, series: Series) -> None:
+def _draw_bars(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
     """A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1."""
     t_s, rows = series["t_s"], panel.rows
     for place, row in enumerate(rows):
         of = [trace for trace in panel.traces if trace.label == row]
         values = np.array([series[trace.column] for trace in of])
-        asked, candidate = series[panel.during] == 1, (values == 0).any(axis=0)
+        asked, candidate = series[panel.bars_during_column] == 1, (values == 0).any(axis=0)
         excluded = asked & (values == 1).any(axis=0) & ~candidate
         for where, half, colour in (
             (asked & candidate, 0.36, LOOKS[of[0].role].colour), (excluded, 0.04, GREY)
@@ -246,13 +264,13 @@ def _draw_bars(axes: "Axes", panel: Panel, series: Series) -> None:
         axes.set_ylim(len(rows) - 0.4, -0.6)
 
 
-def _clip(axes: "Axes", panel: Panel, series: Series) -> None:
+def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
     """Set the axis by all but the spikes; an arrow and its value mark the largest of those."""
     values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
     values = values[np.isfinite(values)]
     if not values.size:
         return
-    low, high = np.quantile(values, CLIPPED)
+    low, high = np.quantile(values, AXIS_QUANTILES)
     pad = 0.1 * (high - low) or 0.1 * abs(high) or 1.0
     low, high = max(low - pad, values.min() - 0.3 * pad), min(high + pad, values.max() + 0.3 * pad)
     axes.set_ylim(low, high)
@@ -271,19 +289,20 @@ def _linestyle(dash: tuple[float, ...]) -> Any:
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
-def _draw_shade(axes: "Axes", panel: Panel, series: Series) -> None:
-    if not panel.shade or not (series[panel.shade] == 1).any():
+def _draw_shade(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+    if not panel.shade_column or not (series[panel.shade_column] == 1).any():
         return
     axes.fill_between(
-        series["t_s"], 0, 1, where=series[panel.shade] == 1, transform=axes.get_xaxis_transform(),
+        series["t_s"], 0, 1, where=series[panel.shade_column] == 1, transform=axes.get_xaxis_transform(),
         color=SHADES.get(panel.shade_label, SHADES["saturated"]), linewidth=0, step="post",
         label=panel.shade_label, zorder=0,
     )  # fmt: skip
 
 
-def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None:
-    """A line each, and symbols at staggered heights so that instants close together can be distinguished."""
-    for rank, mark in enumerate(instants):
+def _draw_event_marks(axes: "Axes", event_marks: Sequence[Mark], t_s: np.ndarray) -> None:
+    """A line for each mark, and symbols at staggered heights, so that marks close together can be
+    distinguished."""
+    for rank, mark in enumerate(event_marks):
         if not t_s.size or not t_s[0] <= mark.time_s <= t_s[-1]:
             continue
         line: Any = {"color": mark.colour, "linestyle": _linestyle(mark.dash), "linewidth": 0.9}
@@ -294,14 +313,22 @@ def _draw_marks(axes: "Axes", instants: Sequence[Mark], t_s: np.ndarray) -> None
         )  # fmt: skip
 
 
-def _say_absent(view: View, series: Series, grid: Iterable["Axes"]) -> None:
+def _write_absent_text(view: View, series: ValuesOfColumns, grid: Iterable["Axes"]) -> None:
     """Say so where a view has nothing to show, rather than leaving empty axes to be wondered at."""
-    if view.absent and all(np.isnan(series[column]).all() for column in view.columns):
+    if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:
-            axes.text(0.5, 0.5, view.absent, transform=axes.transAxes, ha="center", va="center", fontsize=9)
+            axes.text(
+                0.5,
+                0.5,
+                view.text_without_data,
+                transform=axes.transAxes,
+                ha="center",
+                va="center",
+                fontsize=9,
+            )
 
 
-def _columns(labels: Sequence[str], width: float) -> int:
+def _max_legend_columns(labels: Sequence[str], width: float) -> int:
     """The most columns of these labels that a figure, so many inches wide, has room for."""
     for n in range(min(len(labels), 12 if width > 11 else 9), 1, -1):
         longest = (max(map(len, part)) for part in np.array_split(labels, n))
@@ -310,7 +337,7 @@ def _columns(labels: Sequence[str], width: float) -> int:
     return 1
 
 
-def _entries(grid: Sequence["Axes"]) -> dict[str, Any]:
+def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
     """Label and handle of what a legend is to hold."""
     entries: dict[str, Any] = {}
     for axes in grid:
@@ -323,9 +350,9 @@ def _entries(grid: Sequence["Axes"]) -> dict[str, Any]:
 def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
     """One legend for the figure: each label once, but for the single curves that panel titles name."""
     grid = list(grid)
-    shown = _entries(grid)
-    columns, tall = _columns(list(shown), figure.get_figwidth()), figure.get_figheight()
-    more = LEGEND_LINE * (-(-len(shown) // columns) - 1) / tall
+    shown = _legend_handle_of_label(grid)
+    columns, tall = _max_legend_columns(list(shown), figure.get_figwidth()), figure.get_figheight()
+    more = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / tall
     top, share = 1 - TOP / tall, 1 - more * tall / (tall - TOP - BOTTOM)
     for axes in grid if more else ():  # lower, to make room
         old = axes.get_position()

@@ -69,7 +69,7 @@ class Flight:
         """
         from beaver_ftc.results.log import log_frame
 
-        return log_frame(self._kept(), self._typed)
+        return log_frame(self._log_or_raise(), self._typed_metrics)
 
     @property
     def name(self) -> str:
@@ -77,57 +77,57 @@ class Flight:
         return self.scenario.name
 
     @cached_property
-    def _typed(self) -> model.Metrics:
+    def _typed_metrics(self) -> model.Metrics:
         return model.Metrics.of(self.metrics)
 
     @property
     def fault(self) -> model.Fault | None:
         """The first fault declared."""
-        return self._typed.fault
+        return self._typed_metrics.fault
 
     @property
     def detection(self) -> model.Detection:
         """The alarm."""
-        return self._typed.detection
+        return self._typed_metrics.detection
 
     @property
     def isolation(self) -> model.Isolation:
         """What was named."""
-        return self._typed.isolation
+        return self._typed_metrics.isolation
 
     @property
     def tracking(self) -> model.Tracking:
         """How well the rates were followed."""
-        return self._typed.tracking
+        return self._typed_metrics.tracking
 
     @property
     def supervisor(self) -> tuple[model.ModeChange, ...]:
         """Who was in charge, change by change."""
-        return self._typed.supervisor
+        return self._typed_metrics.supervisor
 
     @property
     def departure(self) -> model.Departure | None:
         """When and in which signal the aircraft was lost; None if it was kept."""
-        return self._typed.departure
+        return self._typed_metrics.departure
 
     @property
     def expectations(self) -> tuple[model.Expectation, ...]:
         """What the scenario expects, and what came out."""
-        return self._typed.expectations
+        return self._typed_metrics.expectations
 
     @property
     def false_alarm(self) -> bool:
         """Whether there was an alarm before any fault."""
-        return self._typed.false_alarm
+        return self._typed_metrics.false_alarm
 
     @property
     def passed(self) -> bool:
         """Whether every expectation was met."""
-        return self._typed.passed
+        return self._typed_metrics.passed
 
     def views(self) -> tuple[str, ...]:
         """The names of the views that `plot` can draw of this flight."""
-        return tuple(self._views())
+        return tuple(self._view_of_name())
 
     def plot(
         self, view: str = "tracking", *, closeup: bool = False, style: Literal["screen", "paper"] = "screen"
@@ -143,17 +143,17 @@ class Flight:
         """
         from beaver_ftc.results.figures import STYLES, draw
         from beaver_ftc.results.style import closeup_window, marks
-        from beaver_ftc.results.views import WHOLE, series_of
+        from beaver_ftc.results.views import WHOLE_FLIGHT_S, series_of
 
-        known = self._views()
+        known = self._view_of_name()
         if view not in known:
             raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
         if style not in STYLES:
             raise BadInput(f"style: {style!r:.60} is not known, allowed: {', '.join(STYLES)}")
-        instants = marks(self._typed)
-        window = (closeup_window(instants) if closeup else None) or WHOLE
-        series = series_of(self._kept(), known[view].columns, window)
-        return draw(known[view], series, instants, self.name, style)
+        event_marks = marks(self._typed_metrics)
+        window = (closeup_window(event_marks) if closeup else None) or WHOLE_FLIGHT_S
+        series = series_of(self._log_or_raise(), known[view].columns, window)
+        return draw(known[view], series, event_marks, self.name, style)
 
     def certificate(self) -> Document:
         """The content of certificate.json: the alarm and the exclusions, each with the inequality that proves
@@ -170,7 +170,7 @@ class Flight:
         The `Proof` contains `certificate`, the `log` with further columns, and `scenario`, the text of
         scenario.yaml.
         """
-        found: Proof = required("proof", "certificate")(self.scenario, self._kept())
+        found: Proof = required("proof", "certificate")(self.scenario, self._log_or_raise())
         return found
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
@@ -184,7 +184,7 @@ class Flight:
         """
         from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 
-        kept = self._kept()
+        kept = self._log_or_raise()
         with result_folder(Path(out), self.name) as folder:
             kept.copy_to(folder / "log.parquet")
             write_documents(folder, self.scenario, self.metrics)
@@ -192,36 +192,40 @@ class Flight:
                 write_report_files(folder, self.metrics)
         return Path(out) / self.name
 
-    def _kept(self) -> Log:
+    def _log_or_raise(self) -> Log:
         if self._source is None:
             raise BadInput(f"{self.name}: this flight kept no log, allowed: fly it with log=True")
         return self._source
 
-    def _views(self) -> dict[str, Any]:
+    def _view_of_name(self) -> dict[str, Any]:
         from beaver_ftc.results.views import views_of_flight
 
-        shown = views_of_flight(self._kept().columns, self._typed)
+        shown = views_of_flight(self._log_or_raise().columns, self._typed_metrics)
         return {view.name: view for view in shown}
 
     def __repr__(self) -> str:
-        lines = [f"{what:12} {how}" for what, how in self._facts()]
-        return "\n".join([verdict.title(self._typed), *(f"  {line}" for line in lines)])
+        lines = [f"{what:12} {how}" for what, how in self._verdict_lines()]
+        return "\n".join([verdict.title(self._typed_metrics), *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         cell = "style='text-align:left'"
         rows = "".join(
             f"<tr><th {cell}>{escape(what)}</th><td {cell}>{escape(how)}</td></tr>"
-            for what, how in self._facts()
+            for what, how in self._verdict_lines()
         )
-        return f"<b>{escape(verdict.title(self._typed))}</b><table>{rows}</table>"
+        return f"<b>{escape(verdict.title(self._typed_metrics))}</b><table>{rows}</table>"
 
-    def _facts(self) -> list[tuple[str, str]]:
+    def _verdict_lines(self) -> list[tuple[str, str]]:
         tracked = [
             ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
-            for when, p, q, r in verdict.tracking(self._typed)
+            for when, p, q, r in verdict.tracking_rms_in_words(self._typed_metrics)
         ]
-        missed = [("missed", held.sentence) for held in verdict.expectations(self._typed) if not held.passed]
-        return [*verdict.facts(self._typed), *tracked, *missed]
+        missed = [
+            ("missed", held.sentence)
+            for held in verdict.expectations_in_words(self._typed_metrics)
+            if not held.passed
+        ]
+        return [*verdict.verdict_lines(self._typed_metrics), *tracked, *missed]
 
 
 def fly(

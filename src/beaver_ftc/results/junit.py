@@ -12,13 +12,13 @@ from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Expectation, Judged
 
-_LONGEST = 10_000  # characters of one line
+_MAX_LINE_CHARACTERS = 10_000  # characters of one line
 
 
 def write_junit(runs: Sequence[Judged], path: Path) -> None:
     """Write what has been judged, or could not be flown."""
     took_s = sum(run.took_s for run in runs)
-    root = ElementTree.Element("testsuites", name="beaver-ftc", time=_seconds(took_s))
+    root = ElementTree.Element("testsuites", name="beaver-ftc", time=_seconds_text(took_s))
     for run in runs:
         _add_suite(root, run)
     ElementTree.indent(root)
@@ -31,35 +31,37 @@ def write_junit(runs: Sequence[Judged], path: Path) -> None:
 
 def _add_suite(root: ElementTree.Element, run: Judged) -> None:
     name = run.name
-    cases = [_case(name, expectation) for expectation in run.expectations] or [_flight(run)]
+    cases = [_expectation_case(name, expectation) for expectation in run.expectations] or [
+        _completion_case(run)
+    ]
     failures = sum(case.find("failure") is not None for case in cases)
     errors = sum(case.find("error") is not None for case in cases)
     counts = {"name": name, "tests": str(len(cases)), "failures": str(failures), "errors": str(errors)}
     for case in cases:
-        case.set("time", _seconds(run.took_s / len(cases)))
-    ElementTree.SubElement(root, "testsuite", counts, time=_seconds(run.took_s)).extend(cases)
+        case.set("time", _seconds_text(run.took_s / len(cases)))
+    ElementTree.SubElement(root, "testsuite", counts, time=_seconds_text(run.took_s)).extend(cases)
 
 
-def _seconds(took_s: float) -> str:
+def _seconds_text(took_s: float) -> str:
     return f"{took_s:.6f}"
 
 
-def _case(name: str, expectation: Expectation) -> ElementTree.Element:
+def _expectation_case(name: str, expectation: Expectation) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname=name, name=expectation.name)
     if not expectation.passed:
         says = expectation.both_values + (f": {expectation.reason}" if expectation.reason else "")
-        ElementTree.SubElement(case, "failure", message=_text(says), type="ExpectationMissed")
+        ElementTree.SubElement(case, "failure", message=_xml_safe_text(says), type="ExpectationMissed")
     return case
 
 
-def _flight(run: Judged) -> ElementTree.Element:
+def _completion_case(run: Judged) -> ElementTree.Element:
     """The case of a scenario that expects nothing, or could not be flown."""
     case = ElementTree.Element("testcase", classname=run.name, name="completes")
     if run.error is not None:
-        ElementTree.SubElement(case, "error", message=_text(run.error), type="NotFlown")
+        ElementTree.SubElement(case, "error", message=_xml_safe_text(run.error), type="NotFlown")
     return case
 
 
-def _text(said: str) -> str:
+def _xml_safe_text(said: str) -> str:
     """Text that XML can hold: it has no control characters, nor halves of letters, not even escaped."""
-    return "\n".join(one_line(line, _LONGEST) for line in said.splitlines())
+    return "\n".join(one_line(line, _MAX_LINE_CHARACTERS) for line in said.splitlines())

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
-_BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
-_MOST_ROWS_AT_ONCE = 1_000_000
-_UNITS = (  # ending of a column's name, unit; the longest endings first
+_ROWS_PER_BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
+_MAX_ROWS_PER_GROUP = 1_000_000
+_UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; the longest endings first
     ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
     ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
     ("_hz", "Hz"), ("_m", "m"), ("_s", "s"),
@@ -58,7 +58,7 @@ class ParquetLog:
         """Append `rows`, shape (n, columns), float64. The array may be reused by the caller."""
         start = 0
         while start < len(rows):
-            count = min(len(rows) - start, self._rows_per_group - self._used, _BLOCK)
+            count = min(len(rows) - start, self._rows_per_group - self._used, _ROWS_PER_BLOCK)
             self._buffer[:, self._used : self._used + count] = rows[start : start + count].T
             self._used += count
             start += count
@@ -121,7 +121,7 @@ class MemoryLog:
             self._chunks = [np.concatenate(self._chunks or [np.empty((0, len(self.columns)))])]
         return self._chunks[0]
 
-    def so_far(self) -> "MemoryLog":
+    def frozen_copy(self) -> "MemoryLog":
         """The log as it is now; this one may grow."""
         now = MemoryLog()
         now.columns, now._chunks = self.columns, list(self._chunks)
@@ -184,7 +184,7 @@ class SpooledLog(MemoryLog):
     """A `MemoryLog` that is kept in a temporary file: an hour of flight is 0.3 GB."""
 
     def open(self, columns: Sequence[str]) -> None:
-        """Start again; what `so_far` gave before stays readable."""
+        """Start again; what `frozen_copy` gave before stays readable."""
         super().open(columns)
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- gone with this log, or the process
         self._frames = 0
@@ -194,7 +194,7 @@ class SpooledLog(MemoryLog):
         self._file.write(rows.tobytes())
         self._frames += len(rows)
 
-    def so_far(self) -> MemoryLog:
+    def frozen_copy(self) -> MemoryLog:
         """The log as it is now, read from the file as it is asked for."""
         now = MemoryLog()
         now.columns = self.columns
@@ -229,7 +229,7 @@ Log = MemoryLog | StoredLog
 
 
 @contextlib.contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def open_parquet_log(path: Path) -> Iterator[Any]:
     """A log, open. Raises BadInput where it is none, or only a part of one."""
     from pyarrow import ArrowException
     from pyarrow.parquet import ParquetFile
@@ -239,9 +239,9 @@ def opened(path: Path) -> Iterator[Any]:
             with ParquetFile(content, pre_buffer=False) as file:
                 groups = (file.metadata.row_group(i) for i in range(file.num_row_groups))
                 largest = max((group.num_rows for group in groups), default=0)
-                if largest > _MOST_ROWS_AT_ONCE:  # than a run writes: a few bytes may stand for billions
+                if largest > _MAX_ROWS_PER_GROUP:  # than a run writes: a few bytes may stand for billions
                     has = f"has {largest:,} rows in a row group"
-                    raise BadInput(f"{path}: {has}, allowed: up to {_MOST_ROWS_AT_ONCE:,}")
+                    raise BadInput(f"{path}: {has}, allowed: up to {_MAX_ROWS_PER_GROUP:,}")
                 yield file
         except (ArrowException, OSError) as error:
             if getattr(error, "errno", None) is not None:
@@ -252,26 +252,26 @@ def opened(path: Path) -> Iterator[Any]:
 
 def column_names(path: Path) -> tuple[str, ...]:
     """Names of a log's columns, in order."""
-    with opened(path) as file:
+    with open_parquet_log(path) as file:
         return tuple(file.schema_arrow.names)
 
 
 def row_count(path: Path) -> int:
     """Number of frames in a log."""
-    with opened(path) as file:
+    with open_parquet_log(path) as file:
         return int(file.metadata.num_rows)
 
 
 def read_chunks(path: Path, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
     """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
-    with opened(path) as file:
+    with open_parquet_log(path) as file:
         wanted = list(columns) if columns is not None else file.schema_arrow.names
         for group in range(file.num_row_groups):
             table = file.read_row_group(group, columns=wanted)
-            yield {name: _values(table.column(name)) for name in wanted}
+            yield {name: _column_values(table.column(name)) for name in wanted}
 
 
-def _values(column: Any) -> np.ndarray:
+def _column_values(column: Any) -> np.ndarray:
     """A column without nulls. Not its own to_numpy: that imports pandas, if installed, for nothing."""
     parts = [
         np.frombuffer(part.buffers()[1], np.float64, len(part), 8 * part.offset) for part in column.chunks
@@ -294,7 +294,9 @@ def units(columns: Iterable[str]) -> dict[str, str]:
 def unit_of(column: str) -> str:
     """The unit of a column, read off its name or the section's it is in; "1" for a pure number."""
     parts = reversed(column.split("."))
-    return next((unit for part in parts for ending, unit in _UNITS if part.endswith(ending)), "1")
+    return next(
+        (unit for part in parts for ending, unit in _UNIT_OF_NAME_ENDING if part.endswith(ending)), "1"
+    )
 
 
 def log_frame(log: "Log", found: Metrics) -> "DataFrame":
@@ -307,13 +309,13 @@ def log_frame(log: "Log", found: Metrics) -> "DataFrame":
         chunks = list(log.read_chunks())
         table = DataFrame({name: np.concatenate([chunk[name] for chunk in chunks]) for name in log.columns})
     table.attrs = {
-        "scenario": found.scenario, "seed": found.seed, "verdict": _said(found),
+        "scenario": found.scenario, "seed": found.seed, "verdict": _verdict_attributes(found),
         "units": units(log.columns),
     }  # fmt: skip
     return table
 
 
-def _said(found: Metrics) -> dict[str, Any]:
+def _verdict_attributes(found: Metrics) -> dict[str, Any]:
     detection, isolation = found.detection, found.isolation
     return {
         "passed": found.passed, "false_alarm": found.false_alarm,

@@ -53,8 +53,8 @@ if TYPE_CHECKING:
 
 
 LOSS_OF_EFFECTIVENESS = "loss_of_effectiveness"
-_NOT_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
-_DIGITS = 9  # of a second: without the rounding of frame times
+_FIELDS_THAT_ARE_NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
+_TIME_DECIMALS = 9  # of a second: without the rounding of frame times
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Onset:
         """From the fault's first frame to an event; None without one, or if it came before the fault."""
         if time_s is None or self.is_false(time_s):
             return None
-        return round(max(time_s - self.begins_s, 0.0), _DIGITS)
+        return round(max(time_s - self.begins_s, 0.0), _TIME_DECIMALS)
 
 
 def strikes_within(at_s: Any, flown_s: Any) -> Any:
@@ -116,15 +116,15 @@ class DeclaredFault:
             fault.sensor if of_a_sensor(fault) else None,
             fault.end_s,
             fault.profile,
-            fault.model_dump(exclude=_NOT_SIZE, exclude_none=True),
+            fault.model_dump(exclude=_FIELDS_THAT_ARE_NO_SIZE, exclude_none=True),
         )
 
-    def is_named_by(self, name: str | None, taken: frozenset[str] = frozenset()) -> bool:
-        """Whether a name is right. taken: surfaces that damage takes away."""
+    def is_named_by(self, name: str | None, removed_surfaces: frozenset[str] = frozenset()) -> bool:
+        """Whether a name is right. removed_surfaces: surfaces that damage takes away."""
         if self.sensor is not None:  # outside the class of surface faults is right as well
             return name in (sensor_words(self.sensor), UNANTICIPATED)
         if self.type == DAMAGE:  # outside of every class, unless a surface that it takes
-            return name == UNANTICIPATED or name in taken
+            return name == UNANTICIPATED or name in removed_surfaces
         return name is not None and name == (UNANTICIPATED if self.type == UNANTICIPATED else self.actuator)
 
     def is_of_type(self, kind: str | None) -> bool | None:
@@ -138,16 +138,17 @@ class DeclaredFault:
 
 @dataclass(frozen=True)
 class Truth:
-    """What breaks in a flight. faults: in the order in which they strike; taken: surfaces that damage takes.
+    """The faults that are injected in a flight, in the order in which they strike.
 
-    beyond_one: both together, from the instant on at which a second surface fails, where the diagnosis looks
-    for a single fault: no single one explains the flight, so it is outside the class.
+    removed_surfaces: surfaces that damage takes away. outside_class_from_second_fault: an unanticipated fault
+    that stands for all faults together, from the instant at which a second surface fails; None if the
+    diagnosis looks for pairs. No single fault explains such a flight, so it is outside the fault class.
     """
 
     faults: tuple[DeclaredFault, ...]
     rate_hz: float
-    taken: frozenset[str] = frozenset()
-    beyond_one: DeclaredFault | None = None
+    removed_surfaces: frozenset[str] = frozenset()
+    outside_class_from_second_fault: DeclaredFault | None = None
 
     @classmethod
     def of(cls, scenario: Any) -> Self:
@@ -155,11 +156,11 @@ class Truth:
         faults = sorted(map(DeclaredFault.of, scenario.faults), key=lambda fault: fault.at_s)
         damage = scenario.airframe.damage
         cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
-        taken = frozenset(surface for case in cases for surface in damage[case].takes)
+        removed_surfaces = frozenset(surface for case in cases for surface in damage[case].takes)
         began_s, beyond = sorted(failing(scenario).values()), None
         if not scenario.fdi.pairs and len(began_s) > 1:
             beyond = DeclaredFault(None, UNANTICIPATED, began_s[1])
-        return cls(tuple(faults), scenario.rate_hz, taken, beyond)
+        return cls(tuple(faults), scenario.rate_hz, removed_surfaces, beyond)
 
     @property
     def first(self) -> DeclaredFault | None:
@@ -175,12 +176,16 @@ class Truth:
         """When a fault begins."""
         return Onset(None if fault is None else fault.at_s, self.rate_hz)
 
-    def meant_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
+    def faults_named_rightly_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
         """The declared faults of which a name given then is right, as they strike."""
         candidates = [*self.faults]
-        if self.beyond_one is not None and time_s is not None:
-            candidates += [] if self.onset_of(self.beyond_one).is_false(time_s) else [self.beyond_one]
-        return tuple(fault for fault in candidates if fault.is_named_by(name, self.taken))
+        if self.outside_class_from_second_fault is not None and time_s is not None:
+            candidates += (
+                []
+                if self.onset_of(self.outside_class_from_second_fault).is_false(time_s)
+                else [self.outside_class_from_second_fault]
+            )
+        return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
 
     def is_premature(
         self, name: str | None, time_s: float | None, fault: DeclaredFault | None
@@ -191,28 +196,33 @@ class Truth:
         return fault is not None and self.onset_of(fault).is_false(time_s)
 
 
-Rule = tuple[Callable[[Metrics], Any], Callable[[Any, Any], bool]]
+ExpectationRule = tuple[Callable[[Metrics], Any], Callable[[Any, Any], bool]]
 """From the metrics what was found; from that and what was expected whether it will do."""
 
 
 def evaluate(expect: Any, metrics: Metrics) -> list[Expectation]:
     """One record for each expectation set in `expect`, in its fields' order; with `reason`, where one is
     known."""
-    return [_judged(name, rule, expected, metrics) for name, rule, expected in _each(expect)]
+    return [
+        _judged_expectation(name, rule, expected, metrics)
+        for name, rule, expected in _names_rules_and_limits(expect)
+    ]
 
 
-def _judged(name: str, rule: Rule, expected: Any, metrics: Metrics) -> Expectation:
+def _judged_expectation(name: str, rule: ExpectationRule, expected: Any, metrics: Metrics) -> Expectation:
     found, met = rule
     actual = found(metrics)
     actual = list(actual) if isinstance(actual, tuple) else actual
-    of_one_name = name in _OF_A_NAME and not isinstance(expected, list)  # a list holds none that is premature
+    of_one_name = name in _EXPECTATIONS_OF_ONE_NAME and not isinstance(
+        expected, list
+    )  # a list holds none that is premature
     early = of_one_name and metrics.isolation is not None and bool(metrics.isolation.premature)
     passed = met(actual, expected) and not early
-    why = "" if passed or name not in OF_DIAGNOSIS else _reason(expected, early, metrics)
+    why = "" if passed or name not in OF_DIAGNOSIS else _reason_not_met(expected, early, metrics)
     return Expectation(name, passed, expected, actual, reason=why or None)
 
 
-def _reason(expected: Any, early: bool, metrics: Metrics) -> str:
+def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
     """Why what was expected of the diagnosis is not met, if it is known."""
     detection, isolation = metrics.detection, metrics.isolation
     if early:
@@ -234,35 +244,37 @@ def margin(found: Expectation) -> float | None:
     return float(expected - abs(actual))
 
 
-def names(expect: Any) -> list[str]:
+def expectation_names(expect: Any) -> list[str]:
     """The names of what a scenario expects, as in `evaluate`."""
-    return [name for name, _, _ in _each(expect)]
+    return [name for name, _, _ in _names_rules_and_limits(expect)]
 
 
-def _each(expect: Any) -> Iterator[tuple[str, Rule, Any]]:
+def _names_rules_and_limits(expect: Any) -> Iterator[tuple[str, ExpectationRule, Any]]:
     if expect is None:
         return
     for name, expected in expect.model_dump(exclude_none=True).items():
         if isinstance(expected, tuple):
-            yield name, _LIST_RULES[name], list(expected)
+            yield name, _RULE_OF_LIST_EXPECTATION[name], list(expected)
         elif isinstance(expected, dict):
-            yield from ((f"{name}.{part}", _rule_of(name, part), limit) for part, limit in expected.items())
+            yield from (
+                (f"{name}.{part}", _rule_of_part(name, part), limit) for part, limit in expected.items()
+            )
         else:
-            yield name, _RULES[name], expected
+            yield name, _RULE_OF_EXPECTATION[name], expected
 
 
-def _rule_of(name: str, part: str) -> Rule:
+def _rule_of_part(name: str, part: str) -> ExpectationRule:
     """The rule of one part of an expectation that has several: of an arrival, or of a tracking error."""
     if name == "arrives":
-        return _entry("arrival", part), eq if part == "in_envelope" else _off_by_at_most
+        return _getter_of_metric("arrival", part), eq if part == "in_envelope" else _magnitude_at_most
     return lambda metrics: getattr(getattr(metrics.tracking, name), part, None), _at_most
 
 
-def _entry(section: str, key: str) -> Callable[[Metrics], Any]:
+def _getter_of_metric(section: str, key: str) -> Callable[[Metrics], Any]:
     return lambda metrics: getattr(getattr(metrics, section), key, None)
 
 
-def _names_given(metrics: Metrics) -> list[str]:
+def _isolated_names(metrics: Metrics) -> list[str]:
     return list(metrics.isolation.names)
 
 
@@ -270,39 +282,39 @@ def _at_most(found: float | None, limit: float) -> bool:
     return found is not None and found <= limit
 
 
-def _off_by_at_most(found: float | None, limit: float) -> bool:
+def _magnitude_at_most(found: float | None, limit: float) -> bool:
     return found is not None and abs(found) <= limit
 
 
-def _among(candidates: tuple[str, ...], kind: str) -> bool:
+def _type_is_among_candidates(candidates: tuple[str, ...], kind: str) -> bool:
     return any(kind == candidate.rpartition(":")[2] for candidate in candidates)
 
 
-_OF_A_NAME = ("isolated_as", "isolated_within_s", "isolated_type", "candidate_type")
-_LIST_RULES: dict[str, Rule] = {"isolated_as": (_names_given, eq)}
+_EXPECTATIONS_OF_ONE_NAME = ("isolated_as", "isolated_within_s", "isolated_type", "candidate_type")
+_RULE_OF_LIST_EXPECTATION: dict[str, ExpectationRule] = {"isolated_as": (_isolated_names, eq)}
 """Of the expectations that may be a list."""
 
-_RULES: dict[str, Rule] = {
-    "detected_within_s": (_entry("detection", "delay_s"), _at_most),
-    "isolated_as": (_entry("isolation", "fault"), eq),
-    "isolated_within_s": (_entry("isolation", "delay_s"), _at_most),
-    "isolated_type": (_entry("isolation", "type"), eq),
-    "candidate_type": (_entry("isolation", "candidates"), _among),
+_RULE_OF_EXPECTATION: dict[str, ExpectationRule] = {
+    "detected_within_s": (_getter_of_metric("detection", "delay_s"), _at_most),
+    "isolated_as": (_getter_of_metric("isolation", "fault"), eq),
+    "isolated_within_s": (_getter_of_metric("isolation", "delay_s"), _at_most),
+    "isolated_type": (_getter_of_metric("isolation", "type"), eq),
+    "candidate_type": (_getter_of_metric("isolation", "candidates"), _type_is_among_candidates),
     "no_false_alarm": (lambda metrics: not metrics.false_alarm, eq),
     "no_departure": (lambda metrics: metrics.departure is None, eq),
-    "altitude_within_m": (_entry("profile", "altitude_m"), _at_most),
-    "airspeed_within_mps": (_entry("profile", "airspeed_mps"), _at_most),
-    "airspeed_within_limits_mps": (_entry("profile", "airspeed_limited_mps"), _at_most),
-    "heading_within_deg": (_entry("profile", "heading_deg"), _at_most),
+    "altitude_within_m": (_getter_of_metric("profile", "altitude_m"), _at_most),
+    "airspeed_within_mps": (_getter_of_metric("profile", "airspeed_mps"), _at_most),
+    "airspeed_within_limits_mps": (_getter_of_metric("profile", "airspeed_limited_mps"), _at_most),
+    "heading_within_deg": (_getter_of_metric("profile", "heading_deg"), _at_most),
     "stays_in_envelope": (lambda metrics: metrics.envelope.exits == 0, eq),
 }
 
 
-Rates = tuple[float, float, float]
-Section = TypeVar("Section", bound=model.Part)
+RatesPqr = tuple[float, float, float]
+MetricsRecord = TypeVar("MetricsRecord", bound=model.Part)
 
 TAKEN_OVER, LONG_S = "reallocated", 1.0  # a change of mode that comes later than this is explained
-ON_THE_BOUND = 0.9  # of the worst-case test's bound, in healthy flight
+NEAR_THRESHOLD_SHARE = 0.9  # of the worst-case test's bound, in healthy flight
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
 
 
@@ -313,42 +325,44 @@ def metrics(flight: "Landing") -> Document:
 
 def measure(flight: "Landing") -> Metrics:
     """What a flight amounts to."""
-    found = _measured(flight, Truth.of(flight.scenario))
+    found = _metrics_before_expectations(flight, Truth.of(flight.scenario))
     found = replace(found, hints=tuple(hints(flight, found)))
     expectations = tuple(evaluate(flight.scenario.expect, found))
     return replace(found, expectations=expectations, passed=all(one.passed for one in expectations))
 
 
-def _measured(flight: "Landing", truth: Truth) -> Metrics:
+def _metrics_before_expectations(flight: "Landing", truth: Truth) -> Metrics:
     """The same before it is held against what was expected."""
     scenario = flight.scenario
     return Metrics(
         scenario=scenario.name,
         seed=scenario.seed,
         frames=flight.frames,
-        flight=_condition(flight),
-        fault=_first(truth),
-        faults=tuple(map(_declared, truth.faults)),
-        detection=_detection(flight, truth),
-        isolation=_isolation(flight, truth),
+        flight=_condition_record(flight),
+        fault=_first_fault_record(truth),
+        faults=tuple(map(_declared_fault_record, truth.faults)),
+        detection=_detection_record(flight, truth),
+        isolation=_isolation_record(flight, truth),
         # the alarm is latched: there is one a diagnosis
-        false_alarm=any(truth.onset.is_false(time_s) for time_s in _alarms_s(flight)),
-        fault_free_s=_finite(fault_free_s(flight)),
-        tracking=_tracking(flight, truth),
-        supervisor=tuple(model.ModeChange(_finite(time_s), mode) for time_s, mode in flight.supervisor),
-        changes=tuple(_change(change, truth) for change in flight.changes),
-        mode_changes_left_out=flight.mode_changes - len(flight.supervisor),
-        envelope_exits=tuple(model.Exit(*map(_finite, exit)) for exit in flight.envelope_exits),
-        envelope=model.Envelope(
-            flight.exits, _finite(flight.outside_s), flight.exits - len(flight.envelope_exits)
+        false_alarm=any(truth.onset.is_false(time_s) for time_s in _alarm_times_s(flight)),
+        fault_free_s=_rounded_known_number(fault_free_s(flight)),
+        tracking=_tracking_record(flight, truth),
+        supervisor=tuple(
+            model.ModeChange(_rounded_known_number(time_s), mode) for time_s, mode in flight.supervisor
         ),
-        departure=_departure(flight),
-        authority=_section(model.Authority, flight.authority),
-        engine_power=_section(model.EnginePower, flight.engine_power),
-        profile=_section(model.Profile, _in_deg(flight.profile)),
-        arrival=_arrival(flight),
-        limits=tuple(model.Limit.of(_rounded(limit)) for limit in flight.limits),
-        saturation_s=_rounded(flight.saturation_s),
+        changes=tuple(_change_record(change, truth) for change in flight.changes),
+        mode_changes_left_out=flight.mode_changes - len(flight.supervisor),
+        envelope_exits=tuple(model.Exit(*map(_rounded_known_number, exit)) for exit in flight.envelope_exits),
+        envelope=model.Envelope(
+            flight.exits, _rounded_known_number(flight.outside_s), flight.exits - len(flight.envelope_exits)
+        ),
+        departure=_departure_record(flight),
+        authority=_record_of_mapping(model.Authority, flight.authority),
+        engine_power=_record_of_mapping(model.EnginePower, flight.engine_power),
+        profile=_record_of_mapping(model.Profile, _profile_deviations_in_deg(flight.profile)),
+        arrival=_arrival_record(flight),
+        limits=tuple(model.Limit.of(_with_rounded_numbers(limit)) for limit in flight.limits),
+        saturation_s=_with_rounded_numbers(flight.saturation_s),
         hints=(),
         expectations=(),
         passed=True,
@@ -371,17 +385,17 @@ def versions() -> Document:
 
 def faults_of(scenario: "Scenario") -> list[Document]:
     """Every declared fault, in the order in which they strike: what, when, and how large."""
-    return [_declared(fault).document() for fault in Truth.of(scenario).faults]
+    return [_declared_fault_record(fault).document() for fault in Truth.of(scenario).faults]
 
 
-def _declared(fault: DeclaredFault) -> model.DeclaredFault:
+def _declared_fault_record(fault: DeclaredFault) -> model.DeclaredFault:
     return model.DeclaredFault(
         fault.actuator, fault.type, fault.at_s, fault.end_s, str(fault.profile), dict(fault.size or {}),
         sensor=fault.sensor,
     )  # fmt: skip
 
 
-def _first(truth: Truth) -> model.Fault | None:
+def _first_fault_record(truth: Truth) -> model.Fault | None:
     """The earliest declared fault."""
     first = truth.first
     if first is None:
@@ -389,36 +403,36 @@ def _first(truth: Truth) -> model.Fault | None:
     return model.Fault(first.actuator, first.type, first.at_s, sensor=first.sensor)
 
 
-def _detection(flight: "Landing", truth: Truth) -> model.Detection:
+def _detection_record(flight: "Landing", truth: Truth) -> model.Detection:
     return model.Detection(
         detected=flight.detection_time_s is not None,
-        time_s=_number(flight.detection_time_s),
+        time_s=_rounded_number_or_none(flight.detection_time_s),
         delay_s=truth.onset.delay_s(flight.detection_time_s),
         axis=flight.detection_axis,
-        guaranteed_delay_s=_number(flight.guaranteed_delay_s),
-        statistical=_section(model.Statistical, flight.statistical),
-        inconclusive=_section(model.Inconclusive, flight.inconclusive),
+        guaranteed_delay_s=_rounded_number_or_none(flight.guaranteed_delay_s),
+        statistical=_record_of_mapping(model.Statistical, flight.statistical),
+        inconclusive=_record_of_mapping(model.Inconclusive, flight.inconclusive),
     )
 
 
-def _isolation(flight: "Landing", truth: Truth) -> model.Isolation:
-    meant = truth.meant_by(flight.isolated, flight.isolation_time_s)
+def _isolation_record(flight: "Landing", truth: Truth) -> model.Isolation:
+    meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     against = meant[0] if meant else truth.first
     kind = flight.isolation_type
     correct = None if flight.isolated is None else bool(meant)
     type_correct = against.is_of_type(kind) if against else (None if kind is None else False)
-    named = _named(vars(flight), against, (correct, type_correct), truth)
+    named = _named_fault_record(vars(flight), against, (correct, type_correct), truth)
     return model.Isolation(
         isolated=flight.isolated is not None,
         **vars(named),
-        withdrawn=tuple(model.Withdrawn.of(_rounded(gone)) for gone in flight.withdrawn),
-        names=_names(flight, truth),
-        probing_s=_span(flight.probing_s),
-        faults=tuple(_one_of_several(found, truth) for found in flight.faults),
+        withdrawn=tuple(model.Withdrawn.of(_with_rounded_numbers(gone)) for gone in flight.withdrawn),
+        names=_names_given_in_flight(flight, truth),
+        probing_s=_rounded_interval(flight.probing_s),
+        faults=tuple(_record_of_one_of_several_faults(found, truth) for found in flight.faults),
     )
 
 
-def _names(flight: "Landing", truth: Truth) -> tuple[str, ...]:
+def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
     """The names given in flight, those that were withdrawn too, each once, in the order of the faults that
     they name, and as they were given; without those that were premature."""
     given = [(gone["fault"], gone["from_s"]) for gone in flight.withdrawn]
@@ -428,24 +442,24 @@ def _names(flight: "Landing", truth: Truth) -> tuple[str, ...]:
         given.append((flight.isolated, flight.isolation_time_s))
     said = []
     for name, time_s in given:
-        meant = truth.meant_by(name, time_s)
+        meant = truth.faults_named_rightly_by(name, time_s)
         of = meant[0] if meant else truth.first
         if name is not None and not truth.is_premature(name, time_s, of):
             said.append((of.at_s if of else 0.0, time_s, name))
     return tuple(dict.fromkeys(name for _, _, name in sorted(said)))
 
 
-def _one_of_several(found: Document, truth: Truth) -> model.Named:
+def _record_of_one_of_several_faults(found: Document, truth: Truth) -> model.Named:
     """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
     name, kind = found["isolated"], found["isolation_type"]
-    meant = truth.meant_by(name, found["isolation_time_s"])
+    meant = truth.faults_named_rightly_by(name, found["isolation_time_s"])
     correct = None if name is None else bool(meant)
     type_correct = None if kind is None else any(bool(fault.is_of_type(kind)) for fault in meant)
     of_ours = {**found, "so_far": None if name is None else True}  # no other diagnosis names several
-    return _named(of_ours, meant[0] if meant else None, (correct, type_correct), truth)
+    return _named_fault_record(of_ours, meant[0] if meant else None, (correct, type_correct), truth)
 
 
-def _named(
+def _named_fault_record(
     found: Document, fault: DeclaredFault | None, right: tuple[bool | None, bool | None], truth: Truth
 ) -> model.Named:
     """A fault that is named; fault: since when it is there. right: whether it, and its type, are, unless they
@@ -456,32 +470,34 @@ def _named(
     return model.Named(
         fault=found["isolated"],
         type=kind,
-        time_s=_number(found["isolation_time_s"]),
+        time_s=_rounded_number_or_none(found["isolation_time_s"]),
         delay_s=onset.delay_s(found["isolation_time_s"]),
         correct=right[0] and not premature,
         candidates=tuple(found["candidates"]),
         type_correct=right[1] and not premature,
         type_delay_s=onset.delay_s(found.get("type_time_s")),
-        estimate=_number(estimate),
-        estimate_deg=None if angle_rad is None else _number(math.degrees(angle_rad)),
-        estimate_interval=_span(found.get("estimate_interval")),
-        frequency_rad_s=_number(found.get("frequency_rad_s")),
+        estimate=_rounded_number_or_none(estimate),
+        estimate_deg=None if angle_rad is None else _rounded_number_or_none(math.degrees(angle_rad)),
+        estimate_interval=_rounded_interval(found.get("estimate_interval")),
+        frequency_rad_s=_rounded_number_or_none(found.get("frequency_rad_s")),
         so_far=found["so_far"],
         premature=premature,
     )
 
 
-def _tracking(flight: "Landing", truth: Truth) -> model.Tracking:
+def _tracking_record(flight: "Landing", truth: Truth) -> model.Tracking:
     at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
     return model.Tracking(
-        pre_fault_rms_deg_s=None if at_once else _per_axis_deg_s(flight.pre_fault_rms_rad_s),
-        post_fault_rms_deg_s=_per_axis_deg_s(flight.post_fault_rms_rad_s),
-        surface_travel_deg=_rounded(_each_in_deg(flight.surface_travel_rad)),
-        surface_energy_deg2_s=_rounded(_each_in_deg(_each_in_deg(flight.surface_energy_rad2_s))),
+        pre_fault_rms_deg_s=None if at_once else _rates_record_deg_s(flight.pre_fault_rms_rad_s),
+        post_fault_rms_deg_s=_rates_record_deg_s(flight.post_fault_rms_rad_s),
+        surface_travel_deg=_with_rounded_numbers(_values_in_deg(flight.surface_travel_rad)),
+        surface_energy_deg2_s=_with_rounded_numbers(
+            _values_in_deg(_values_in_deg(flight.surface_energy_rad2_s))
+        ),
     )
 
 
-def _in_deg(off: dict[str, float | None] | None) -> Document | None:
+def _profile_deviations_in_deg(off: dict[str, float | None] | None) -> Document | None:
     """Deviations from the commanded profile; null without an autopilot, or where a channel is not flown."""
     if off is None:
         return None
@@ -489,19 +505,21 @@ def _in_deg(off: dict[str, float | None] | None) -> Document | None:
     return {name: None if away is None else in_deg.get(name, float)(away) for name, away in off.items()}
 
 
-def _arrival(flight: "Landing") -> model.Arrival | None:
+def _arrival_record(flight: "Landing") -> model.Arrival | None:
     """Where a flight along a profile has come to; null without an autopilot, or if the aircraft is lost."""
-    off = _in_deg(flight.arrival)
+    off = _profile_deviations_in_deg(flight.arrival)
     if off is None or flight.departure is not None:
         return None
-    return _section(model.Arrival, {**off, "in_envelope": not flight.outside_at_end})
+    return _record_of_mapping(model.Arrival, {**off, "in_envelope": not flight.outside_at_end})
 
 
-def _departure(flight: "Landing") -> model.Departure | None:
-    return flight.departure and model.Departure(_finite(flight.departure[0]), flight.departure[1])
+def _departure_record(flight: "Landing") -> model.Departure | None:
+    return flight.departure and model.Departure(
+        _rounded_known_number(flight.departure[0]), flight.departure[1]
+    )
 
 
-def _alarms_s(flight: "Landing") -> list[float]:
+def _alarm_times_s(flight: "Landing") -> list[float]:
     """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
     alarms = [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
     return [time_s for time_s in alarms if time_s is not None]
@@ -511,53 +529,54 @@ def fault_free_s(flight: "Landing") -> float:
     """Time under observation in which an alarm is a false one: until the first fault, the first alarm of any
     diagnosis, or the end. Rates of false alarms are per this time."""
     faults = [fault.at_s for fault in flight.scenario.faults]
-    return min([flight.frames / flight.scenario.rate_hz, *_alarms_s(flight), *faults])
+    return min([flight.frames / flight.scenario.rate_hz, *_alarm_times_s(flight), *faults])
 
 
-def _change(change: Document, truth: Truth) -> model.Change:
+def _change_record(change: Document, truth: Truth) -> model.Change:
     """A change in flight, with what to think of the alarm of the diagnosis that it ended."""
-    made, alarm_s = model.Change.of(_rounded(change)), change.get("detection_time_s")
+    made, alarm_s = model.Change.of(_with_rounded_numbers(change)), change.get("detection_time_s")
     return made if alarm_s is None else replace(made, false_alarm=truth.onset.is_false(alarm_s))
 
 
-def _section(of: type[Section], found: Mapping[str, Any] | None) -> Section | None:
+def _record_of_mapping(of: type[MetricsRecord], found: Mapping[str, Any] | None) -> MetricsRecord | None:
     """A section that a flight has as a mapping; null if it has none."""
-    return None if found is None else of.of(_rounded(found))
+    return None if found is None else of.of(_with_rounded_numbers(found))
 
 
-def _per_axis_deg_s(rates_rad_s: Rates | None) -> model.Rates | None:
-    return rates_rad_s and model.Rates(*(_number(math.degrees(rate)) for rate in rates_rad_s))
+def _rates_record_deg_s(rates_rad_s: RatesPqr | None) -> model.Rates | None:
+    return rates_rad_s and model.Rates(*(_rounded_number_or_none(math.degrees(rate)) for rate in rates_rad_s))
 
 
-def _each_in_deg(angles: dict[str, float]) -> dict[str, float]:
+def _values_in_deg(angles: dict[str, float]) -> dict[str, float]:
     return {name: math.degrees(angle) for name, angle in angles.items()}
 
 
-def _span(ends: tuple[float, float] | None) -> Any:
-    return tuple(map(_number, ends)) if ends else None
+def _rounded_interval(ends: tuple[float, float] | None) -> Any:
+    return tuple(map(_rounded_number_or_none, ends)) if ends else None
 
 
-def _rounded(value: Any) -> Any:
-    """A part of a landing as the document has it: each number as `_number` gives it, a sequence as a list."""
+def _with_rounded_numbers(value: Any) -> Any:
+    """A part of a landing as the document has it: each number as `_rounded_number_or_none` gives it, each
+    sequence as a list."""
     if isinstance(value, float):  # first, as most are
-        return _number(value)
+        return _rounded_number_or_none(value)
     if isinstance(value, dict):
-        return {key: _rounded(entry) for key, entry in value.items()}
-    return [_rounded(entry) for entry in value] if isinstance(value, list | tuple) else value
+        return {key: _with_rounded_numbers(entry) for key, entry in value.items()}
+    return [_with_rounded_numbers(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
-def _finite(value: float) -> Any:
-    return _number(value)
+def _rounded_known_number(value: float) -> Any:
+    return _rounded_number_or_none(value)
 
 
-def _number(value: float | None) -> float | None:
+def _rounded_number_or_none(value: float | None) -> float | None:
     """A finite Python float without the rounding dust of frame times (nine decimals), or null."""
     if value is None or not math.isfinite(value):
         return None
     return round(float(value), 9)
 
 
-def _condition(flight: "Landing") -> model.Condition:
+def _condition_record(flight: "Landing") -> model.Condition:
     scenario = flight.scenario
     return model.Condition(
         airspeed_mps=scenario.initial.airspeed_mps,
@@ -573,13 +592,21 @@ def _condition(flight: "Landing") -> model.Condition:
 def hints(flight: "Landing", found: Metrics) -> list[str]:
     """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
-    of_diagnosis = (_in_one_frame, _outside_the_class, _several, _too_small) if scenario.fdi.diagnoses else ()
-    said = [*(says(scenario, found) for says in of_diagnosis), _on_the_bound(flight), _waited(found)]
-    said.append(_drift(flight))
+    of_diagnosis = (
+        (_hint_alarm_in_one_frame, _hint_outside_fault_class, _hint_several_faults, _hint_fault_too_small)
+        if scenario.fdi.diagnoses
+        else ()
+    )
+    said = [
+        *(says(scenario, found) for says in of_diagnosis),
+        _hint_residual_near_threshold(flight),
+        _hint_late_reallocation(found),
+    ]
+    said.append(_hint_drift(flight))
     return [sentence for sentence in said if sentence]
 
 
-def _outside_the_class(scenario: "Scenario", found: Metrics) -> str:
+def _hint_outside_fault_class(scenario: "Scenario", found: Metrics) -> str:
     on_surfaces = [(getattr(fault, "actuator", None), fault.type) for fault in scenario.faults]
     strange = [
         f"{surface} {kind.replace('_', ' ')}"
@@ -596,11 +623,11 @@ def _outside_the_class(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _several(scenario: "Scenario", found: Metrics) -> str:
+def _hint_several_faults(scenario: "Scenario", found: Metrics) -> str:
     return "" if scenario.fdi.pairs else of_several(scenario)
 
 
-def _too_small(scenario: "Scenario", found: Metrics) -> str:
+def _hint_fault_too_small(scenario: "Scenario", found: Metrics) -> str:
     detection = found.detection
     if not scenario.faults or detection.detected or detection.guaranteed_delay_s is not None:
         return ""
@@ -612,10 +639,10 @@ def _too_small(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _in_one_frame(scenario: "Scenario", found: Metrics) -> str:
+def _hint_alarm_in_one_frame(scenario: "Scenario", found: Metrics) -> str:
     """The shortest delay that there is: it says nothing of a flight in which something is uncertain."""
     delay_s, frame_s = found.detection.delay_s, 1.0 / scenario.rate_hz
-    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S or not _is_exact(scenario):
+    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S or not _has_no_errors(scenario):
         return ""
     return (
         f"the alarm came within one frame ({frame_s:.2g} s): sensors exact, servos ideal, the air "
@@ -623,17 +650,17 @@ def _in_one_frame(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _is_exact(scenario: "Scenario") -> bool:
+def _has_no_errors(scenario: "Scenario") -> bool:
     """Whether sensors and servos are ideal, the air is still and nothing is undeclared."""
     parts = scenario.sensors.is_ideal, scenario.actuators.is_ideal, scenario.environment.is_still
     return all(parts) and next(undeclared(scenario), None) is None
 
 
-def _on_the_bound(flight: "Landing") -> str:
+def _hint_residual_near_threshold(flight: "Landing") -> str:
     """The worst-case test has next to nothing left before the fault, which any fault then takes, or an error
     that is larger than declared."""
     used = max(flight.closest_approach, default=0.0)
-    if not ON_THE_BOUND <= used <= 1.0:
+    if not NEAR_THRESHOLD_SHARE <= used <= 1.0:
         return ""
     before = " before the fault" if flight.scenario.faults else ""
     return (
@@ -642,7 +669,7 @@ def _on_the_bound(flight: "Landing") -> str:
     )
 
 
-def _waited(found: Metrics) -> str:
+def _hint_late_reallocation(found: Metrics) -> str:
     """Why the law goes on with a surface that has been named long since: another takes over only where it is
     weak or stuck, which the name alone does not say. Nothing of several faults: which of them another surface
     took over is not known here."""
@@ -659,7 +686,7 @@ def _waited(found: Metrics) -> str:
     )
 
 
-def _drift(flight: "Landing") -> str:
+def _hint_drift(flight: "Landing") -> str:
     """Attitude, height and speed are left alone unless a scenario has an autopilot."""
     if flight.end is None:
         return ""

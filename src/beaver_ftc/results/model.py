@@ -16,7 +16,7 @@ Document = files.Document
 Span = tuple[float, float]
 
 
-_IF_KNOWN = {"left_out": True}  # a key that the document has only where its value is known
+_LEFT_OUT_IF_NONE = {"left_out": True}  # a key that the document has only where its value is known
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,16 @@ class Part:
     def of(cls, document: Mapping[str, Any]) -> Self:
         """From a section as JSON has it; a key that is not there is None, or an empty list."""
         part: Any = cls
-        return cls(**{name: read(document.get(name)) for name, read in _readers(part)})
+        return cls(**{name: read(document.get(name)) for name, read in _reader_of_field(part)})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
         left_out = {one.name for one in fields(self) if "left_out" in one.metadata}
         return {
-            key: _plain(value) for key, value in values.items() if not (value is None and key in left_out)
+            key: _as_json_value(value)
+            for key, value in values.items()
+            if not (value is None and key in left_out)
         }
 
 
@@ -42,9 +44,9 @@ Reader = Callable[[Any], Any]
 
 
 @cache
-def _readers(part: Any) -> tuple[tuple[str, Reader], ...]:
+def _reader_of_field(part: Any) -> tuple[tuple[str, Reader], ...]:
     """The fields of a section, and how each is read."""
-    return tuple((name, _reader(hint)) for name, hint in get_type_hints(part).items())
+    return tuple((name, _reader_of_type(hint)) for name, hint in get_type_hints(part).items())
 
 
 def without_none(hint: Any) -> Any:
@@ -54,41 +56,43 @@ def without_none(hint: Any) -> Any:
     return next(one for one in get_args(hint) if one is not type(None))
 
 
-def _reader(hint: Any) -> Reader:
+def _reader_of_type(hint: Any) -> Reader:
     """How a value of JSON becomes a field of this type: the type is looked into once, not for each flight."""
     bare = without_none(hint)
     kind, inner = get_origin(bare), get_args(bare)
     if kind is tuple:
-        read = _entries(_reader(inner[0]))
+        read = _tuple_reader(_reader_of_type(inner[0]))
     elif kind is dict:
-        read = _mapping(_reader(inner[1]))
+        read = _dict_reader(_reader_of_type(inner[1]))
     else:
-        return _or_none(bare.of if isinstance(bare, type) and issubclass(bare, Part) else _without_lists)
-    return read if bare is hint else _or_none(read)
+        return _optional_reader(
+            bare.of if isinstance(bare, type) and issubclass(bare, Part) else _list_as_tuple
+        )
+    return read if bare is hint else _optional_reader(read)
 
 
-def _entries(entry: Reader) -> Reader:
+def _tuple_reader(entry: Reader) -> Reader:
     return lambda values: tuple(map(entry, values or ()))
 
 
-def _mapping(entry: Reader) -> Reader:
+def _dict_reader(entry: Reader) -> Reader:
     return lambda values: {key: entry(value) for key, value in (values or {}).items()}
 
 
-def _or_none(read: Reader) -> Reader:
+def _optional_reader(read: Reader) -> Reader:
     return lambda value: None if value is None else read(value)
 
 
-def _without_lists(value: Any) -> Any:
+def _list_as_tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
-def _plain(value: Any) -> Any:
+def _as_json_value(value: Any) -> Any:
     if isinstance(value, Part):
         return value.document()
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return [_plain(entry) for entry in value] if isinstance(value, tuple | list) else value
+        return {key: _as_json_value(entry) for key, entry in value.items()}
+    return [_as_json_value(entry) for entry in value] if isinstance(value, tuple | list) else value
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ class Fault(Part):
     """
 
     actuator: str | None
-    sensor: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    sensor: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     type: str
     at_s: float
 
@@ -308,7 +312,7 @@ class Change(Part):
     sensors: bool
     detection_time_s: float | None
     isolated: str | None
-    false_alarm: bool | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    false_alarm: bool | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     renewed: bool = True
 
     def document(self) -> Document:
@@ -359,12 +363,12 @@ class AxisAuthority(Part):
 
     given_share: float
     beyond_s: float
-    least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    healthy_least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    healthy_greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    engines_least_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    engines_greatest_rad_s2: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    healthy_least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    healthy_greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    engines_least_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    engines_greatest_rad_s2: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -437,12 +441,12 @@ class Expectation(Part):
     passed: bool
     expected: Any
     actual: Any
-    reason: str | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    reason: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
     @property
     def both_values(self) -> str:
         """What was expected and what came out, as tests and CI show them."""
-        expected, actual = map(_plain, (self.expected, self.actual))
+        expected, actual = map(_as_json_value, (self.expected, self.actual))
         return f"expected {expected}, actual {actual}"
 
 
@@ -543,9 +547,9 @@ class Metrics(Part):
     expectations: tuple[Expectation, ...]
     passed: bool
     versions: dict[str, str]
-    interrupted_s: float | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    link: Link | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
-    certificate: Certified | None = field(default=None, metadata=_IF_KNOWN, kw_only=True)
+    interrupted_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    link: Link | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    certificate: Certified | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
     @property
     def judged(self) -> Judged:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from beaver_ftc.results.figures import Picture
 
-PROCESSES = 2  # the process that flies waits for them
+N_PAINTERS = 2  # the process that flies waits for them
 Painters = Sequence[Connection]
 
 
@@ -31,10 +31,10 @@ def painters(wanted: bool = True) -> Iterator[Painters]:
     fork = multiprocessing.get_context("fork")
     ours: list[Connection] = []
     processes = []
-    for _ in range(PROCESSES):
+    for _ in range(N_PAINTERS):
         here, there = fork.Pipe()
         ours.append(here)
-        processes.append(fork.Process(target=_serve, args=(there, tuple(ours)), daemon=True))
+        processes.append(fork.Process(target=_draw_until_closed, args=(there, tuple(ours)), daemon=True))
         processes[-1].start()
         there.close()
     try:
@@ -48,7 +48,7 @@ def painters(wanted: bool = True) -> Iterator[Painters]:
 
 def _can_fork() -> bool:
     """Whether painters can work beside this process, and a fork copies no lock that another thread holds."""
-    if not sys.platform.startswith("linux") or (os.cpu_count() or 1) < PROCESSES:
+    if not sys.platform.startswith("linux") or (os.cpu_count() or 1) < N_PAINTERS:
         return False
     return threading.active_count() == 1
 
@@ -56,8 +56,10 @@ def _can_fork() -> bool:
 @contextmanager
 def drawing(pictures: "Sequence[Picture]", painters: Painters) -> Iterator[None]:
     """Have the pictures drawn during the block: they are there at its end. Raises what went wrong."""
-    given = list(zip(painters, share(pictures, len(painters)), strict=True)) if painters else []
-    asked = [(painter, own) for painter, own in given if _ask(painter, own)]
+    given = (
+        list(zip(painters, shares_of_equal_work(pictures, len(painters)), strict=True)) if painters else []
+    )
+    asked = [(painter, own) for painter, own in given if _send_pictures(painter, own)]
     left = [picture for each in given if each not in asked for picture in each[1]] if given else [*pictures]
     failures = []
     try:
@@ -82,7 +84,7 @@ def save_all(pictures: "Sequence[Picture]") -> None:
             save(picture)
 
 
-def _ask(painter: Connection, pictures: "Sequence[Picture]") -> bool:
+def _send_pictures(painter: Connection, pictures: "Sequence[Picture]") -> bool:
     """Whether this painter has been asked: one that was killed cannot be."""
     try:
         painter.send(pictures)
@@ -91,7 +93,7 @@ def _ask(painter: Connection, pictures: "Sequence[Picture]") -> bool:
     return True
 
 
-def _serve(there: Connection, not_ours: Sequence[Connection]) -> None:
+def _draw_until_closed(there: Connection, not_ours: Sequence[Connection]) -> None:
     """Draw what is asked for until the other end is closed: by its process, or with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -112,7 +114,7 @@ def _serve(there: Connection, not_ours: Sequence[Connection]) -> None:
             there.send(error)
 
 
-def share(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
+def shares_of_equal_work(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
     """As much to draw for each: the largest first, to the process that has least."""
     shares: list[list[Picture]] = [[] for _ in range(among)]
     for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):

@@ -19,25 +19,25 @@ from beaver_ftc.results import log, verdict
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
-    MAX_POINTS,
+    MAX_CURVE_POINTS,
     Panel,
     View,
     expected_airspeed_mps,
-    kinds,
     read_series,
     surfaces,
+    surfaces_by_kind,
     views,
 )
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
-Section = Callable[[Path], str]
+ReportSection = Callable[[Path], str]
 
-_TEMPLATES = Path(__file__).parent / "templates"
-_SECTIONS: list[Section] = []  # studies that add to a run's report register theirs
+_TEMPLATE_FOLDER = Path(__file__).parent / "templates"
+_REGISTERED_SECTIONS: list[ReportSection] = []  # studies that add to a run's report register theirs
 AROUND_S, AT_FULL_RATE = 2.5, 10_000  # at full rate around the events, this much before and after; points
-_PATH = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
+_FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
 def write_report(path: Path, folders: Sequence[Path], names: Sequence[str] = ()) -> None:
@@ -55,25 +55,25 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
 
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
-    return template(_TEMPLATES / "report.html.j2").render(
-        runs=[_words(document, text) for document, text in zip(documents, texts, strict=True)],
+    return template(_TEMPLATE_FOLDER / "report.html.j2").render(
+        runs=[_verdict_words(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
         marks=(shown := list({m.name: m for each in documents for m in marks(Metrics.of(each))}.values())),
         first_mark_s=shown[0].time_s if shown else 0.0,
-        **parts(folders, documents, names),
+        **script_style_and_data(folders, documents, names),
         # what studies have found in a folder, if they have been there
-        sections=[Markup("".join(section(folder) for section in _SECTIONS)) for folder in folders],
+        sections=[Markup("".join(section(folder) for section in _REGISTERED_SECTIONS)) for folder in folders],
     )
 
 
-def register_section(section: Section) -> None:
+def register_section(section: ReportSection) -> None:
     """Have every report from now on show what `section` makes of its result folder: HTML, or nothing."""
-    if section not in _SECTIONS:
-        _SECTIONS.append(section)
+    if section not in _REGISTERED_SECTIONS:
+        _REGISTERED_SECTIONS.append(section)
 
 
-def _words(metrics: Document, scenario: str) -> Document:
+def _verdict_words(metrics: Document, scenario: str) -> Document:
     import yaml
 
     found = Metrics.of(metrics)
@@ -82,14 +82,14 @@ def _words(metrics: Document, scenario: str) -> Document:
         "title": verdict.title(found),
         "outcome_class": verdict.outcome_class(found),
         "description": yaml.safe_load(scenario).get("description", ""),
-        "facts": verdict.facts(found),
-        "tracking": verdict.tracking(found),
-        "expectations": verdict.expectations(found),
+        "facts": verdict.verdict_lines(found),
+        "tracking": verdict.tracking_rms_in_words(found),
+        "expectations": verdict.expectations_in_words(found),
         "scenario": scenario,
     }
 
 
-def parts(
+def script_style_and_data(
     folders: Sequence[Path],
     documents: Sequence[Document],
     names: Sequence[str] = (),
@@ -101,15 +101,15 @@ def parts(
     """
     from markupsafe import Markup
 
-    data = json.dumps(_data(folders, documents, names, shown), allow_nan=False, separators=(",", ":"))
+    data = json.dumps(_page_data(folders, documents, names, shown), allow_nan=False, separators=(",", ":"))
     return {
         "data": Markup(data.replace("<", "\\u003c")),  # it cannot end the script element it stands in
-        "css": _asset("report.css"),
-        "script": _asset("report.js"),
+        "css": _asset_text("report.css"),
+        "script": _asset_text("report.js"),
     }
 
 
-def _data(
+def _page_data(
     folders: Sequence[Path],
     documents: Sequence[Document],
     names: Sequence[str],
@@ -118,14 +118,16 @@ def _data(
     """What the page draws from."""
     logs = [folder / "log.parquet" for folder in folders]
     shown = _common_views(logs, documents) if shown is None else shown
-    columns = tuple(dict.fromkeys([*_PATH, "mode", *(name for view in shown for name in view.columns)]))
+    columns = tuple(
+        dict.fromkeys([*_FLIGHT_PATH_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
+    )
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
-    points = MAX_POINTS if len(logs) <= 2 else max(600, 2 * MAX_POINTS // len(logs))
+    points = MAX_CURVE_POINTS if len(logs) <= 2 else max(600, 2 * MAX_CURVE_POINTS // len(logs))
     found = [Metrics.of(document) for document in documents]
     named = zip(logs, found, names or [each.scenario for each in found], strict=True)
     return {
-        "runs": [_run(path, metrics, columns, name, points) for path, metrics, name in named],
-        "views": [_view(view) for view in shown],
+        "runs": [_run_entry(path, metrics, columns, name, points) for path, metrics, name in named],
+        "views": [_view_entry(view) for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
     }
@@ -143,9 +145,9 @@ def _common_views(logs: Sequence[Path], documents: Sequence[Document]) -> tuple[
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _run(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
-    instants = marks(metrics)
-    window = closeup_window(instants)
+def _run_entry(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
+    event_marks = marks(metrics)
+    window = closeup_window(event_marks)
     levels = [read_series(path, columns, max_points=points)]
     t_s = levels[0]["t_s"]
     if window and t_s.size < log.row_count(path):
@@ -153,50 +155,52 @@ def _run(path: Path, metrics: Metrics, columns: Sequence[str], name: str, points
         levels.append(read_series(path, columns, around, AT_FULL_RATE))
     return {
         "name": name,
-        "jet": not {"spoiler", "stabiliser"}.isdisjoint(kinds(surfaces(log.column_names(path)))),
-        "damage": [_damage(fault) for fault in metrics.faults if fault.type == "damage"],
-        "marks": [asdict(mark) for mark in instants],
+        "jet": not {"spoiler", "stabiliser"}.isdisjoint(surfaces_by_kind(surfaces(log.column_names(path)))),
+        "damage": [_damage_entry(fault) for fault in metrics.faults if fault.type == "damage"],
+        "marks": [asdict(mark) for mark in event_marks],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
-        "levels": [{name: _packed(name, values) for name, values in level.items()} for level in levels],
+        "levels": [
+            {name: _base64_floats(name, values) for name, values in level.items()} for level in levels
+        ],
     }
 
 
-def _damage(fault: DeclaredFault) -> Document:
+def _damage_entry(fault: DeclaredFault) -> Document:
     """Which part is missing, and from when to when."""
     part = fault.size["case"].removesuffix("-off")
     return {"part": part, "at_s": fault.at_s, "end_s": fault.end_s}
 
 
-def _packed(name: str, values: np.ndarray) -> str:
+def _base64_floats(name: str, values: np.ndarray) -> str:
     """Values as base64 of little-endian floats: double for time, single for what is only looked at."""
     return base64.b64encode(values.astype("<f8" if name == "t_s" else "<f4").tobytes()).decode("ascii")
 
 
-def _view(view: View) -> Document:
+def _view_entry(view: View) -> Document:
     return {
         "name": view.name,
         "title": view.title,
-        "across": view.across,
-        "absent": view.absent,
+        "across": view.n_panel_columns,
+        "absent": view.text_without_data,
         "folded": view.folded,
-        "panels": [_panel(panel) for panel in view.panels],
+        "panels": [_panel_entry(panel) for panel in view.panels],
     }
 
 
-def _panel(panel: Panel) -> Document:
+def _panel_entry(panel: Panel) -> Document:
     return {
         "label": panel.label,
         "unit": panel.unit,
         "log": panel.log_scale,
         "limits": panel.limits,
-        "steps": panel.steps or panel.rows,
+        "steps": panel.value_names or panel.rows,
         "bars": panel.bars,
-        "during": panel.during,
+        "during": panel.bars_during_column,
         "clipped": panel.clipped,
-        "shade": panel.shade,
+        "shade": panel.shade_column,
         "shadeLabel": panel.shade_label,
         "shadeColour": SHADES.get(panel.shade_label, ""),
-        "level": panel.level,
+        "level": panel.line_at,
         "traces": [
             {
                 "column": trace.column,
@@ -211,10 +215,10 @@ def _panel(panel: Panel) -> Document:
 
 
 @cache
-def _asset(name: str) -> Any:
+def _asset_text(name: str) -> Any:
     from markupsafe import Markup
 
-    return Markup((_TEMPLATES / name).read_text(encoding="utf-8"))
+    return Markup((_TEMPLATE_FOLDER / name).read_text(encoding="utf-8"))
 
 
 @cache

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from beaver_ftc.diagnosis import Detector
     from beaver_ftc.plant.adapter import Plant
 
-PLUGS = ("detector", "law")
+PLUG_IN_NAMES = ("detector", "law")
 
 
 class Simulation(Stepping):
@@ -74,7 +74,9 @@ class Simulation(Stepping):
 
         A snapshot can be resumed any number of times. Each new flight has exactly the same numbers.
         """
-        plugged = tuple(name for name, of in zip(PLUGS, self._plug_ins, strict=True) if of is not None)
+        plugged = tuple(
+            name for name, of in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if of is not None
+        )
         made = partial(type(self), self._given, log=self._kept is not None, prepare=self._prepare)
         return Snapshot(self.frames, self.t_s, tuple(self._asked), made, plugged)
 
@@ -86,7 +88,7 @@ class Simulation(Stepping):
         """The flight so far as a `Flight`. The simulation can continue afterwards."""
         outcome = self._outcome()
         self._flush()
-        return Flight.landed(outcome, self._kept and self._kept.so_far())
+        return Flight.landed(outcome, self._kept and self._kept.frozen_copy())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write the flight so far as a result folder, and return its path. See `Flight.save`."""
@@ -107,7 +109,7 @@ class Snapshot:
     frames: int
     t_s: float
     _asked: tuple[Asked, ...] = field(repr=False)
-    _made: Callable[..., Simulation] = field(repr=False)
+    _make_simulation: Callable[..., Simulation] = field(repr=False)
     plugged: tuple[str, ...] = ()
 
     def resume(self, **plug_ins: "Detector | Law") -> Simulation:
@@ -118,6 +120,6 @@ class Snapshot:
         if set(plug_ins) != set(self.plugged):
             asked = " and ".join(self.plugged) or "no plug-in"
             raise BadInput(f"resume: a flight with {asked} is resumed, allowed: new objects of just that")
-        flight = self._made(**plug_ins)
+        flight = self._make_simulation(**plug_ins)
         flight._do_again(self._asked, self.frames)
         return flight

@@ -76,21 +76,23 @@ class Mark:
 
 
 def marks(metrics: Metrics) -> list[Mark]:
-    """The instants of fault, detection, isolation and departure, as far as they came before the end."""
+    """The event_marks of fault, detection, isolation and departure, as far as they came before the end."""
     fault, departure = metrics.fault, metrics.departure
-    instants = (
+    event_marks = (
         ("fault", fault.at_s if fault else None, VERMILION, (), "v", "F"),
         ("detection", metrics.detection.time_s, BLACK, (4, 2), "D", "D"),
         ("isolation", metrics.isolation.time_s, PLUM, (6, 2, 1, 2), "s", "I"),
         ("departure", departure.time_s if departure else None, CRIMSON, (1, 2), "X", "X"),
     )
     end_s = departure.time_s if departure else math.inf
-    return [Mark(name, time, *look) for name, time, *look in instants if time is not None and time <= end_s]
+    return [
+        Mark(name, time, *look) for name, time, *look in event_marks if time is not None and time <= end_s
+    ]
 
 
-def closeup_window(instants: Sequence[Mark]) -> tuple[float, float] | None:
+def closeup_window(event_marks: Sequence[Mark]) -> tuple[float, float] | None:
     """Where to look closely: from just before the fault (or alarm) to two seconds after the last event."""
-    if not instants:
+    if not event_marks:
         return None
-    times = [mark.time_s for mark in instants if mark.name != "departure"] or [instants[0].time_s]
+    times = [mark.time_s for mark in event_marks if mark.name != "departure"] or [event_marks[0].time_s]
     return min(times) - 0.5, min(max(times), min(times) + 10.0) + 2.0

@@ -21,17 +21,17 @@ import numpy as np
 
 MOST_CHARACTERS, MOST_DEPTH = 4000, 40
 
-_TOKEN = re.compile(
+_TOKEN_PATTERN = re.compile(
     r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|[A-Za-z_][\w.]*|->|<=|>=|[-+*/()<>\[\]:,])"
 )
-_POWER = {  # how tightly each binds what stands on its left
+_BINDING_POWER = {  # how tightly each binds what stands on its left
     "->": 1, "implies": 1, "or": 2, "and": 3, "until": 4,
     "<=": 5, ">=": 5, "<": 5, ">": 5, "+": 6, "-": 6, "*": 7, "/": 7,
 }  # fmt: skip
-_TIGHTEST = 8
-_TEMPORAL = ("always", "eventually", "once", "historically")
-_ARITHMETIC = ("+", "-", "*", "/", "abs", "column", "number")
-_WORDS = {*_TEMPORAL, "not", "and", "or", "implies", "until", "abs"}
+_MAX_BINDING_POWER = 8
+_TEMPORAL_OPERATORS = ("always", "eventually", "once", "historically")
+_NUMERIC_OPERATORS = ("+", "-", "*", "/", "abs", "column", "number")
+_RESERVED_WORDS = {*_TEMPORAL_OPERATORS, "not", "and", "or", "implies", "until", "abs"}
 
 
 class FormulaError(ValueError):
@@ -63,15 +63,15 @@ class Formula(NamedTuple):
     def robustness(self, columns: Mapping[str, np.ndarray], rate_hz: float) -> float:
         """At the first frame of these columns (frames,); NaN where a column it depends on is not a number."""
         frames = len(next(iter(columns.values())))
-        return float(_values(self, columns, rate_hz, frames)[0])
+        return float(_robustness_by_frame(self, columns, rate_hz, frames)[0])
 
 
 def parse(text: str) -> Formula:
     """The formula in a text. Raises FormulaError."""
     if len(text) > MOST_CHARACTERS:
         raise FormulaError(f"has {len(text)} characters, allowed: at most {MOST_CHARACTERS}")
-    found = _Parser(list(_tokens(text))).whole()
-    if found.operator in _ARITHMETIC:
+    found = _Parser(list(_tokens(text))).parse_all()
+    if found.operator in _NUMERIC_OPERATORS:
         raise FormulaError("says nothing that can be true, allowed: a comparison such as abs(q_rad_s) <= 0.2")
     return found
 
@@ -79,7 +79,7 @@ def parse(text: str) -> Formula:
 def _tokens(text: str) -> Iterator[str]:
     at = 0
     while text[at:].strip():
-        match = _TOKEN.match(text, at)
+        match = _TOKEN_PATTERN.match(text, at)
         if match is None:
             allowed = "names, numbers, + - * / <= < >= > ( ) [ : ] ->"
             raise FormulaError(f"{text[at:].strip()[:20]!r} is not read, allowed: {allowed}")
@@ -93,104 +93,112 @@ class _Parser:
     def __init__(self, tokens: list[str]) -> None:
         self._tokens, self._at, self._depth = [*tokens, ""], 0, 0
 
-    def whole(self) -> Formula:
-        found = self._operand(0)
-        if self._next:
-            raise FormulaError(f"{self._next!r} is one too many, allowed: the end of the formula")
+    def parse_all(self) -> Formula:
+        found = self._parse_operand(0)
+        if self._next_token:
+            raise FormulaError(f"{self._next_token!r} is one too many, allowed: the end of the formula")
         return found
 
     @property
-    def _next(self) -> str:
+    def _next_token(self) -> str:
         return self._tokens[self._at]
 
-    def _take(self, expected: str = "") -> str:
-        token = self._next
+    def _take_token(self, expected: str = "") -> str:
+        token = self._next_token
         if expected and token != expected:
             raise FormulaError(f"{token or 'the end'!r} where {expected!r} is due")
         self._at += 1
         return token
 
-    def _operand(self, power: int) -> Formula:
+    def _parse_operand(self, power: int) -> Formula:
         self._depth += 1
         if self._depth > MOST_DEPTH:
             raise FormulaError(f"is nested too deeply, allowed: {MOST_DEPTH} levels")
-        left = self._first()
-        while _POWER.get(self._next, 0) > power:
-            operator = self._take()
-            interval = self._interval() if operator == "until" else None
+        left = self._parse_prefix()
+        while _BINDING_POWER.get(self._next_token, 0) > power:
+            operator = self._take_token()
+            interval = self._parse_interval() if operator == "until" else None
             # to the right the same operator: a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
-            right = self._operand(_POWER[operator] - (_POWER[operator] == 1))
-            left = _joined("implies" if operator == "->" else operator, left, right, interval)
+            right = self._parse_operand(_BINDING_POWER[operator] - (_BINDING_POWER[operator] == 1))
+            left = _binary_formula("implies" if operator == "->" else operator, left, right, interval)
         self._depth -= 1
         return left
 
-    def _first(self) -> Formula:
-        token = self._take()
+    def _parse_prefix(self) -> Formula:
+        token = self._take_token()
         if token == "(":
-            found = self._operand(0)
-            self._take(")")
+            found = self._parse_operand(0)
+            self._take_token(")")
             return found
         if token == "-":
-            return _of_numbers("-", Formula("number", what=0.0), self._operand(_POWER["*"] - 1))
+            return _formula_of_numbers(
+                "-", Formula("number", what=0.0), self._parse_operand(_BINDING_POWER["*"] - 1)
+            )
         if token == "abs":
-            self._take("(")
-            found = _of_numbers("abs", self._operand(0))
-            self._take(")")
+            self._take_token("(")
+            found = _formula_of_numbers("abs", self._parse_operand(0))
+            self._take_token(")")
             return found
-        if token == "not" or token in _TEMPORAL:
-            interval = self._interval() if token in _TEMPORAL else None
-            return _of_truths(token, self._operand(_TIGHTEST), interval=interval)
+        if token == "not" or token in _TEMPORAL_OPERATORS:
+            interval = self._parse_interval() if token in _TEMPORAL_OPERATORS else None
+            return _formula_of_truths(token, self._parse_operand(_MAX_BINDING_POWER), interval=interval)
         if re.fullmatch(r"[\d.].*", token):
             if not isfinite(float(token)):
                 raise FormulaError(f"{token[:40]!r} is too large for a number")
             return Formula("number", what=float(token))
-        if not token or token in _WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
+        if not token or token in _RESERVED_WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
             raise FormulaError(f"{token or 'the end'!r} where a column, a number or ( is due")
         return Formula("column", what=token)
 
-    def _interval(self) -> tuple[float, float] | None:
-        if self._next != "[":
+    def _parse_interval(self) -> tuple[float, float] | None:
+        if self._next_token != "[":
             return None
-        self._take("[")
-        begin = self._seconds()
-        if self._take() not in (":", ","):
+        self._take_token("[")
+        begin = self._parse_seconds()
+        if self._take_token() not in (":", ","):
             raise FormulaError("an interval is due, allowed: [from:to] in seconds")
-        end = self._seconds()
-        self._take("]")
+        end = self._parse_seconds()
+        self._take_token("]")
         if end < begin:
             raise FormulaError(
                 f"the interval [{begin:g}:{end:g}] is out of order, allowed: [from:to] in seconds"
             )
         return begin, end
 
-    def _seconds(self) -> float:
-        token = self._take()
+    def _parse_seconds(self) -> float:
+        token = self._take_token()
         if not re.fullmatch(r"[\d.].*", token) or float(token) > 360_000:
             raise FormulaError(f"{token or 'the end'!r} is no time, allowed: seconds from 0 to 360000")
         return float(token)
 
 
-def _joined(operator: str, left: Formula, right: Formula, interval: tuple[float, float] | None) -> Formula:
-    of = _of_numbers if _POWER[operator] >= _POWER["<="] else _of_truths
+def _binary_formula(
+    operator: str, left: Formula, right: Formula, interval: tuple[float, float] | None
+) -> Formula:
+    of = _formula_of_numbers if _BINDING_POWER[operator] >= _BINDING_POWER["<="] else _formula_of_truths
     return of(operator, left, right, interval=interval)
 
 
-def _of_numbers(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
-    if any(part.operator not in _ARITHMETIC for part in parts):
+def _formula_of_numbers(
+    operator: str, *parts: Formula, interval: tuple[float, float] | None = None
+) -> Formula:
+    if any(part.operator not in _NUMERIC_OPERATORS for part in parts):
         raise FormulaError(
             f"{operator!r} is of numbers, and is given what is true or false, allowed: columns and numbers"
         )
     return Formula(operator, parts)
 
 
-def _of_truths(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
-    if any(part.operator in _ARITHMETIC for part in parts):
+def _formula_of_truths(
+    operator: str, *parts: Formula, interval: tuple[float, float] | None = None
+) -> Formula:
+    if any(part.operator in _NUMERIC_OPERATORS for part in parts):
         raise FormulaError(f"{operator!r} is of what is true or false, allowed: a comparison, in parentheses")
     return Formula(operator, parts, interval)
 
 
-_Values = Callable[..., np.ndarray]
-_PLAIN: dict[str, _Values] = {
+_ValueFunction = Callable[..., np.ndarray]
+_FRAMEWISE_FUNCTION_OF_OPERATOR: dict[str, _ValueFunction] = {
     "+": np.add, "-": np.subtract, "*": np.multiply,
     "/": np.divide,
     "<=": lambda a, b: b - a, "<": lambda a, b: b - a, ">=": np.subtract, ">": np.subtract,
@@ -199,25 +207,27 @@ _PLAIN: dict[str, _Values] = {
 }  # fmt: skip
 
 
-def _values(formula: Formula, columns: Mapping[str, np.ndarray], rate_hz: float, frames: int) -> np.ndarray:
+def _robustness_by_frame(
+    formula: Formula, columns: Mapping[str, np.ndarray], rate_hz: float, frames: int
+) -> np.ndarray:
     """What a formula is worth at each frame, (frames,)."""
     operator = formula.operator
     if operator in ("number", "column"):
         return np.full(frames, formula.what) if operator == "number" else columns[str(formula.what)]
-    parts = [_values(part, columns, rate_hz, frames) for part in formula.parts]
-    if operator in _PLAIN:
+    parts = [_robustness_by_frame(part, columns, rate_hz, frames) for part in formula.parts]
+    if operator in _FRAMEWISE_FUNCTION_OF_OPERATOR:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return _PLAIN[operator](*parts)
+            return _FRAMEWISE_FUNCTION_OF_OPERATOR[operator](*parts)
     begin, end = (round(t * rate_hz) for t in formula.interval or (0.0, frames / rate_hz))
     if operator == "until":
-        return _until(parts[0], parts[1], begin, min(end, frames))
+        return _until_robustness(parts[0], parts[1], begin, min(end, frames))
     past = operator in ("once", "historically")
     sign = 1.0 if operator in ("always", "historically") else -1.0
     values = sign * parts[0][:: -1 if past else 1]
-    return sign * _least_ahead(values, begin, end)[:: -1 if past else 1]
+    return sign * _future_minimum(values, begin, end)[:: -1 if past else 1]
 
 
-def _least_ahead(values: np.ndarray, begin: int, end: int) -> np.ndarray:
+def _future_minimum(values: np.ndarray, begin: int, end: int) -> np.ndarray:
     """min(values[k + begin : k + end + 1]) at each k, infinite where that is beyond the log: twice as long a
     stretch at each step."""
     frames, width = len(values), min(end, len(values)) - begin + 1
@@ -229,7 +239,7 @@ def _least_ahead(values: np.ndarray, begin: int, end: int) -> np.ndarray:
     return np.minimum(least[:frames], least[width - span :][:frames])
 
 
-def _until(held: np.ndarray, reached: np.ndarray, begin: int, end: int) -> np.ndarray:
+def _until_robustness(held: np.ndarray, reached: np.ndarray, begin: int, end: int) -> np.ndarray:
     """max over j in begin..end of min(reached[k + j], min(held[k : k + j])) at each k."""
     frames = len(held)
     best, so_far = np.full(frames, -np.inf), np.full(frames, np.inf)

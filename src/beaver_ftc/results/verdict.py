@@ -26,7 +26,7 @@ from beaver_ftc.scenario.declared import in_words
 if TYPE_CHECKING:
     from rich.table import Table
 
-LEAST_BEYOND_S = 0.1
+MIN_SHOWN_BEYOND_S = 0.1
 
 
 def title(metrics: Metrics) -> str:
@@ -44,45 +44,48 @@ def outcome_class(metrics: Metrics) -> str:
     return "bad" if not metrics.passed else "lost" if metrics.departure else "good"
 
 
-def facts(metrics: Metrics) -> list[tuple[str, str]]:
+def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     """(name, text) of each line of the verdict, in the order of events."""
     declared = metrics.faults or (metrics.fault,)
     said = (
-        ("flight", _flight(metrics)),
-        *(("" if i else "fault", _fault(fault)) for i, fault in enumerate(declared)),
-        ("detection", _detection(metrics)),
-        ("inconclusive", _inconclusive(metrics)),
-        ("statistical", _statistical(metrics)),
-        ("isolation", _isolation(metrics)),
-        *(("", said) for said in _others(metrics)),
-        ("probing", _probing(metrics)),
-        ("supervisor", _supervisor(metrics)),
-        *(("changed", _changed(change)) for change in metrics.changes),
-        ("engine power", _engine_power(metrics)),
-        ("profile", _profile(metrics)),
-        *(("limited", _limit(limit)) for limit in metrics.limits),
-        ("authority", _authority(metrics)),
-        ("remaining", _remaining(metrics)),
-        ("envelope", _envelope(metrics)),
-        ("departure", _departure(metrics)),
-        ("link", _link(metrics)),
-        ("saturation", _saturation(metrics)),
+        ("flight", _condition_text(metrics)),
+        *(("" if i else "fault", _fault_text(fault)) for i, fault in enumerate(declared)),
+        ("detection", _detection_text(metrics)),
+        ("inconclusive", _inconclusive_text(metrics)),
+        ("statistical", _statistical_text(metrics)),
+        ("isolation", _isolation_text(metrics)),
+        *(("", said) for said in _further_fault_texts(metrics)),
+        ("probing", _probing_text(metrics)),
+        ("supervisor", _supervisor_text(metrics)),
+        *(("changed", _change_text(change)) for change in metrics.changes),
+        ("engine power", _engine_power_text(metrics)),
+        ("profile", _profile_text(metrics)),
+        *(("limited", _protection_limit_text(limit)) for limit in metrics.limits),
+        ("authority", _insufficient_authority_text(metrics)),
+        ("remaining", _remaining_authority_text(metrics)),
+        ("envelope", _envelope_text(metrics)),
+        ("departure", _departure_text(metrics)),
+        ("link", _link_text(metrics)),
+        ("saturation", _saturation_text(metrics)),
         *(("note", hint) for hint in metrics.hints),
     )
     return [(what, how) for what, how in said if how]
 
 
-def _others(metrics: Metrics) -> list[str]:
+def _further_fault_texts(metrics: Metrics) -> list[str]:
     """The further faults of several at once: named, or the remaining candidates."""
     isolation = metrics.isolation
     rest = isolation.faults[1:] if isolation.isolated else []
-    return [_one(fault, metrics) if fault.fault else _still_possible(fault.candidates) for fault in rest]
+    return [
+        _named_fault_text(fault, metrics) if fault.fault else _candidates_text(fault.candidates)
+        for fault in rest
+    ]
 
 
-MOST_LISTED = 4  # places, or types: more are counted
+MAX_LISTED = 4  # places, or types: more are counted
 
 
-def _still_possible(candidates: Sequence[str]) -> str:
+def _candidates_text(candidates: Sequence[str]) -> str:
     return f"not isolated, {candidates_in_words(candidates)}"
 
 
@@ -93,60 +96,62 @@ def candidates_in_words(candidates: Sequence[str]) -> str:
     for candidate in candidates:
         place, _, kind = candidate.partition(":")
         places.setdefault(place, []).extend([kind] if kind else [])
-    surfaces = [place for place, kinds in places.items() if place not in _NO_SURFACE]
-    said = [_surfaces(surfaces)] if surfaces else []
-    said += [_NO_SURFACE[place] for place in places if place in _NO_SURFACE]
+    surfaces = [place for place, kinds in places.items() if place not in _TEXT_OF_OTHER_CANDIDATE]
+    said = [_surfaces_text(surfaces)] if surfaces else []
+    said += [_TEXT_OF_OTHER_CANDIDATE[place] for place in places if place in _TEXT_OF_OTHER_CANDIDATE]
     open_types = list(dict.fromkeys(kind for kinds in places.values() for kind in kinds))
-    types = f"; {_open_types(open_types)}" if open_types else ""
+    types = f"; {_open_types_text(open_types)}" if open_types else ""
     return f"still possible: {' or '.join(said) or 'nothing'}{types}"
 
 
-_NO_SURFACE = {
+_TEXT_OF_OTHER_CANDIDATE = {
     "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
 }  # fmt: skip
 # What an aircraft's surfaces are called, and where on it they are.
-_PARTS = {
+_AIRCRAFT_PART_OF_SURFACE_WORD = {
     "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
     "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
     "throttle": "engines", "engine": "engines",
 }  # fmt: skip
 
 
-def _surfaces(names: Sequence[str]) -> str:
+def _surfaces_text(names: Sequence[str]) -> str:
     """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
-    if len(names) <= MOST_LISTED:
-        return " or ".join(_in_words(name) for name in names)
+    if len(names) <= MAX_LISTED:
+        return " or ".join(_without_underscores(name) for name in names)
     parts: dict[str, int] = {}
     for name in names:
-        part = next((part for word, part in _PARTS.items() if word in name), "others")
+        part = next((part for word, part in _AIRCRAFT_PART_OF_SURFACE_WORD.items() if word in name), "others")
         parts[part] = parts.get(part, 0) + 1
     counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
     return f"one of {len(names)} surfaces ({counted})"
 
 
-def _open_types(kinds: Sequence[str]) -> str:
+def _open_types_text(kinds: Sequence[str]) -> str:
     """The types that remain, counted."""
     if len(kinds) == 1:
-        return f"type {_in_words(kinds[0])}"
-    return f"type not determined ({len(kinds)} remain: {', '.join(map(_in_words, kinds))})"
+        return f"type {_without_underscores(kinds[0])}"
+    return f"type not determined ({len(kinds)} remain: {', '.join(map(_without_underscores, kinds))})"
 
 
-def _in_words(name: str) -> str:
+def _without_underscores(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _counted(n: int, what: str) -> str:
+def _count_and_noun(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
-def tracking(metrics: Metrics) -> list[tuple[str, str, str, str]]:
+def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
     """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
     of = metrics.tracking
     tracked = ("before", of.pre_fault_rms_deg_s), ("after", of.post_fault_rms_deg_s)
-    return [(when, _value(rms.p), _value(rms.q), _value(rms.r)) for when, rms in tracked if rms]
+    return [
+        (when, _value_text(rms.p), _value_text(rms.q), _value_text(rms.r)) for when, rms in tracked if rms
+    ]
 
 
-class Held(NamedTuple):
+class ExpectationInWords(NamedTuple):
     """An expectation compared with the flight.
 
     limit: what is expected; actual: what the flight gave, empty where it adds nothing; share: actual / limit
@@ -164,12 +169,12 @@ class Held(NamedTuple):
         return f"{self.limit}, got {self.actual}" if self.actual else self.limit
 
 
-def expectations(metrics: Metrics) -> list[Held]:
+def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
     """Each expectation in words."""
-    return [_held(found) for found in metrics.expectations]
+    return [_expectation_in_words(found) for found in metrics.expectations]
 
 
-_LIMITS = {  # quantity and unit of the expectations that are limits
+_QUANTITY_AND_UNIT_OF_LIMIT = {  # quantity and unit of the expectations that are limits
     "detected_within_s": ("detection delay", "s"), "isolated_within_s": ("isolation delay", "s"),
     "altitude_within_m": ("altitude deviation", "m"),
     "airspeed_within_mps": ("airspeed deviation (10 s mean)", "m/s"),
@@ -184,34 +189,41 @@ _LIMITS = {  # quantity and unit of the expectations that are limits
         for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
     },
 }  # fmt: skip
-_FLAGS = {  # what is said of true, and of false
+_TRUE_AND_FALSE_TEXT_OF_FLAG = {  # what is said of true, and of false
     "no_false_alarm": ("no false alarm", "a false alarm"),
     "no_departure": ("no departure", "a departure"),
     "stays_in_envelope": ("stays in the envelope", "leaves the envelope"),
     "arrives.in_envelope": ("inside the envelope at the end", "outside the envelope at the end"),
 }  # fmt: skip
-_NAMES = {
+_TITLE_OF_NAME_EXPECTATION = {
     "isolated_as": "isolated fault", "isolated_type": "fault type",
     "candidate_type": "possible fault types include",
 }  # fmt: skip
 
 
-def _held(found: Expectation) -> Held:
-    actual, share = _value(found.actual), None
-    if found.name in _FLAGS:
-        limit = _FLAGS[found.name][not found.expected]
-        actual = "" if found.passed or found.actual is None else _FLAGS[found.name][not found.actual]
-    elif found.name in _LIMITS:
-        quantity, unit = _LIMITS[found.name]
-        limit = f"{quantity} ≤ {_value(found.expected)} {unit}"
+def _expectation_in_words(found: Expectation) -> ExpectationInWords:
+    actual, share = _value_text(found.actual), None
+    if found.name in _TRUE_AND_FALSE_TEXT_OF_FLAG:
+        limit = _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.expected]
+        actual = (
+            ""
+            if found.passed or found.actual is None
+            else _TRUE_AND_FALSE_TEXT_OF_FLAG[found.name][not found.actual]
+        )
+    elif found.name in _QUANTITY_AND_UNIT_OF_LIMIT:
+        quantity, unit = _QUANTITY_AND_UNIT_OF_LIMIT[found.name]
+        limit = f"{quantity} ≤ {_value_text(found.expected)} {unit}"
         if found.actual is not None:
             share = abs(float(found.actual)) / found.expected if found.expected else None
             actual += f" {unit}{'' if share is None else f' ({100 * share:.3g} % of the limit)'}"
     else:
-        limit = f"{_NAMES.get(found.name, _in_words(found.name))} {_value(found.expected)}"
+        what = _TITLE_OF_NAME_EXPECTATION.get(found.name, _without_underscores(found.name))
+        limit = f"{what} {_value_text(found.expected)}"
         actual = "" if found.passed and found.actual == found.expected else actual
     reason = found.reason if actual or not found.passed else ""
-    return Held(found.name, limit, "; ".join(filter(None, (actual, reason))), found.passed, share)
+    return ExpectationInWords(
+        found.name, limit, "; ".join(filter(None, (actual, reason))), found.passed, share
+    )
 
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
@@ -220,11 +232,11 @@ def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
 
     console = Console(file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False)
     with console.capture() as captured:
-        console.print(_table(metrics, folder))
+        console.print(_verdict_table(metrics, folder))
     return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
 
-def _table(metrics: Metrics, folder: str) -> "Table":
+def _verdict_table(metrics: Metrics, folder: str) -> "Table":
     from rich.table import Table
     from rich.text import Text
 
@@ -233,93 +245,95 @@ def _table(metrics: Metrics, folder: str) -> "Table":
     table = Table(title=headline, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for what, how in facts(metrics):
+    for what, how in verdict_lines(metrics):
         table.add_row(what, how)
-    for i, (when, p, q, r) in enumerate(tracking(metrics)):
+    for i, (when, p, q, r) in enumerate(tracking_rms_in_words(metrics)):
         table.add_row("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault")
-    for held in expectations(metrics):
+    for held in expectations_in_words(metrics):
         mark = Text("met   " if held.passed else "MISSED", "green" if held.passed else "bold red")
         table.add_row("expected", Text.assemble(mark, f" {held.sentence}"))
     if metrics.certificate is not None:
-        table.add_row("certificate", _certificate(metrics.certificate, folder))
+        table.add_row("certificate", _certificate_text(metrics.certificate, folder))
     table.add_row("results", folder)
     return table
 
 
-def _certificate(written: Certified, folder: str) -> str:
+def _certificate_text(written: Certified, folder: str) -> str:
     """How many alarms and exclusions are certified, and the command that checks them."""
     if not written.statements and not written.without:
         return "nothing to certify: no alarm"
     without = f", {written.without} not certified" if written.without else ""
-    return f"{_counted(written.statements, 'statement')}{without}; check: beaver-ftc check {folder}"
+    return f"{_count_and_noun(written.statements, 'statement')}{without}; check: beaver-ftc check {folder}"
 
 
-def _changed(change: Change) -> str:
+def _change_text(change: Change) -> str:
     """What was changed in flight, and what a diagnosis that ended with it had found."""
     to = [f"{key} {name}" for key, name in (("law", change.law), ("scheme", change.scheme)) if name]
     said = f"{', '.join([*to, *(['sensors'] if change.sensors else [])]) or 'declared sensors'}"
     if change.detection_time_s is None:
-        return f"{said} at {_time(change.time_s)}"
+        return f"{said} at {_seconds_text(change.time_s)}"
     found = change.isolated or "not isolated"
     alarm = "FALSE ALARM" if change.false_alarm else "alarm"
-    before = f"{alarm} at {_time(change.detection_time_s)}, {found}"
-    return f"{said} at {_time(change.time_s)}; the diagnosis before: {before}"
+    before = f"{alarm} at {_seconds_text(change.detection_time_s)}, {found}"
+    return f"{said} at {_seconds_text(change.time_s)}; the diagnosis before: {before}"
 
 
-def _flight(metrics: Metrics) -> str:
+def _condition_text(metrics: Metrics) -> str:
     flown = metrics.flight
     if not flown:
         return ""
-    condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_time(flown.flown_s)}"
+    condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_seconds_text(flown.flown_s)}"
     kind = ", every fault type" if flown.fault_class == "all" else ""
     return f"{condition}; diagnosis {flown.scheme}{kind}; law {flown.law}"
 
 
-def _fault(fault: Fault | None) -> str:
+def _fault_text(fault: Fault | None) -> str:
     if fault is None:
         return "none"
     end_s = fault.end_s if isinstance(fault, DeclaredFault) else None
-    until = f" to {_time(end_s)}" if end_s else ""
+    until = f" to {_seconds_text(end_s)}" if end_s else ""
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
     what = f"{place} {fault.type.replace('_', ' ')}".strip()
-    size = ", ".join(_sizes(fault))
-    return f"{what}{' (' + size + ')' if size else ''} at {_time(fault.at_s)}{until}"
+    size = ", ".join(_fault_size_texts(fault))
+    return f"{what}{' (' + size + ')' if size else ''} at {_seconds_text(fault.at_s)}{until}"
 
 
-_CHANNELS = {
+_DEVIATION_FORMAT_OF_CHANNEL = {
     "altitude_m": "altitude {} m",
     "airspeed_mps": "airspeed {} m/s (10 s mean; largest at one instant {})", "heading_deg": "heading {} deg",
     "bank_deg": "bank {} deg",
 }  # fmt: skip
 
 
-def _profile(metrics: Metrics) -> str:
+def _profile_text(metrics: Metrics) -> str:
     """Largest deviations from the commanded profile; nothing where none was flown."""
     profile = metrics.profile
-    worst = {name: getattr(profile, name, None) for name in _CHANNELS}
-    at_once = _value(profile.airspeed_at_one_instant_mps) if profile else ""
+    worst = {name: getattr(profile, name, None) for name in _DEVIATION_FORMAT_OF_CHANNEL}
+    at_once = _value_text(profile.airspeed_at_one_instant_mps) if profile else ""
     off = ", ".join(
-        _CHANNELS[name].format(_value(by), at_once) for name, by in worst.items() if by is not None
+        _DEVIATION_FORMAT_OF_CHANNEL[name].format(_value_text(by), at_once)
+        for name, by in worst.items()
+        if by is not None
     )
     return f"largest deviation: {off}" if off else ""
 
 
-_LIMITED = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
+_LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
 
 
-def _limit(limit: Limit) -> str:
+def _protection_limit_text(limit: Limit) -> str:
     """What envelope protection has limited, since when and why."""
-    what = _LIMITED[limit.limits].format(limit.side, limit.value)
+    what = _LIMIT_FORMAT_OF_QUANTITY[limit.limits].format(limit.side, limit.value)
     until = "" if limit.in_force else ", no longer at the end"
-    return f"{what} from {_time(limit.time_s)}{until}: {limit.because}"
+    return f"{what} from {_seconds_text(limit.time_s)}{until}: {limit.because}"
 
 
-def _sizes(fault: Fault) -> list[str]:
+def _fault_size_texts(fault: Fault) -> list[str]:
     """The size of an injected fault, in words."""
     if not isinstance(fault, DeclaredFault):
         return []
     if fault.sensor:
-        return _sensor_sizes(fault, fault.sensor)
+        return _sensor_fault_size_texts(fault, fault.sensor)
     from beaver_ftc.scenario.faults import TYPES
 
     row = TYPES.get(fault.type)
@@ -327,7 +341,7 @@ def _sizes(fault: Fault) -> list[str]:
     return [in_words[key](value) for key, value in fault.size.items() if key in in_words]
 
 
-def _sensor_sizes(fault: DeclaredFault, sensor: str) -> list[str]:
+def _sensor_fault_size_texts(fault: DeclaredFault, sensor: str) -> list[str]:
     """The same of an instrument's fault, in the unit of the instrument."""
     from beaver_ftc.scenario.sensors import QUANTITIES
 
@@ -337,7 +351,7 @@ def _sensor_sizes(fault: DeclaredFault, sensor: str) -> list[str]:
     return [] if size is None else [words[fault.type].format(size, unit)]
 
 
-def _true(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _true_size_text(isolation: Isolation | Named, metrics: Metrics) -> str:
     """The true size, where the fault named is one that was injected."""
     from beaver_ftc.scenario.faults import TYPES
 
@@ -352,182 +366,193 @@ def _true(isolation: Isolation | Named, metrics: Metrics) -> str:
     ]
     if not sizes or row is None:
         return ""
-    in_words = _value if isolation.estimate_deg is not None else row.size_in_words
+    in_words = _value_text if isolation.estimate_deg is not None else row.size_in_words
     return f" (true {in_words(sign * sizes[0])}{' deg' if isolation.estimate_deg is not None else ''})"
 
 
-def _detection(metrics: Metrics) -> str:
+def _detection_text(metrics: Metrics) -> str:
     detection = metrics.detection
     if not detection.detected:
         return "no alarm"
     if metrics.false_alarm and detection.delay_s is None:
-        return f"FALSE ALARM at {_time(detection.time_s)} {_seen(detection)}"
+        return f"FALSE ALARM at {_seconds_text(detection.time_s)} {_alarm_source_text(detection)}"
     guaranteed = detection.guaranteed_delay_s
-    within = "" if guaranteed is None else f" (certain within {_time(guaranteed)})"
-    return f"after {_time(detection.delay_s)} {_seen(detection)}{within}"
+    within = "" if guaranteed is None else f" (certain within {_seconds_text(guaranteed)})"
+    return f"after {_seconds_text(detection.delay_s)} {_alarm_source_text(detection)}{within}"
 
 
-def _inconclusive(metrics: Metrics) -> str:
+def _inconclusive_text(metrics: Metrics) -> str:
     """Where the diagnosis could conclude nothing; nothing if it could all the time."""
     found = metrics.detection.inconclusive
     return in_words(found.document()) if found else ""
 
 
-def _seen(detection: Detection) -> str:
+def _alarm_source_text(detection: Detection) -> str:
     """Which test raised the alarm: the residual of an axis, or the sensor monitor."""
     return f"on {detection.axis}" if detection.axis else "by the sensor monitor"
 
 
-def _statistical(metrics: Metrics) -> str:
+def _statistical_text(metrics: Metrics) -> str:
     """When the statistical detector alone would have raised the alarm; nothing if there was none."""
     said = metrics.detection.statistical
     if said is None:
         return ""
-    when = "no alarm" if said.time_s is None else f"alarm at {_time(said.time_s)}"
+    when = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
     peak = f"peak in healthy flight {said.closest_approach:.2f} of it"
     return f"{when}; threshold {said.alarm_level:.2f} σ, {peak}"
 
 
-def _isolation(metrics: Metrics) -> str:
+def _isolation_text(metrics: Metrics) -> str:
     isolation = metrics.isolation
-    return "; ".join([_found(isolation, metrics), *_withdrawn(isolation.withdrawn)])
+    return "; ".join(
+        [_isolated_or_candidates_text(isolation, metrics), *_withdrawn_texts(isolation.withdrawn)]
+    )
 
 
-def _found(isolation: Isolation, metrics: Metrics) -> str:
+def _isolated_or_candidates_text(isolation: Isolation, metrics: Metrics) -> str:
     if isolation.isolated:
-        return _one(isolation, metrics)
+        return _named_fault_text(isolation, metrics)
     left = isolation.candidates
-    return _still_possible(left) if metrics.detection.detected and left else "none"
+    return _candidates_text(left) if metrics.detection.detected and left else "none"
 
 
-def _withdrawn(gone: Sequence[Withdrawn]) -> list[str]:
+def _withdrawn_texts(gone: Sequence[Withdrawn]) -> list[str]:
     """What was named before, for how long, each surface once."""
     spans: dict[str, list[float]] = {}
     for one in gone:
         spans.setdefault(one.fault, []).append(one.to_s - one.from_s)
     said = [
-        f"{name} for {_time(times[0])}"
+        f"{name} for {_seconds_text(times[0])}"
         if len(times) == 1
-        else f"{name} {len(times)} times for {_time(sum(times))} in all"
+        else f"{name} {len(times)} times for {_seconds_text(sum(times))} in all"
         for name, times in spans.items()
     ]
     return [f"named before: {', '.join(said)}"] if said else []
 
 
-def _one(isolation: Isolation | Named, metrics: Metrics) -> str:
+def _named_fault_text(isolation: Isolation | Named, metrics: Metrics) -> str:
     """One named fault. The only remaining candidate may still be excluded by later data."""
     left = " (only remaining candidate)" if isolation.so_far else ""
-    when = "" if isolation.delay_s is None else f" after {_time(isolation.delay_s)}"
+    when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
     right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
     if isolation.premature:
-        right = f"PREMATURE at {_time(isolation.time_s)}"
-    size = _estimate(isolation) + _true(isolation, metrics)
-    return f"{isolation.fault}{left}{when}; {right}{_type(isolation)}{size}"
+        right = f"PREMATURE at {_seconds_text(isolation.time_s)}"
+    size = _estimate_text(isolation) + _true_size_text(isolation, metrics)
+    return f"{isolation.fault}{left}{when}; {right}{_type_text(isolation)}{size}"
 
 
-def _probing(metrics: Metrics) -> str:
+def _probing_text(metrics: Metrics) -> str:
     instants = metrics.isolation.probing_s
-    return f"flap and elevator moved from {_time(instants[0])} to {_time(instants[1])}" if instants else ""
+    return (
+        f"flap and elevator moved from {_seconds_text(instants[0])} to {_seconds_text(instants[1])}"
+        if instants
+        else ""
+    )
 
 
-def _type(isolation: Isolation | Named) -> str:
+def _type_text(isolation: Isolation | Named) -> str:
     """The type, or those still possible; nothing where the class knows no other."""
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
-        return f", {_open_types(isolation.candidates) if isolation.candidates else 'of no known type'}"
+        return f", {_open_types_text(isolation.candidates) if isolation.candidates else 'of no known type'}"
     return "" if isolation.type == "unanticipated" else f", {isolation.type.replace('_', ' ')}"
 
 
-def _estimate(isolation: Isolation | Named) -> str:
+def _estimate_text(isolation: Isolation | Named) -> str:
     if isolation.estimate is None:
         return ""
     if isolation.estimate_deg is None:
         from beaver_ftc.scenario.faults import TYPES
 
         return f", estimated {TYPES[str(isolation.type)].estimate_in_words(isolation.estimate)}"
-    return f", estimated {_value(isolation.estimate_deg)} deg"
+    return f", estimated {_value_text(isolation.estimate_deg)} deg"
 
 
-def _supervisor(metrics: Metrics) -> str:
-    changes = [f"{change.mode} {_time(change.time_s)}" for change in metrics.supervisor]
+def _supervisor_text(metrics: Metrics) -> str:
+    changes = [f"{change.mode} {_seconds_text(change.time_s)}" for change in metrics.supervisor]
     left_out = metrics.mode_changes_left_out
     if left_out:
         changes.insert(-1, f"({left_out} more)")
     return " → ".join(changes)
 
 
-def _engine_power(metrics: Metrics) -> str:
+def _engine_power_text(metrics: Metrics) -> str:
     power = metrics.engine_power
     if not power:
         return ""
     span = f"{power.lowest_inhg:.1f} to {power.highest_inhg:.1f} inHg"
-    return f"took over pitch at {_time(power.from_s)}, for {_time(power.in_charge_s)} in all, {span}"
+    total = _seconds_text(power.in_charge_s)
+    return f"took over pitch at {_seconds_text(power.from_s)}, for {total} in all, {span}"
 
 
-MUCH_LEFT = 0.995  # of an axis: nothing to be said
+MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
 
 
-def _authority(metrics: Metrics) -> str:
+def _insufficient_authority_text(metrics: Metrics) -> str:
     """For how long no law could have held a rate, if long enough to matter."""
-    beyond_s = {axis: given.beyond_s for axis, given in _by_axis(metrics) if given.beyond_s >= LEAST_BEYOND_S}
+    beyond_s = {
+        axis: given.beyond_s
+        for axis, given in _authority_of_axes(metrics)
+        if given.beyond_s >= MIN_SHOWN_BEYOND_S
+    }
     if not beyond_s:
         return ""
-    said = ", ".join(f"{axis} for {_time(time)}" for axis, time in beyond_s.items())
+    said = ", ".join(f"{axis} for {_seconds_text(time)}" for axis, time in beyond_s.items())
     return f"no deflection could hold the rate: {said}"
 
 
-def _by_axis(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
+def _authority_of_axes(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
     of = metrics.authority
     return [("p", of.p), ("q", of.q), ("r", of.r)] if of else []
 
 
-_AXES = {"p": "roll", "q": "pitch", "r": "yaw"}
+_AXIS_TITLES = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
-def _remaining(metrics: Metrics) -> str:
+def _remaining_authority_text(metrics: Metrics) -> str:
     """Remaining control authority of each axis that has lost some, as a share of the healthy aircraft's."""
     said = []
-    for axis, of in _by_axis(metrics):
+    for axis, of in _authority_of_axes(metrics):
         ends = of.least_rad_s2, of.greatest_rad_s2, of.healthy_least_rad_s2, of.healthy_greatest_rad_s2
         if None not in ends:
             least, greatest, healthy_least, healthy_greatest = map(float, ends)  # type: ignore[arg-type]
             share, most = (greatest - least) / (healthy_greatest - healthy_least), of.engines_greatest_rad_s2
-            if share < MUCH_LEFT or most:
+            if share < MAX_SHOWN_AUTHORITY_SHARE or most:
                 engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
                 span = f"{least:.2g} to {greatest:.2g} rad/s2{engines}"
-                said.append(f"{_AXES[axis]} authority {100 * share:.0f} % ({span})")
+                said.append(f"{_AXIS_TITLES[axis]} authority {100 * share:.0f} % ({span})")
     return "; ".join(said)
 
 
-def _envelope(metrics: Metrics) -> str:
+def _envelope_text(metrics: Metrics) -> str:
     exits = metrics.envelope_exits
     if not exits:
         return ""
-    count, total_s = metrics.envelope.exits, metrics.envelope.outside_s
-    return f"left {_counted(count, 'time')}, {_time(total_s)} in all, first at {_time(exits[0].start_s)}"
+    count, total = _count_and_noun(metrics.envelope.exits, "time"), _seconds_text(metrics.envelope.outside_s)
+    return f"left {count}, {total} in all, first at {_seconds_text(exits[0].start_s)}"
 
 
-def _departure(metrics: Metrics) -> str:
+def _departure_text(metrics: Metrics) -> str:
     departure = metrics.departure
-    return f"LOST at {_time(departure.time_s)}: {departure.signal}" if departure else ""
+    return f"LOST at {_seconds_text(departure.time_s)}: {departure.signal}" if departure else ""
 
 
 # The counts of a link that are printed where they are not 0.
-_COUNTED = {
+_LINK_COUNT_WORDS = {
     "repeated": "repeated", "late": "late", "missed": "missing", "malformed": "malformed",
     "strangers": "from other senders", "off_rate": "at another rate", "resets": "restarts",
 }  # fmt: skip
 
 
-def _link(metrics: Metrics) -> str:
+def _link_text(metrics: Metrics) -> str:
     """Latency and losses of the link to an autopilot; nothing where a law of ours flew."""
     link = metrics.link
     if not link:
         return ""
     latency, interval = link.latency_ms, link.interval_ms
     odd = "".join(
-        f", {getattr(link, name)} {words}" for name, words in _COUNTED.items() if getattr(link, name)
+        f", {getattr(link, name)} {words}" for name, words in _LINK_COUNT_WORDS.items() if getattr(link, name)
     )
     times = (
         f"latency {latency.median:.2f} ms (99th percentile {latency.p99:.2f}), interval "
@@ -536,22 +561,24 @@ def _link(metrics: Metrics) -> str:
     return f"{link.protocol}, {link.frames} frames at {link.packets_hz:g} Hz{odd}; {times}"
 
 
-def _saturation(metrics: Metrics) -> str:
-    return ", ".join(f"{surface} {_time(time)}" for surface, time in metrics.saturation_s.items() if time)
+def _saturation_text(metrics: Metrics) -> str:
+    return ", ".join(
+        f"{surface} {_seconds_text(time)}" for surface, time in metrics.saturation_s.items() if time
+    )
 
 
-def _time(seconds: float | None) -> str:
+def _seconds_text(seconds: float | None) -> str:
     if seconds is None:
         return "none"
     return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"
 
 
-def _value(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
     if value is None or value == ():
         return "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):
-        return ", ".join(_value(entry) for entry in value)
+        return ", ".join(_value_text(entry) for entry in value)
     return value if isinstance(value, str) else f"{value:.3g}"

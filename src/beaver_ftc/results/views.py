@@ -26,20 +26,22 @@ AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
 
 SIDES = ("left", "right")
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
-LIMITED = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
-BEAVERS_POWER = "manifold_pressure_inhg"
-MAX_POINTS = 4000  # of a curve
-WHOLE = (-math.inf, math.inf)
-Series = dict[str, np.ndarray]
-RATIO = "_ratio"  # ends the name of a derived column: |residual| / threshold
-UNLIKE = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
-UNLIKE_RAD = math.radians(0.05)
-CLIPPED = 0.005, 0.995  # quantiles that set the axis where spikes would
-COMMANDED, FLOWN = "airspeed_command_mps", "airspeed_mps"
-MEAN = "airspeed_mean_mps"  # derived: the commanded airspeed, and the mean deviation from it over 10 s
-MEAN_OF = "airspeed_within_mps"  # the expectation that reads it
+ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
+BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
+MAX_CURVE_POINTS = 4000  # of a curve
+WHOLE_FLIGHT_S = (-math.inf, math.inf)
+ValuesOfColumns = dict[str, np.ndarray]
+RATIO_ENDING = "_ratio"  # ends the name of a derived column: |residual| / threshold
+UNLIKE_ENDING = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
+MIN_UNLIKE_RAD = math.radians(0.05)
+AXIS_QUANTILES = 0.005, 0.995  # quantiles that set the axis where spikes would
+COMMANDED_AIRSPEED_COLUMN, FLOWN_AIRSPEED_COLUMN = "airspeed_command_mps", "airspeed_mps"
+MEAN_AIRSPEED_COLUMN = (
+    "airspeed_mean_mps"  # derived: the commanded airspeed, and the mean deviation from it over 10 s
+)
+MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation that reads it
 
-_SHOWN = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
+_SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
 
 
 @dataclass(frozen=True)
@@ -67,13 +69,15 @@ class Panel:
     traces: tuple[Trace, ...]
     log_scale: bool = False
     limits: tuple[float, float] | None = None
-    steps: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
-    shade: str = ""  # a 0/1 column: the panel is shaded while it is 1
+    value_names: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
+    shade_column: str = ""  # a 0/1 column: the panel is shaded while it is 1
     shade_label: str = ""
-    level: float | None = None  # a value worth a line across
-    clipped: bool = False  # spikes beyond the quantiles CLIPPED do not set the axis; an arrow marks them
+    line_at: float | None = None  # a value worth a line across
+    clipped: bool = (
+        False  # spikes beyond the quantiles AXIS_QUANTILES do not set the axis; an arrow marks them
+    )
     bars: bool = False  # a row for each label, with a bar while one of its traces is 0,
-    during: str = ""  # as long as this column is 1
+    bars_during_column: str = ""  # as long as this column is 1
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -88,13 +92,13 @@ class Panel:
 
 @dataclass(frozen=True)
 class View:
-    """A figure: panels, filled row by row into `across` columns."""
+    """A figure: panels, filled row by row into `n_panel_columns` columns."""
 
     name: str
     title: str
     panels: tuple[Panel, ...]
-    across: int = 1
-    absent: str = ""  # what to say where the log holds nothing of this
+    n_panel_columns: int = 1
+    text_without_data: str = ""  # what to say where the log holds nothing of this
     closeup: bool = False  # worth a second look around the fault
     folded: bool = False  # details: the report shows it when asked
 
@@ -102,14 +106,16 @@ class View:
     def columns(self) -> tuple[str, ...]:
         """The log columns it shows."""
         traced = [trace.column for panel in self.panels for trace in panel.traces]
-        flags = [flag for panel in self.panels for flag in (panel.shade, panel.during) if flag]
+        flags = [
+            flag for panel in self.panels for flag in (panel.shade_column, panel.bars_during_column) if flag
+        ]
         return tuple(dict.fromkeys(traced + flags))
 
 
 def unit_of(column: str) -> tuple[str, float]:
     """Unit to show a log column in, and the factor from the column's own unit to it."""
     unit = log.unit_of(column)
-    return _SHOWN.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
+    return _SHOWN_UNIT.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
 
 
 def estimators(columns: Sequence[str]) -> tuple[str, ...]:
@@ -131,7 +137,9 @@ def views_of_flight(columns: Sequence[str], metrics: Metrics) -> tuple[View, ...
 
 def expected_airspeed_mps(metrics: Metrics) -> float | None:
     """How far the mean airspeed may be from the command; None where the scenario does not say."""
-    return next((found.expected for found in metrics.expectations if found.name == MEAN_OF), None)
+    return next(
+        (found.expected for found in metrics.expectations if found.name == MEAN_AIRSPEED_EXPECTATION), None
+    )
 
 
 def views(columns: Sequence[str], power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
@@ -139,52 +147,57 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
     commanded airspeed, as the scenario expects its mean."""
     known, moved, engine = set(columns), surfaces(columns), power_column(columns)
     named = (
-        _tracking(), _profile(LIMITED in known, engine, within_mps), _surfaces(moved), _detection(), _watch(),
-        _likelihood(columns), _candidates(moved, estimators(columns)), _isolation(estimators(columns)),
-        _ratio(estimators(columns)),
-        _effectiveness(moved), _supervisor(), *((_engine(),) if power else ()), _states(),
+        _tracking_view(), _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
+        _surfaces_view(moved), _detection_view(), _sensor_monitor_view(), _likelihood_view(columns),
+        _candidates_view(moved, estimators(columns)), _isolation_view(estimators(columns)),
+        _ratio_view(estimators(columns)),
+        _effectiveness_view(moved), _supervisor_view(), *((_engine_view(),) if power else ()), _states_view(),
     )  # fmt: skip
-    return tuple(view for view in named if view.panels and known.issuperset(sources(view.columns)))
+    return tuple(view for view in named if view.panels and known.issuperset(source_columns(view.columns)))
 
 
 def power_column(columns: Sequence[str]) -> str:
     """The log's column of the engine power commanded along a profile; empty where there is none."""
-    if BEAVERS_POWER in columns or "altitude_command_m" not in columns:
-        return BEAVERS_POWER if BEAVERS_POWER in columns else ""
+    if BEAVER_POWER_COLUMN in columns or "altitude_command_m" not in columns:
+        return BEAVER_POWER_COLUMN if BEAVER_POWER_COLUMN in columns else ""
     before = list(columns)[list(columns).index("altitude_command_m") - 1]
     return "" if before in ("detected", "watch_test") else before
 
 
-def sources(columns: Iterable[str]) -> tuple[str, ...]:
+def source_columns(columns: Iterable[str]) -> tuple[str, ...]:
     """The log columns that columns to be shown, some of them derived, are made from."""
-    return tuple(dict.fromkeys(source for column in columns for source in _sources(column)))
+    return tuple(dict.fromkeys(source for column in columns for source in _source_columns_of(column)))
 
 
-def _sources(column: str) -> tuple[str, ...]:
-    if column == MEAN:
-        return (COMMANDED, FLOWN)
-    if column.endswith(UNLIKE):
-        return tuple(f"{column.removesuffix(UNLIKE)}_{what}_rad" for what in ("pos", "effective"))
-    stem = column.removesuffix(RATIO)
+def _source_columns_of(column: str) -> tuple[str, ...]:
+    if column == MEAN_AIRSPEED_COLUMN:
+        return (COMMANDED_AIRSPEED_COLUMN, FLOWN_AIRSPEED_COLUMN)
+    if column.endswith(UNLIKE_ENDING):
+        return tuple(f"{column.removesuffix(UNLIKE_ENDING)}_{what}_rad" for what in ("pos", "effective"))
+    stem = column.removesuffix(RATIO_ENDING)
     if stem == column:
         return (column,)
     bounds = ("lower", "upper") if stem.startswith("fie_") else ("threshold",)
     return tuple(f"{stem}_{what}_rad_s" for what in ("residual", *bounds))
 
 
-def _panel(label: str, *traces: tuple[str, str, str], shade: str = "", shade_label: str = "") -> Panel:
+def _curve_panel(
+    label: str, *traces: tuple[str, str, str], shade_column: str = "", shade_label: str = ""
+) -> Panel:
     """A panel of curves, each (column, label, role)."""
-    return Panel(label, tuple(Trace(*trace) for trace in traces), shade=shade, shade_label=shade_label)
+    return Panel(
+        label, tuple(Trace(*trace) for trace in traces), shade_column=shade_column, shade_label=shade_label
+    )
 
 
-def _share(label: str, *traces: tuple[str, str, str]) -> Panel:
+def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
     """A panel of what stays below 1 as long as all is well."""
-    return Panel(label, tuple(Trace(*trace) for trace in traces), log_scale=True, level=1.0)
+    return Panel(label, tuple(Trace(*trace) for trace in traces), log_scale=True, line_at=1.0)
 
 
-def _tracking() -> View:
+def _tracking_view() -> View:
     panels = tuple(
-        _panel(
+        _curve_panel(
             AXIS_NAMES[axis],
             (f"{axis}_reference_rad_s", "reference", "command"),
             (f"{axis}_model_rad_s", "reference model", "target"),
@@ -195,8 +208,8 @@ def _tracking() -> View:
     return View("tracking", "Tracking: body rates against their reference", panels)
 
 
-def _profile(limited: bool, power: str, within_mps: float | None) -> View:
-    held = {"airspeed": [(LIMITED, "attainable", "command")]} if limited else {}
+def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
+    held = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")]} if limited else {}
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
@@ -204,24 +217,31 @@ def _profile(limited: bool, power: str, within_mps: float | None) -> View:
         ("bank φ", "bank_command_rad", "phi_rad"),
     )
     panels = [
-        _panel(label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual"))
+        _curve_panel(
+            label, (command, "commanded", "target"), *held.get(label, ()), (actual, "flown", "actual")
+        )
         for label, command, actual in flown
     ]
-    panels[1] = replace(panels[1], traces=(*panels[1].traces, *_judged_airspeed(within_mps)))
+    panels[1] = replace(panels[1], traces=(*panels[1].traces, *_mean_airspeed_traces(within_mps)))
     words = power.removesuffix("_inhg").replace("_", " ")
-    engine = [_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
+    engine = [_curve_panel(f"engine: {words}", (power, "flown", "actual"))] if power else []
     return View("profile", "Profile: commanded and flown", (*panels, *engine))
 
 
-def _judged_airspeed(within_mps: float | None) -> Iterator[Trace]:
+def _mean_airspeed_traces(within_mps: float | None) -> Iterator[Trace]:
     """The mean of the airspeed that is judged, and what the scenario expects of it."""
-    yield Trace(MEAN, "10 s mean", "residual")
+    yield Trace(MEAN_AIRSPEED_COLUMN, "10 s mean", "residual")
     if within_mps is not None:
-        yield Trace(COMMANDED, f"± {within_mps:g} m/s, expected of the mean", "bound", offset=within_mps)
-        yield Trace(COMMANDED, "", "bound", offset=-within_mps)
+        yield Trace(
+            COMMANDED_AIRSPEED_COLUMN,
+            f"± {within_mps:g} m/s, expected of the mean",
+            "bound",
+            offset=within_mps,
+        )
+        yield Trace(COMMANDED_AIRSPEED_COLUMN, "", "bound", offset=-within_mps)
 
 
-def kinds(names: Sequence[str]) -> dict[str, list[str]]:
+def surfaces_by_kind(names: Sequence[str]) -> dict[str, list[str]]:
     """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
     found: dict[str, list[str]] = {}
     for name in names:
@@ -231,35 +251,37 @@ def kinds(names: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def _by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
+def _labels_and_roles_by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
     """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
     if len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
     said: dict[str, list[tuple[str, str, str]]] = {}
-    for kind, alike in kinds(names).items():
+    for kind, alike in surfaces_by_kind(names).items():
         for name, role in zip(alike, SURFACE_ROLES * len(alike), strict=False):
             others = " ".join(word for word in name.split("_") if word != kind)
             said.setdefault(kind, []).append((name, others or kind, role))
     return said
 
 
-def _surfaces(names: Sequence[str]) -> View:
+def _surfaces_view(names: Sequence[str]) -> View:
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
-            _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
-            for kind, alike in _by_kind(names).items()
+            _curve_panel(
+                f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike)
+            )
+            for kind, alike in _labels_and_roles_by_kind(names).items()
             for of, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
         )
-        return View("surfaces", "Control surfaces by kind", panels, across=2)
+        return View("surfaces", "Control surfaces by kind", panels, n_panel_columns=2)
     panels = tuple(
         Panel(
             surface,
             (
                 Trace(f"{surface}_cmd_rad", "command", "demand"),
                 Trace(f"{surface}_effective_rad", "effective", f"effective {place}"),
-                Trace(f"{surface}{UNLIKE}", "position, where it differs from effective", "unlike"),
+                Trace(f"{surface}{UNLIKE_ENDING}", "position, where it differs from effective", "unlike"),
             ),
-            shade=f"{surface}_saturated",
+            shade_column=f"{surface}_saturated",
             shade_label="saturated",
             clipped=True,
         )
@@ -280,58 +302,61 @@ def isolation_panel(name: str, axis: str, label: str, threshold: str = "± thres
     stem = f"fie_{name}_{axis}"
     bounds = Trace(f"{stem}_lower_rad_s", threshold, "bound"), Trace(f"{stem}_upper_rad_s", "", "bound")
     residual = Trace(f"{stem}_residual_rad_s", "residual", "actual")
-    return Panel(label, (*bounds, residual), shade=f"fie_{name}_excluded", shade_label="excluded")
+    return Panel(label, (*bounds, residual), shade_column=f"fie_{name}_excluded", shade_label="excluded")
 
 
-def _detection() -> View:
-    ratios = [(f"{axis}_alarm{RATIO}", axis, axis) for axis in AXES]
-    alarm = _share("alarm test: |residual| / threshold", *ratios)
+def _detection_view() -> View:
+    ratios = [(f"{axis}_alarm{RATIO_ENDING}", axis, axis) for axis in AXES]
+    alarm = _ratio_panel("alarm test: |residual| / threshold", *ratios)
     panels = (detection_panel(axis, f"{AXIS_NAMES[axis]}: detection residual") for axis in AXES)
     title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
     return View("detection", title, (alarm, *panels), closeup=True)
 
 
-def _watch() -> View:
+def _sensor_monitor_view() -> View:
     label = "largest residual between sensors / bound"
     title = "Sensor monitor: largest residual between sensors over its bound; above 1 one of them is faulty"
-    return View("watch", title, (_share(label, ("watch_share", "largest", "actual")),), closeup=True)
+    return View("watch", title, (_ratio_panel(label, ("watch_share", "largest", "actual")),), closeup=True)
 
 
-def _likelihood(columns: Sequence[str]) -> View:
+def _likelihood_view(columns: Sequence[str]) -> View:
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = {
         kind: [(f"{name}{ending}", f"{called} loss", role) for name, called, role in alike]
-        for kind, alike in (_by_kind(names).items() if names else ())
+        for kind, alike in (_labels_and_roles_by_kind(names).items() if names else ())
     }
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
-        *(_share(f"loss of {kind or 'a surface'}: test / alarm level", *of) for kind, of in losses.items()),
-        _share("step or tone of an acceleration, or its force: test / alarm level", *steps),
+        *(
+            _ratio_panel(f"loss of {kind or 'a surface'}: test / alarm level", *of)
+            for kind, of in losses.items()
+        ),
+        _ratio_panel("step or tone of an acceleration, or its force: test / alarm level", *steps),
     )
     title = "Detection: likelihood ratio tests against their alarm level"
     return View("likelihood", title, panels, closeup=True)
 
 
-def _candidates(moved: Sequence[str], names: Sequence[str]) -> View:
+def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
     """One strip: which surfaces may be at fault, from the alarm on, until the last of their estimators is
     excluded."""
     roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
     traces = tuple(
-        Trace(f"fie_{name}_excluded", _spoken(surface), roles[surface])
+        Trace(f"fie_{name}_excluded", _without_underscores(surface), roles[surface])
         for surface in moved
         for name in names
         if surface == max((of for of in moved if f"{name}_".startswith(f"{of}_")), key=len, default="")
     )
-    panel = Panel("surfaces that may be at fault", traces, bars=True, during="detected")
+    panel = Panel("surfaces that may be at fault", traces, bars=True, bars_during_column="detected")
     panels = (panel,) if traces else ()
     title = "Candidates: a bar from the alarm until the surface is excluded"
-    return View("candidates", title, panels, absent="no alarm: no candidates", closeup=True)
+    return View("candidates", title, panels, text_without_data="no alarm: no candidates", closeup=True)
 
 
-def _isolation(names: Sequence[str]) -> View:
+def _isolation_view(names: Sequence[str]) -> View:
     panels = tuple(
-        isolation_panel(name, axis, f"{_spoken(name)} estimator: {axis}", "threshold")
+        isolation_panel(name, axis, f"{_without_underscores(name)} estimator: {axis}", "threshold")
         for name in names
         for axis in AXES
     )
@@ -340,83 +365,94 @@ def _isolation(names: Sequence[str]) -> View:
         "isolation",
         title,
         panels,
-        across=3,
-        absent="no alarm: it never ran",
+        n_panel_columns=3,
+        text_without_data="no alarm: it never ran",
         closeup=True,
         folded=True,
     )
 
 
-def _ratio(names: Sequence[str]) -> View:
-    stems = [("detection estimator", ""), *((f"{_spoken(name)} estimator", f"fie_{name}_") for name in names)]
+def _ratio_view(names: Sequence[str]) -> View:
+    stems = [
+        ("detection estimator", ""),
+        *((f"{_without_underscores(name)} estimator", f"fie_{name}_") for name in names),
+    ]
     panels = tuple(
-        _share(f"{label}: |residual| / threshold", *((f"{stem}{axis}{RATIO}", axis, axis) for axis in AXES))
+        _ratio_panel(
+            f"{label}: |residual| / threshold",
+            *((f"{stem}{axis}{RATIO_ENDING}", axis, axis) for axis in AXES),
+        )
         for label, stem in stems
     )
     title = "Residual over threshold: above 1 is an alarm, or an exclusion"
-    return View("ratio", title, panels, across=1 if len(panels) <= 4 else 3)
+    return View("ratio", title, panels, n_panel_columns=1 if len(panels) <= 4 else 3)
 
 
-def _spoken(name: str) -> str:
+def _without_underscores(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _effectiveness(names: Sequence[str]) -> View:
+def _effectiveness_view(names: Sequence[str]) -> View:
     panels = tuple(
         Panel(
             f"{kind}: {label}" if kind else label,
             tuple(Trace(f"{name}_effectiveness_{which}", called, role) for name, called, role in alike),
             limits=(-0.05, 1.1),
         )
-        for kind, alike in (_by_kind(names).items() if names else ())
+        for kind, alike in (_labels_and_roles_by_kind(names).items() if names else ())
         for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
     )
     title = "Effectiveness of each surface: estimated by the diagnosis, and used by the law (rate-limited)"
-    return View("effectiveness", title, panels, across=1 if len(panels) <= 2 else 2)
+    return View("effectiveness", title, panels, n_panel_columns=1 if len(panels) <= 2 else 2)
 
 
-def _supervisor() -> View:
+def _supervisor_view() -> View:
     panels = (
-        Panel("mode", (Trace("mode", "mode", "actual"),), steps=MODES),
-        Panel("alarm", (Trace("detected", "alarm", "actual"),), steps=("quiet", "alarm")),
-        Panel("envelope", (Trace("envelope_valid", "envelope", "actual"),), steps=("outside", "inside")),
+        Panel("mode", (Trace("mode", "mode", "actual"),), value_names=MODES),
+        Panel("alarm", (Trace("detected", "alarm", "actual"),), value_names=("quiet", "alarm")),
+        Panel(
+            "envelope", (Trace("envelope_valid", "envelope", "actual"),), value_names=("outside", "inside")
+        ),
     )
     return View("supervisor", "Supervisor: mode, alarm, envelope", panels)
 
 
-def _engine() -> View:
-    panels = _curves(
+def _engine_view() -> View:
+    panels = _panels_of_columns(
         ("manifold_pressure_inhg", "manifold pressure"), ("dpt", "slipstream dpt"),
         ("airspeed_mps", "airspeed"), ("theta_rad", "pitch θ"),
     )  # fmt: skip
     return View("engine", "Engine power on pitch, when elevator and flap are lost", panels)
 
 
-def _states() -> View:
-    panels = _curves(
+def _states_view() -> View:
+    panels = _panels_of_columns(
         ("airspeed_mps", "airspeed"), ("alpha_rad", "angle of attack"), ("beta_rad", "sideslip"),
         ("p_rad_s", "roll rate p"), ("q_rad_s", "pitch rate q"), ("r_rad_s", "yaw rate r"),
         ("phi_rad", "bank φ"), ("theta_rad", "pitch θ"), ("psi_rad", "heading ψ"),
         ("north_m", "north"), ("east_m", "east"), ("altitude_m", "altitude"),
     )  # fmt: skip
-    return View("states", "The twelve states", panels, across=3)
+    return View("states", "The twelve states", panels, n_panel_columns=3)
 
 
-def _curves(*named: tuple[str, str]) -> tuple[Panel, ...]:
+def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
     """A panel for each column, under its name."""
-    return tuple(_panel(label, (column, label, "actual")) for column, label in named)
+    return tuple(_curve_panel(label, (column, label, "actual")) for column, label in named)
 
 
 def read_series(
-    path: Path, columns: Sequence[str], window_s: tuple[float, float] = WHOLE, max_points: int = MAX_POINTS
-) -> Series:
+    path: Path,
+    columns: Sequence[str],
+    window_s: tuple[float, float] = WHOLE_FLIGHT_S,
+    max_points: int = MAX_CURVE_POINTS,
+) -> ValuesOfColumns:
     """What `series_of` makes of the log in a parquet file."""
     return series_of(log.StoredLog(path), columns, window_s, max_points)
 
 
 def series_of(
-    source: log.Log, columns: Sequence[str], window_s: tuple[float, float], max_points: int = MAX_POINTS
-) -> Series:
+    source: log.Log, columns: Sequence[str], window_s: tuple[float, float], max_points: int = MAX_CURVE_POINTS
+) -> ValuesOfColumns:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
     A longer log is cut into stretches of equal length; each gives two points at its first two instants, the
@@ -426,14 +462,18 @@ def series_of(
     frame_s = _frame_s(source)
     rows = min(source.row_count(), (window_s[1] - window_s[0]) / frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    whole = _unwrap_heading(source.read_chunks(sources(wanted)))
-    whole = _add_mean_airspeed(whole, frame_s) if MEAN in wanted else whole
-    chunks = (_derive(_within(chunk, window_s), wanted) for chunk in whole)
-    parts = [chunk if stretch == 1 else _envelope(chunk, stretch) for chunk in chunks if chunk["t_s"].size]
+    whole = _unwrap_heading(source.read_chunks(source_columns(wanted)))
+    whole = _add_mean_airspeed(whole, frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
+    chunks = (_with_derived_columns(_rows_in_window(chunk, window_s), wanted) for chunk in whole)
+    parts = [
+        chunk if stretch == 1 else _extremes_by_stretch(chunk, stretch)
+        for chunk in chunks
+        if chunk["t_s"].size
+    ]
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
 
 
-def _unwrap_heading(chunks: Iterable[Series]) -> Iterator[Series]:
+def _unwrap_heading(chunks: Iterable[ValuesOfColumns]) -> Iterator[ValuesOfColumns]:
     """Heading without its jumps of a whole turn."""
     last = np.empty(0)
     for chunk in chunks:
@@ -443,29 +483,29 @@ def _unwrap_heading(chunks: Iterable[Series]) -> Iterator[Series]:
         yield chunk
 
 
-def _add_mean_airspeed(chunks: Iterable[Series], frame_s: float) -> Iterator[Series]:
+def _add_mean_airspeed(chunks: Iterable[ValuesOfColumns], frame_s: float) -> Iterator[ValuesOfColumns]:
     """The mean as the autopilot judges it: deviations from the command through a lag of MEAN_S."""
     share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
     last = 0.0
     for chunk in chunks:
-        off = np.nan_to_num(chunk[FLOWN] - chunk[COMMANDED]).tolist()
+        off = np.nan_to_num(chunk[FLOWN_AIRSPEED_COLUMN] - chunk[COMMANDED_AIRSPEED_COLUMN]).tolist()
         means = [*accumulate(off, lambda mean, one: mean + share * (one - mean), initial=last)][1:]
         last = means[-1] if means else last
-        yield chunk | {MEAN: chunk[COMMANDED] + means}
+        yield chunk | {MEAN_AIRSPEED_COLUMN: chunk[COMMANDED_AIRSPEED_COLUMN] + means}
 
 
-def _derive(chunk: Series, wanted: Sequence[str]) -> Series:
-    return {name: chunk[name] if name in chunk else _derived(chunk, name) for name in wanted}
+def _with_derived_columns(chunk: ValuesOfColumns, wanted: Sequence[str]) -> ValuesOfColumns:
+    return {name: chunk[name] if name in chunk else _derived_column(chunk, name) for name in wanted}
 
 
-def _derived(chunk: Series, name: str) -> np.ndarray:
-    if not name.endswith(UNLIKE):
-        return _share_of_bound(chunk, sources([name]))
-    position, effective = (chunk[source] for source in sources([name]))
-    return np.where(np.abs(position - effective) > UNLIKE_RAD, position, np.nan)
+def _derived_column(chunk: ValuesOfColumns, name: str) -> np.ndarray:
+    if not name.endswith(UNLIKE_ENDING):
+        return _residual_over_threshold(chunk, source_columns([name]))
+    position, effective = (chunk[source] for source in source_columns([name]))
+    return np.where(np.abs(position - effective) > MIN_UNLIKE_RAD, position, np.nan)
 
 
-def _share_of_bound(chunk: Series, names: Sequence[str]) -> np.ndarray:
+def _residual_over_threshold(chunk: ValuesOfColumns, names: Sequence[str]) -> np.ndarray:
     """|residual| / threshold, the threshold on the residual's side; NaN where there is no threshold."""
     residual, *bounds = (chunk[name] for name in names)
     bound = bounds[0] if len(bounds) == 1 else np.where(residual < 0, bounds[0], bounds[1])
@@ -480,19 +520,19 @@ def _frame_s(source: log.Log) -> float:
     return float(first[1] - first[0]) if first.size == 2 else math.inf
 
 
-def _within(chunk: Series, window_s: tuple[float, float]) -> Series:
+def _rows_in_window(chunk: ValuesOfColumns, window_s: tuple[float, float]) -> ValuesOfColumns:
     first, last = np.searchsorted(chunk["t_s"], window_s, side="left")
     return {name: values[first:last] for name, values in chunk.items()}
 
 
-def _envelope(chunk: Series, stretch: int) -> Series:
+def _extremes_by_stretch(chunk: ValuesOfColumns, stretch: int) -> ValuesOfColumns:
     starts = np.arange(0, chunk["t_s"].size, stretch)
     middles = np.minimum(starts + stretch // 2, chunk["t_s"].size - 1)
-    out = {name: _extremes(values, starts) for name, values in chunk.items() if name != "t_s"}
+    out = {name: _lowest_and_highest(values, starts) for name, values in chunk.items() if name != "t_s"}
     return {"t_s": np.column_stack([chunk["t_s"][starts], chunk["t_s"][middles]]).ravel()} | out
 
 
-def _extremes(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def _lowest_and_highest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
     lowest = np.fmin.reduceat(values, starts)
     highest = np.fmax.reduceat(values, starts)
     rising = values[starts] <= values[np.append(starts[1:], values.size) - 1]

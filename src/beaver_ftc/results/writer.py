@@ -39,8 +39,8 @@ FILES_OF_A_RUN = frozenset({
     "log.csv", "flight.acmi", "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
 })  # fmt: skip
 AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
-MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
-_HEAD_BYTES = 2048  # of a picture: its metadata come first
+SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
+_PICTURE_HEAD_BYTES = 2048  # of a picture: its metadata come first
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 
@@ -82,30 +82,30 @@ def run(
             flight = fly(scenario, log, progress, prepare=prepare, watch=watch)
         write_scenario(folder, scenario)
         document: Document = {}
-        with _kept_whatever(folder, "metrics.json", failed):
+        with _note_failure_and_go_on(folder, "metrics.json", failed):
             document = metrics(flight)
             (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
         if certificate:
-            with _kept_whatever(folder, CERTIFICATE, failed):
+            with _note_failure_and_go_on(folder, CERTIFICATE, failed):
                 certificate.write(folder)
         if report and document:
-            with _kept_whatever(folder, "report.html", failed):
+            with _note_failure_and_go_on(folder, "report.html", failed):
                 write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
             from beaver_ftc.results.exports import write_csv
 
-            with _kept_whatever(folder, "log.csv", failed):
+            with _note_failure_and_go_on(folder, "log.csv", failed):
                 write_csv(log_path, folder / "log.csv")
         if "acmi" in exports and document:
             from beaver_ftc.results.exports import write_acmi
 
-            with _kept_whatever(folder, "flight.acmi", failed):
+            with _note_failure_and_go_on(folder, "flight.acmi", failed):
                 write_acmi(log_path, Metrics.of(document), folder / "flight.acmi", aircraft)
         if recording is not None:
             from beaver_ftc.results.exports import write_recording
 
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
-            with _kept_whatever(folder, f"the recording ({recording})", failed):
+            with _note_failure_and_go_on(folder, f"the recording ({recording})", failed):
                 write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
     if failed:
         why = "; ".join(" ".join(str(error).split()) for error in failed)
@@ -120,7 +120,7 @@ class NotAllWritten(SimulationFailed):
 
 
 @contextlib.contextmanager
-def _kept_whatever(folder: Path, what: str, failed: list[Exception]) -> Iterator[None]:
+def _note_failure_and_go_on(folder: Path, what: str, failed: list[Exception]) -> Iterator[None]:
     """Write one part of the results; where that fails, note why and leave nothing of that part."""
     before = set(folder.iterdir())
     try:
@@ -130,7 +130,7 @@ def _kept_whatever(folder: Path, what: str, failed: list[Exception]) -> Iterator
             shutil.rmtree(left) if left.is_dir() else left.unlink()
         says = f"{type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno and not error.filename:  # of the disk
-            says = _in_words(error)
+            says = _disk_error_text(error)
         reason = SimulationFailed(f"{what} could not be written: {says}")
         reason.__cause__ = error
         failed.append(reason)
@@ -147,12 +147,14 @@ def write_scenario(folder: Path, scenario: "Scenario") -> None:
     from beaver_ftc.scenario.builtin import to_yaml
 
     if str(scenario.aircraft).startswith("./"):  # the user's own, copied: it can be flown again from here
-        shutil.copytree(scenario.airframe.folder, folder / AIRCRAFT, ignore=_no_model, dirs_exist_ok=True)
+        shutil.copytree(
+            scenario.airframe.folder, folder / AIRCRAFT, ignore=_files_not_of_model, dirs_exist_ok=True
+        )
         scenario = scenario.model_copy(update={"aircraft": f"./{AIRCRAFT}"})
     (folder / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")
 
 
-def _no_model(folder: str, names: list[str]) -> set[str]:
+def _files_not_of_model(folder: str, names: list[str]) -> set[str]:
     """What is no part of a JSBSim model and of its description."""
     return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
@@ -185,9 +187,9 @@ def add_report(folder: Path, document: Document) -> str:
     folder is as it was. They appear whole, and in no folder that has taken its place meanwhile."""
     failed: list[Exception] = []
     with (
-        TemporaryDirectory(prefix=_prefix(folder.name), dir=folder.parent) as partial,
+        TemporaryDirectory(prefix=_partial_folder_prefix(folder.name), dir=folder.parent) as partial,
         _locked(Path(partial)),
-        _kept_whatever(folder, "report.html", failed),
+        _note_failure_and_go_on(folder, "report.html", failed),
     ):
         drawn_for = folder.stat()
         write_report_files(folder, document, Path(partial))
@@ -211,7 +213,7 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
         created = _make_parents(out)
         _remove_stale(out, name)
         own = uuid4().hex
-        unnamed, partial = out / f".beaver-ftc-{own}", out / f"{_prefix(name)}{own}"
+        unnamed, partial = out / f".beaver-ftc-{own}", out / f"{_partial_folder_prefix(name)}{own}"
         unnamed.mkdir()
         try:
             with _locked(unnamed):  # before it bears the name by which another run would look for stale ones
@@ -264,7 +266,7 @@ def _is_our_picture(path: Path) -> bool:
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
-        return MARK.encode() in file.read(_HEAD_BYTES)
+        return SOFTWARE_MARK.encode() in file.read(_PICTURE_HEAD_BYTES)
 
 
 @contextlib.contextmanager
@@ -273,15 +275,15 @@ def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise SimulationFailed(f"cannot write {folder}: {_in_words(error)}{but}") from error
+        raise SimulationFailed(f"cannot write {folder}: {_disk_error_text(error)}{but}") from error
 
 
-def _in_words(error: OSError) -> str:
+def _disk_error_text(error: OSError) -> str:
     reason = os.strerror(error.errno) if error.errno else str(error)
     return f"{reason[:1].lower()}{reason[1:]}"
 
 
-def _prefix(name: str) -> str:
+def _partial_folder_prefix(name: str) -> str:
     return f".{name}.partial-"
 
 
@@ -316,7 +318,7 @@ def _locked(folder: Path) -> Iterator[bool]:
 
 def _remove_stale(out: Path, name: str) -> None:
     """Remove what killed runs of this scenario left behind."""
-    for leftover in out.glob(f"{_prefix(name)}*"):
+    for leftover in out.glob(f"{_partial_folder_prefix(name)}*"):
         with contextlib.suppress(OSError), _locked(leftover) as stale:
             if stale:
                 shutil.rmtree(leftover, ignore_errors=True)
@@ -345,7 +347,7 @@ def _move_into_place(partial: Path, final: Path, files: Iterable[str]) -> None:
     except OSError:
         if not final.exists():
             raise
-    if _exchange(partial, final):
+    if _swap_folders(partial, final):
         shutil.rmtree(partial, ignore_errors=True)
     else:
         retired = partial.with_name(f"{partial.name}-replaced")
@@ -354,7 +356,7 @@ def _move_into_place(partial: Path, final: Path, files: Iterable[str]) -> None:
         shutil.rmtree(retired, ignore_errors=True)
 
 
-def _exchange(one: Path, other: Path) -> bool:
+def _swap_folders(one: Path, other: Path) -> bool:
     """Swap two folders in one step, as Linux can; False where the system or the file system cannot."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2

@@ -179,7 +179,7 @@ def judge(flight: Landing) -> Row:
     truth, guaranteed_s = Truth.of(flight.scenario), flight.guaranteed_delay_s
     alarm_s, delay_s = flight.detection_time_s, truth.onset.delay_s(flight.detection_time_s)
     left = (*flight.candidates, flight.isolated)
-    meant = truth.meant_by(flight.isolated, flight.isolation_time_s)
+    meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     return {
         "delay_s": delay_s,
         "false_alarm": alarm_s is not None and truth.onset.is_false(alarm_s),

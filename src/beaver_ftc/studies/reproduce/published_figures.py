@@ -76,7 +76,7 @@ _SHOWN = (  # name, title, panels, case, span of time
     ("as-printed", "Eq. (2) as printed, no fault: detection", _DETECTION, "as-printed", (0.0, 5.0)),
 )  # fmt: skip
 FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, case, span of time
-    (View(name, title, panels, across=2 if len(panels) > len(AXES) else 1), case, span)
+    (View(name, title, panels, n_panel_columns=2 if len(panels) > len(AXES) else 1), case, span)
     for name, title, panels, case, span in _SHOWN
 )
 

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Sequence
 
-from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.page import Makers, Part, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
@@ -24,7 +24,7 @@ def sentences(document: Document) -> Iterator[str]:
     yield from (
         f"Nothing can be concluded in part of these flights: {why}." for why in document["inconclusive"]
     )
-    if document["bound_used"] >= ON_THE_BOUND:
+    if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
         yield (
             f"Half of these flights use {_percent(document['bound_used'])} of the bound or more before the "
             f"loss: the size found "

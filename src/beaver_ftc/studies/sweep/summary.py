@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import ON_THE_BOUND, is_late
+from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE, is_late
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
@@ -49,7 +49,7 @@ def summarise(flights: Flights, sweep: Sweep) -> Document:
         "departures": rate(flights.departed, flights.measured),
         "passes": rate(flights["passed"], flights.measured),
         "guarantee": _guarantee(flights),
-        "on_the_bound": rate(flights["worst_residual_ratio"] >= ON_THE_BOUND, flights.faulted),
+        "on_the_bound": rate(flights["worst_residual_ratio"] >= NEAR_THRESHOLD_SHARE, flights.faulted),
         "inconclusive": rate(flights["detection.inconclusive.share"] > 0.0, flights.measured),
         "by_fault": _by_fault(flights),
         "confusion": _confusion(flights),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.results.metrics import ON_THE_BOUND
+from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
 from beaver_ftc.studies.present.page import picture_data
 from beaver_ftc.studies.present.tables import number, printed
@@ -178,8 +178,8 @@ def _on_the_bound(found: Document) -> str:
         return ""
     return (
         f"in {found['count']} of {found['of']} flights the residual of the healthy flight already reaches "
-        f"{percent(ON_THE_BOUND)} of its threshold or more; the detection of small faults then measures the "
-        "scenario's own uncertainty, not the diagnosis"
+        f"{percent(NEAR_THRESHOLD_SHARE)} of its threshold or more; the detection of small faults then "
+        "measures the scenario's own uncertainty, not the diagnosis"
     )
 
 

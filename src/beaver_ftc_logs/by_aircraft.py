@@ -1,8 +1,9 @@
-"""A recorded flight by the aircraft's own model: the diagnosis of the loop, on what the log has measured.
+"""Diagnose a recorded flight with the design model of its aircraft: the diagnosis of the control loop, on the
+measurements of the log.
 
-Where the aircraft is known no model is identified. The errors declared are those of a scenario; what theory
-promises of the loop holds of the log as well, as long as they hold: no alarm of a healthy flight, no true
-fault excluded. Outside the aircraft's envelope, after a gap and where a number is missing nothing is said.
+If the aircraft is known, no model is identified. A scenario declares the errors. As long as they hold, the
+log has the guarantees of the loop: no alarm in a healthy flight, no true fault excluded. There is no verdict
+outside the aircraft's envelope, after a gap, and where a number is missing.
 """
 
 from dataclasses import dataclass, field, replace
@@ -40,15 +41,15 @@ _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True)
 class DiagnosedAircraft:
-    """The aircraft whose flights are diagnosed, and what its diagnosis is told, as `Diagnosis` takes it."""
+    """The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`."""
 
     aircraft: Aircraft
     declared_errors: Document = field(default_factory=dict)
 
 
 def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
-    """The aircraft of a name, and the errors that a scenario (file or name) declares: the published ones
-    where None. Raises BadInput where the scenario is of another aircraft."""
+    """The aircraft with this name, and the errors that a scenario (file or name) declares; without a scenario
+    the default ones. Raises BadInput if the scenario has another aircraft."""
     from beaver_ftc.aircraft import UnknownAircraft
     from beaver_ftc.scenario import find_aircraft, load_scenario
 
@@ -73,8 +74,12 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
 
 @dataclass(frozen=True)
 class AircraftDiagnosisInputs:
-    """Inputs of the diagnosis from a log: as `stepped.log_input_columns`; the mean age of what is held, s;
-    and begin and end of each stretch that is diagnosed in one."""
+    """A log as inputs of the diagnosis.
+
+    input_arrays: rates, signals, commands and attitude, (n, ...) each, as `stepped.log_input_columns`.
+    mean_age_s_by_held_column: mean age of the values of each column that is held. has_missing_value (n,):
+    rows in which an input is not a number. gap_free_stretches: first row and end of each stretch through
+    which the diagnosis is stepped without a reset."""
 
     samples: Samples
     diagnosis: "Diagnosis"
@@ -162,7 +167,7 @@ def diagnose_inputs(
 def _check_command_signs(
     flight_name: str, aircraft: Aircraft, stretch_verdicts: list[ReplayedVerdicts]
 ) -> None:
-    """Raise BadInput where the rates answer a command the other way round in all of a stretch."""
+    """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
     for surface, gain in zip(
         aircraft.surfaces,
         np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0),
@@ -176,7 +181,7 @@ def _check_command_signs(
 
 
 def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> None:
-    """Raise BadInput for what vehicle file and log lack of what the aircraft's model is given."""
+    """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
     missing_surfaces = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing_surfaces:
         says = (
@@ -208,7 +213,7 @@ def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
 
 
 def _log_rate_hz(samples: Samples) -> float:
-    """Samples a second: of the first ones, so that a log cut short has the same; rounded to four digits."""
+    """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
     first_t_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
     steps_s = np.diff(first_t_s)
     even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
@@ -222,8 +227,8 @@ def _log_rate_hz(samples: Samples) -> float:
 def _read_sample_inputs(
     samples: Samples, recording: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft, needs_attitude: bool
 ) -> tuple[list[Floats], dict[str, float]]:
-    """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns` has them; and the
-    mean age of what is held, s. needs_attitude: whether the attitude is wanted."""
+    """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns`, and the mean age
+    of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
     columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.mean_age_s_by_held_column)
 
     def sampled_values(quantity: QuantityColumn) -> Floats:
@@ -256,7 +261,7 @@ def _read_sample_inputs(
 
 
 def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Aircraft) -> None:
-    """Raise BadInput where flow or commands are in another unit."""
+    """Raise BadInput if the size of the flow or of the commands shows another unit."""
     signals, commands = inputs[1], inputs[2]
     for axis, angle in enumerate(("alpha_rad", "beta_rad")):
         median_angle = _median_without_nan(np.abs(signals[:, axis]))
@@ -289,13 +294,13 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
 
 
 def _median_without_nan(values: Floats) -> float:
-    """Median of the numbers among the values, nan where there is none."""
+    """Median of the values that are numbers; nan if none is."""
     known = values[~np.isnan(values)]
     return float(np.median(known)) if known.size else float("nan")
 
 
 def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: float) -> list[tuple[int, int]]:
-    """Begin and end of what is diagnosed in one: evenly spaced and without a missing number."""
+    """First row and end of each stretch that is evenly spaced and has no missing number."""
     is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
     is_known = ~has_missing_value
     is_joined = is_known[1:] & is_known[:-1] & ~is_uneven_step
@@ -330,7 +335,7 @@ def _join_stretch_diagnoses(
 def _undiagnosable_rows_by_reason(
     signals: Floats, aircraft: Aircraft, has_missing_value: Mask, gap_free_stretches: list[tuple[int, int]]
 ) -> dict[str, Mask]:
-    """Rows of which the aircraft's model says nothing, by what is wrong."""
+    """For each reason the rows (n,) for which there is no verdict."""
     min_airspeed_mps, max_airspeed_mps = aircraft.envelope.airspeed_mps
     min_alpha_rad, max_alpha_rad = aircraft.alpha_rad
     is_outside_stretches = np.ones(len(signals), dtype=bool)
@@ -350,7 +355,8 @@ def _undiagnosable_rows_by_reason(
 def _unexplained_start_rows_by_reason(
     t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed: ReplayedVerdicts
 ) -> dict[str, Mask]:
-    """Stretches that nothing explains from their first second on."""
+    """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
+    residuals within the first second."""
     is_unexplained = np.zeros(len(t_s), dtype=bool)
     for begin, end in gap_free_stretches:
         first_second_end = begin + int(
@@ -366,7 +372,8 @@ def _unexplained_start_rows_by_reason(
 def _add_rows_after_doubtful_alarm(
     gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
 ) -> dict[str, Mask]:
-    """The reasons there are; an alarm that was raised where one holds is none in what follows."""
+    """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
+    a reason of its own."""
     has_reason, is_after_doubtful_alarm = (
         np.logical_or.reduce(list(reasons.values())),
         np.zeros(len(rows.t_s), dtype=bool),
@@ -423,7 +430,8 @@ def _verdict_document(
 
 
 def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
-    """The loss of each surface that is excluded within a second in half of the healthy rows."""
+    """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
+    the healthy rows."""
     is_credible_healthy = (rows.faulty == 0) & (rows.credible == 1)
     if not is_credible_healthy.any():
         return []

@@ -1,7 +1,7 @@
 """The certificate of a recorded flight that an aircraft's own model diagnosed.
 
-A log of others says nothing of models and bounds. So what the diagnosis makes of each sample is written
-beside the certificate, in the columns of a log of ours: of the first stretch with an alarm, from its first
+A log from elsewhere has no columns of residuals and bounds. So the diagnosis writes a log of its own beside
+the certificate, with the columns of a simulated flight: for the first stretch with an alarm, from its first
 sample on.
 """
 

@@ -1,9 +1,9 @@
-"""Whether power is there: an engine that fails changes trim and motion, and looks like a surface that fails.
+"""Distinguish an engine failure from a surface fault: both change trim and motion.
 
-The energy height altitude + V^2 / 2g falls as fast as drag takes it where no engine works against it; lift,
-whatever the surfaces do to it, takes none. Where it has fallen, since the evidence for an alarm began, as
-fast as in the lowest part of healthy flight, with the engine idling, no surface is named: `unknown`, and
-`engine` where it goes on.
+Without power the energy height altitude + V^2 / 2g falls at the rate at which drag takes energy; lift takes
+none, whatever the surfaces do. If the energy height, since the evidence for an alarm began, has fallen as
+fast as in the parts of healthy flight with the engine idling, no surface is named. The name is `unknown`, and
+`engine` if the fall goes on.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from beaver_ftc_logs.recording import Floats
 
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
 UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE = 0.15
-"""Share of healthy flight in which energy falls as fast as without power."""
+"""Share of healthy flight in which the energy height falls as fast as without power."""
 _CLIMB_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
 
 
@@ -39,11 +39,12 @@ def withdraw_surfaces_after_engine_failure(
     unpowered_energy_height_rate_mps: float,
     evidence_start_time_s: Floats,
 ) -> np.ndarray:
-    """The names of rows (n,), without a surface where an engine may have failed. evidence_start_time_s (n,):
-    since when the evidence for the alarm of each row has gathered.
+    """The isolated names (n,), with `unknown` or `engine` in the rows in which an engine may have failed.
+    evidence_start_time_s (n,): time at which the evidence for the alarm of each row began to increase.
 
-    That is so while the window of the energy height reaches back to before then, and from where energy falls
-    as without power until it rises, which it does by power alone. A row uses nothing later than its time.
+    An engine may have failed while the window of the energy height begins before that time, and from the
+    row in which the energy height falls as without power until it rises. A row uses nothing later than its
+    time.
     """
     kept_names = isolated_surfaces.copy()
     edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))

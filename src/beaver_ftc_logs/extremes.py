@@ -1,15 +1,15 @@
-"""How often a healthy flight alarms: the tail of the alarm statistic on parts that were not fitted.
+"""Rate of false alarms in healthy flight, from the tail of the alarm statistic on held-out flights.
 
-The statistic is Page's sum of evidence for a fault [Page1954]. It starts again whenever it falls to zero, so
-the highest values between two such times are independent of one another. Those over a level u are Poisson in
-time, and their excess has the generalised Pareto distribution [Coles2001, section 4.2]:
+The statistic is Page's sum of evidence for a fault [Page1954]. It restarts whenever it falls to zero, so the
+highest values between two restarts (the peaks) are independent of one another. The peaks over a level u are a
+Poisson process, and their excess over u has the generalised Pareto distribution [Coles2001, section 4.2]:
 
     rate of x and more, an hour = rate(u) (1 + xi (x - u) / sigma)^(-1 / xi)
 
-Shape, scale and rate are known by their posterior on a grid: the threshold for a rate asked is where the mean
-of the rate, with all that is not known of the tail, is that rate. A log likelihood ratio has an exponential
-tail, xi = 0, where the model is right [Wald1945]: the prior of the shape is about it. Flights that differ
-more than chance lets them count for fewer.
+The posterior of shape, scale and rate is computed on a grid. The threshold for a requested rate is the x at
+which the posterior mean of the rate is that rate. If the model is right, a log likelihood ratio has an
+exponential tail, xi = 0 [Wald1945], so the prior of the shape is centred there. If flights differ by more
+than chance, they count for fewer.
 """
 
 from collections.abc import Sequence
@@ -36,11 +36,11 @@ _PROBABILITY_ROUNDING = (
 )
 
 PeaksAndHours = tuple[Floats, float]
-"""Peaks of what is left out in one, and its hours."""
+"""Peaks (k,) of the alarm statistic in one held-out flight, and its healthy hours."""
 
 
 class PeakTail(Section):
-    """The highest peaks of the alarm statistic on parts not fitted."""
+    """The highest peaks of the alarm statistic on held-out flights."""
 
     tail_start_level: Number = Field(description="the level, in natural logarithms of odds", alias="level")
     excess_over_level: list[Number] = Field(
@@ -54,7 +54,7 @@ class PeakTail(Section):
 
 @dataclass(frozen=True)
 class ExpectedFalseAlarmsPerHour:
-    """False alarms an hour: mean, and what 90 % of the posterior lies between."""
+    """False alarms an hour: posterior mean (value), and bounds of the central 90 % of the posterior."""
 
     value: float
     low: float
@@ -68,7 +68,7 @@ def peaks_between_zeros(statistic: Floats) -> Floats:
 
 
 def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail | None:
-    """The tail of parts left out: each one's peaks and its hours; None where they are fewer than ten."""
+    """The tail of the peaks of all held-out flights; None if there are at most ten peaks."""
     peaks = np.sort(
         np.concatenate([one for one, _ in held_out_peaks_and_hours]) if held_out_peaks_and_hours else []
     )[::-1]
@@ -89,8 +89,8 @@ def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail
 
 
 def _excess_overdispersion(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> float:
-    """Chi-square by degree of freedom of what each part's excess comes to, 1 at least: sums of exponential
-    excess at Poisson times have twice the variance that their number alone would give."""
+    """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
+    exponential excesses at Poisson times has twice the variance that their number alone would give."""
     excess_sums, hours = (
         np.array([one.sum() for one, _ in held_out_peaks_and_hours]),
         np.array([hours for _, hours in held_out_peaks_and_hours]),
@@ -125,7 +125,8 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
-    """The threshold at which so many false alarms an hour are expected; the level where that has fewer."""
+    """The threshold at which this rate of false alarms is expected; the level of the tail if the rate there
+    is lower."""
     shape, scale, weight = _pareto_posterior(tail)
     mean_peak_rate = float(_peaks_per_hour_quantiles(tail).mean())
 
@@ -151,20 +152,21 @@ def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> 
 
 
 def threshold_by_lorden_bound(rate_hz: float, false_alarms_per_hour: float) -> float:
-    """The threshold with so many false alarms an hour at most where the model is right, whatever the tail:
-    Page's sum of a log likelihood ratio passes h once in exp(h) samples or less often [Lorden1971]."""
+    """The threshold at which the rate of false alarms is at most this, if the model is right, whatever the
+    tail: Page's sum of a log likelihood ratio passes h on average at most once in exp(h) samples
+    [Lorden1971]."""
     return float(np.log(max(3600.0 * rate_hz / false_alarms_per_hour, 1.0)))
 
 
 def missing_healthy_minutes(tail: PeakTail, false_alarms_per_hour: float) -> float:
-    """Minutes of health by which the rate asked would show without any tail, less those there are."""
+    """Minutes of healthy flight that are missing to show the requested rate without a fitted tail."""
     return max(
         60.0 * EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM / false_alarms_per_hour - tail.healthy_minutes, 0.0
     )
 
 
 def _peaks_per_hour_quantiles(tail: PeakTail) -> Floats:
-    """Peaks over the level an hour, at even steps of their posterior."""
+    """Quantiles of the posterior of the number of peaks over the level in an hour, at even probabilities."""
     from scipy.stats import gamma
 
     gamma_shape = len(tail.excess_over_level) / tail.overdispersion + 0.5
@@ -176,7 +178,7 @@ def _peaks_per_hour_quantiles(tail: PeakTail) -> Floats:
 
 
 def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
-    """Shape, scale and the weight of both, each over the whole grid."""
+    """Shape, scale and posterior weight of each point of the grid."""
     from scipy.stats import genpareto
 
     excess = np.array(tail.excess_over_level)
@@ -189,7 +191,7 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
 
 
 def _exceedance_probability(excess: float, shape: Floats, scale: Floats) -> Floats:
-    """Probability that a peak over the level exceeds it by more."""
+    """Probability that a peak over the level exceeds it by more than `excess`."""
     from scipy.stats import genpareto
 
     return np.asarray(genpareto.sf(excess, shape, scale=scale))

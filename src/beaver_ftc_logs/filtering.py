@@ -1,18 +1,19 @@
-"""A flight through the bank of filters: causal, one pass, all hypotheses at once.
+"""The bank of filters: one causal pass through a flight, with all hypotheses in parallel.
 
-Under hypothesis h with effectiveness e_h of the groups, what the past does not explain of the rates is
+Under hypothesis h, with effectiveness e_h of the groups, the part of the rates unexplained by the past is
 
     y = c + s (b + sum_g e_hg F_g) + sum_g d_g e_hg F_g + noise,      noise ~ t(0, r R)
 
-with the model's constant b, and of the flight its own trim c (3,), gain s, and what each group has more of it
-than the others, d (G,): each hypothesis estimates them by a Kalman filter. r is the running scale of the
-noise. The gain acts on what a trimmed flight balances: it shows by the motion alone, as dynamic pressure
-does, and not in the trim. A hypothesis passes to another at random
-times (interacting multiple models [Blom1988]): the one that takes over inherits trim and gain, plus an offset
-where a surface may be stuck. The last hypothesis says that nothing answers the commands, as on the ground: it
-learns no trim and no gain.
+with the intercept b of the model. The trim c (3,), the common gain s and the additional gain d (G,) of each
+group belong to the flight: each hypothesis estimates them with a Kalman filter. r is the running scale of the
+noise. The common gain multiplies the intercept and all responses, whose sum vanishes in trimmed flight: it
+shows in the motion about trim, as the dynamic pressure does, and not in the trim. One hypothesis changes to
+another at random times (interacting multiple models [Blom1988]); the new one inherits trim and gains, plus an
+offset of the rates if a surface may be stuck. The last hypothesis is that nothing answers the commands, as on
+the ground: it estimates no trim and no gain.
 
-This is done once for each delay the flight may have; the likelier delay counts more.
+The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
+the probabilities of the delays.
 """
 
 from collections.abc import Sequence
@@ -31,11 +32,11 @@ _MODEL_EVIDENCE_MEMORY_S = 600.0
 _MIN_HYPOTHESIS_PROBABILITY = 1e-15
 _SQUARED_RESIDUAL_CLIP_PER_AXIS = 3.0
 _RESIDUAL_SUM_SPANS_S, _SCALE_WINDOW_S = (0.0, 0.1), 2.0
-"""Spans over which a residual is summed, and the seconds in which its size is taken."""
+"""Spans over which a residual is summed, and the window in which its variance is taken."""
 _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
 _MIN_NOISE_MODEL_PROBABILITY = 1e-3
-"""Probability of a colour of the noise below which it is left out."""
+"""Probability of a noise model below which it is left out."""
 
 BankRunResult = tuple[Floats, Floats, Floats, Floats]
 """As `run_bank` returns it."""
@@ -46,8 +47,8 @@ def hypothesis_posterior(
 ) -> tuple[Floats, Floats, Floats]:
     """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
 
-    The mean over the delays of the model's settings, and the colours of its noise where the flight is not yet
-    whitened, each weighted by how well it explains the last minutes.
+    All are averages over the command delays of the model's settings and, if the flight is not yet whitened,
+    over its noise models. The weights are their probabilities given the last minutes.
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
@@ -67,8 +68,8 @@ def hypothesis_posterior(
 def _posterior_averaged_over_noise_models(
     samples: Samples, model: Model, bank: HypothesisBank
 ) -> tuple[Floats, Floats, Floats]:
-    """The mean over the colours of the noise. A colour is filtered up to the last sample at which its weight
-    counts: within a second most are far less likely than another, and stay so."""
+    """The average over the noise models. The bank is run with each up to the last sample at which its weight
+    is not negligible: within a second most become far less likely than another, and stay so."""
     whitened_flights = [
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
@@ -95,7 +96,7 @@ def _posterior_averaged_over_noise_models(
 def _average_bank_runs(
     weights: Sequence[Floats], runs: Sequence[BankRunResult]
 ) -> tuple[Floats, Floats, Floats]:
-    """Runs with weights (n,) each; a run ends where its weight stays 0."""
+    """Weighted average of runs; weights (n,) each. A run may be shorter than n where its weight stays 0."""
     averages: list[Floats] = []
     for output_index in range(3):
         shape = (len(weights[0]), *runs[0][output_index].shape[1:])
@@ -108,8 +109,8 @@ def _average_bank_runs(
 
 
 def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
-    """Log likelihood of a colour at each sample of a flight that is whitened by it, all in health, (n,): by
-    its noise as it was, not as much wider as gains differ. Filtering made a sample C(1) times as large."""
+    """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
+    the covariance of the fit, without its inflation. The filter multiplied the samples by C(1)."""
     is_predictable, unexplained, responses = whitened_rates_and_responses(flight, model)
     residual = np.nan_to_num(
         unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.ma_coefficients)
@@ -128,9 +129,8 @@ def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: Nois
 
 
 def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
-    """Return the gain of each sample in the log odds of a fault, beyond that of a random change, (n,): the
-    sum of it is the log of a likelihood ratio, in which one who believes in no fault gains nothing on the
-    mean."""
+    """Return the increase of the log odds of any fault by each sample, beyond that by the prior of a change,
+    (n,). Its sum is the logarithm of a likelihood ratio."""
     fault_probability = np.clip(
         posterior[:, bank.is_fault_hypothesis].sum(axis=1),
         _MIN_HYPOTHESIS_PROBABILITY,
@@ -165,10 +165,10 @@ def page_cusum(evidence_increments, max_sum):
 
 
 def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
-    """The flight with commands that act by so much later, less than a sample, than the model says.
+    """The flight with commands that act delay_s later than in the model; at most a sample, may be negative.
 
-    Sooner takes from the command of the same sample, which is known; never from a later one: a command enters
-    from one sample back.
+    The model uses commands from one sample before the rates, so a negative delay needs no later command than
+    that of the same sample.
     """
     if delay_s == 0.0:
         return samples
@@ -180,7 +180,8 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
 
 
 def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
-    """Probability of each delay at each sample, (D, n), by the evidence of some minutes."""
+    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods
+    (n,), forgotten exponentially within minutes."""
     from scipy.signal import lfilter
 
     forgetting_factor = np.exp(-1.0 / (_MODEL_EVIDENCE_MEMORY_S * rate_hz))
@@ -190,7 +191,7 @@ def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate
 
 
 def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRunResult:
-    """As the kernel gives it."""
+    """The result of `run_bank` for one flight."""
     ok, *parts = whitened_rates_and_responses(samples, model)
     unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
     noise = build_residual_noise(model, samples.noise_ma_coefficients)
@@ -207,11 +208,11 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
 def recent_noise_variance_scale(
     residual: Floats, is_usable: np.ndarray, covariance: Floats, rate_hz: float
 ) -> Floats:
-    """Return how many times the covariance of the fitted noise that of a flight's residual (n, 3) was in the
-    last seconds, (n,), at each sample: of a sample, or of the sum of some per sample where these are alike.
+    """Return the ratio of the variance of a flight's residual (n, 3) in the last seconds to that of the
+    fitted noise, (n,): of single samples, or of sums of several if that is larger.
 
-    Air, gyros or a law that the fit has not seen leave more unexplained, and evidence is to weigh less at
-    once. A fault leaves more, too; the hypothesis that is right explains it, and gains as much a sample.
+    Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
+    at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
     white = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
     total = np.cumsum(np.vstack([np.zeros((1, 3)), white]), axis=0)
@@ -233,38 +234,44 @@ def recent_noise_variance_scale(
 def run_bank(
     unexplained_rates, group_responses, is_usable, bank, state_model, noise, recent_noise_variance_scale
 ):
-    """Posterior probability of each hypothesis, mean trim and gain, noise scale, and evidence, by sample.
+    """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and evidence (n,).
 
-    Evidence is the log likelihood of the sample given all before it, raised to the power.
+    Evidence is the log likelihood of a sample given all before it, times effective_sample_share.
 
     Shapes: unexplained_rates (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the sample may
     be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
     recent_noise_variance_scale (n,): lower bound of the scale of the noise.
     """
-    n, hypotheses, states = len(unexplained_rates), len(bank.transition_share), len(state_model.initial_mean)
-    idle = hypotheses - 1
-    mu = bank.prior_probability.copy()
-    m = np.zeros((hypotheses, states))
-    p = np.zeros((hypotheses, states, states))
-    m[:] = state_model.initial_mean
-    p[:] = state_model.initial_covariance
-    posterior = np.zeros((n, hypotheses))
-    trim = np.zeros((n, states))
+    n, n_hypotheses, n_states = (
+        len(unexplained_rates),
+        len(bank.transition_share),
+        len(state_model.initial_mean),
+    )
+    no_response = n_hypotheses - 1
+    probabilities = bank.prior_probability.copy()
+    state_means = np.zeros((n_hypotheses, n_states))
+    state_covariances = np.zeros((n_hypotheses, n_states, n_states))
+    state_means[:] = state_model.initial_mean
+    state_covariances[:] = state_model.initial_covariance
+    posterior = np.zeros((n, n_hypotheses))
+    mean_states = np.zeros((n, n_states))
     scales = np.zeros(n)
     evidence = np.zeros(n)
     scale = 1.0
     for k in range(n):
-        prior = _mix_hypotheses(mu, m, p, bank, state_model.random_walk_variance)
-        _relax_to_model(m, p, state_model)
-        m[idle], p[idle] = (
+        prior = _mix_hypotheses(
+            probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
+        )
+        _relax_to_model(state_means, state_covariances, state_model)
+        state_means[no_response], state_covariances[no_response] = (
             state_model.initial_mean,
             state_model.initial_covariance,
         )  # while nothing answers, nothing is learnt
         if is_usable[k]:
-            mu, square, evidence[k] = _correct_hypotheses(
+            probabilities, square, evidence[k] = _correct_hypotheses(
                 prior,
-                m,
-                p,
+                state_means,
+                state_covariances,
                 unexplained_rates[k],
                 group_responses[k],
                 bank,
@@ -272,52 +279,56 @@ def run_bank(
                 max(scale, recent_noise_variance_scale[k]),
             )
             _limit_states(
-                m,
+                state_means,
                 state_model.initial_mean - state_model.max_deviation,
                 state_model.initial_mean + state_model.max_deviation,
             )
             scale *= np.exp(
-                (1.0 - mu[idle])
+                (1.0 - probabilities[no_response])
                 * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
                 / noise.scale_memory_samples
             )
             scale = min(max(scale, noise.min_variance_scale), noise.max_variance_scale)
         else:
-            mu = prior
-        posterior[k] = mu
+            probabilities = prior
+        posterior[k] = probabilities
         scales[k] = scale
-        for h in range(hypotheses):
-            trim[k] += mu[h] * m[h]
-    return posterior, trim, scales, evidence
+        for h in range(n_hypotheses):
+            mean_states[k] += probabilities[h] * state_means[h]
+    return posterior, mean_states, scales, evidence
 
 
 @kernel
 def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_walk_variance):
-    """Let each hypothesis pass to any other; state_means (H, N) and state_covariances (H, N, N) are replaced,
-    the prior probabilities returned."""
-    hypotheses, states = state_means.shape
-    stay = 1.0 - bank.change_probability_per_sample
-    mean = np.zeros(states)
-    spread = np.zeros((states, states))
-    for h in range(hypotheses):
-        mean += probabilities[h] * state_means[h]
-    for h in range(hypotheses):
-        for i in range(states):
-            for j in range(states):
-                spread[i, j] += probabilities[h] * (
-                    state_covariances[h, i, j] + (state_means[h, i] - mean[i]) * (state_means[h, j] - mean[j])
+    """Interaction of the hypotheses: each may change to any other. state_means (H, N) and state_covariances
+    (H, N, N) are replaced. Returns the prior probabilities (H,)."""
+    n_hypotheses, n_states = state_means.shape
+    stay_probability = 1.0 - bank.change_probability_per_sample
+    mixed_mean = np.zeros(n_states)
+    mixed_covariance = np.zeros((n_states, n_states))
+    for h in range(n_hypotheses):
+        mixed_mean += probabilities[h] * state_means[h]
+    for h in range(n_hypotheses):
+        for i in range(n_states):
+            for j in range(n_states):
+                mixed_covariance[i, j] += probabilities[h] * (
+                    state_covariances[h, i, j]
+                    + (state_means[h, i] - mixed_mean[i]) * (state_means[h, j] - mixed_mean[j])
                 )
-    prior = np.empty(hypotheses)
+    prior = np.empty(n_hypotheses)
     total = 0.0
-    for h in range(hypotheses):
-        prior[h] = stay * probabilities[h] + bank.change_probability_per_sample * bank.transition_share[h]
+    for h in range(n_hypotheses):
+        prior[h] = (
+            stay_probability * probabilities[h]
+            + bank.change_probability_per_sample * bank.transition_share[h]
+        )
         total += prior[h]
         _merge_gaussians(
-            stay * probabilities[h] / prior[h],
+            stay_probability * probabilities[h] / prior[h],
             state_means[h],
             state_covariances[h],
-            mean,
-            spread,
+            mixed_mean,
+            mixed_covariance,
             bank.rate_offset_variance[h],
             random_walk_variance,
         )
@@ -334,29 +345,32 @@ def _merge_gaussians(
     rate_offset_variance,
     random_walk_variance,
 ):
-    """One Gaussian for two: the hypothesis' own with weight `own_weight`, everyone's with the rest.
+    """Replace two Gaussians by one with the same moments: that of the hypothesis, with weight `own_weight`,
+    and the mixture of all hypotheses, with the rest of the weight.
 
-    state_mean (N,) and state_covariance (N, N) are replaced; who comes from elsewhere brings the offset of
-    the rates along, of variance rate_offset_variance (3,).
+    state_mean (N,) and state_covariance (N, N) are replaced. The mixture gets the variance of the offset of
+    the rates, rate_offset_variance (3,), that comes with a change to this hypothesis.
     """
-    rest, states = 1.0 - own_weight, len(state_mean)
-    for i in range(states):
-        for j in range(states):
-            away = (state_mean[i] - mixed_mean[i]) * (state_mean[j] - mixed_mean[j])
+    other_weight, n_states = 1.0 - own_weight, len(state_mean)
+    for i in range(n_states):
+        for j in range(n_states):
+            deviation_product = (state_mean[i] - mixed_mean[i]) * (state_mean[j] - mixed_mean[j])
             state_covariance[i, j] = (
-                own_weight * state_covariance[i, j] + rest * mixed_covariance[i, j] + own_weight * rest * away
+                own_weight * state_covariance[i, j]
+                + other_weight * mixed_covariance[i, j]
+                + own_weight * other_weight * deviation_product
             )
         state_covariance[i, i] += random_walk_variance[i]
-    for i in range(states):
-        state_mean[i] = own_weight * state_mean[i] + rest * mixed_mean[i]
+    for i in range(n_states):
+        state_mean[i] = own_weight * state_mean[i] + other_weight * mixed_mean[i]
     for i in range(len(rate_offset_variance)):
-        state_covariance[i, i] += rest * rate_offset_variance[i]
+        state_covariance[i, i] += other_weight * rate_offset_variance[i]
 
 
 @kernel
 def _relax_to_model(state_means, state_covariances, state_model):
-    """Let all trims and gains return towards the model's; state_means (H, N) and state_covariances (H, N, N)
-    are replaced."""
+    """Move all trims and gains towards those of the model, by one sample. state_means (H, N) and
+    state_covariances (H, N, N) are replaced."""
     for h in range(len(state_means)):
         for i in range(len(state_model.deviation_retention)):
             state_means[h, i] = state_model.initial_mean[i] + state_model.deviation_retention[i] * (
@@ -381,61 +395,65 @@ def _correct_hypotheses(
 ):
     """Kalman correction of every hypothesis by one sample; state_means and state_covariances are replaced.
 
-    Returns the posterior probabilities, the clipped square of the residual under them, as if the noise were
-    no wider than residuals are, and the evidence.
+    Returns the posterior probabilities (H,), the clipped squared residual averaged over them (in the
+    covariance without its inflation), and the evidence of the sample.
     """
-    hypotheses, states = state_means.shape
-    log = np.empty(hypotheses)
-    squares = np.empty(hypotheses)
-    nothing, certain = np.zeros(states), np.zeros((states, states))
+    n_hypotheses, n_states = state_means.shape
+    log_likelihood = np.empty(n_hypotheses)
+    squares = np.empty(n_hypotheses)
+    zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
     covariance, dof = noise.covariance * noise_variance_scale, noise.t_degrees_of_freedom
-    for h in range(hypotheses):
-        seen = _state_sensitivity(
+    for h in range(n_hypotheses):
+        sensitivity = _state_sensitivity(
             bank.effectiveness[h],
             bank.response_share_scaled_by_group_gain[h],
             group_responses,
             noise.intercept_rad_s,
-            states,
+            n_states,
         )
-        if h == hypotheses - 1:
+        if h == n_hypotheses - 1:
             squares[h], log_det = _update_gaussian(
-                nothing, certain, unexplained_rates, seen, covariance, noise
+                zero_mean, zero_covariance, unexplained_rates, sensitivity, covariance, noise
             )
         else:
             squares[h], log_det = _update_gaussian(
-                state_means[h], state_covariances[h], unexplained_rates, seen, covariance, noise
+                state_means[h], state_covariances[h], unexplained_rates, sensitivity, covariance, noise
             )
         square = min(squares[h], noise.max_squared_residual)
-        log[h] = noise.effective_sample_share * (
+        log_likelihood[h] = noise.effective_sample_share * (
             -0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det
         )
-    most = log.max()
-    mu = np.maximum(prior_probabilities * np.exp(log - most), _MIN_HYPOTHESIS_PROBABILITY)
-    total = mu.sum()
-    mu /= total
+    max_log_likelihood = log_likelihood.max()
+    probabilities = np.maximum(
+        prior_probabilities * np.exp(log_likelihood - max_log_likelihood), _MIN_HYPOTHESIS_PROBABILITY
+    )
+    total = probabilities.sum()
+    probabilities /= total
     clipped = 0.0
-    for h in range(hypotheses):
-        clipped += mu[h] * min(noise.covariance_inflation * squares[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS)
-    return mu, clipped, most + np.log(total)
+    for h in range(n_hypotheses):
+        clipped += probabilities[h] * min(
+            noise.covariance_inflation * squares[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
+        )
+    return probabilities, clipped, max_log_likelihood + np.log(total)
 
 
 @kernel
 def _state_sensitivity(effectiveness, gain_sensitivity, group_responses, intercept_rad_s, n_states):
-    """How the rates show the states, (N, 3): trim, the gain of the constant and of all group_responses (G,
-    3), each as effective as effectiveness (G,) says, and each group's own gain, gain_sensitivity (G,) of its
-    response."""
-    seen = np.zeros((n_states, 3))
-    seen[:3] = np.eye(3)
-    seen[3] = intercept_rad_s
+    """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
+    multiplies the intercept and all group_responses (G, 3) times effectiveness (G,); and to each group's own
+    gain, which multiplies the share gain_sensitivity (G,) of its response."""
+    sensitivity = np.zeros((n_states, 3))
+    sensitivity[:3] = np.eye(3)
+    sensitivity[3] = intercept_rad_s
     for g in range(len(effectiveness)):
-        seen[4 + g] = gain_sensitivity[g] * group_responses[g]
-        seen[3] += effectiveness[g] * group_responses[g]
-    return seen
+        sensitivity[4 + g] = gain_sensitivity[g] * group_responses[g]
+        sensitivity[3] += effectiveness[g] * group_responses[g]
+    return sensitivity
 
 
 @kernel
 def _limit_states(state_means, min_state, max_state):
-    """Keep every hypothesis' trim and gain near those of the model: a fault is not to be learnt away."""
+    """Limit trim and gains of every hypothesis, so that they do not adapt to a fault."""
     for h in range(len(state_means)):
         state_means[h] = np.minimum(np.maximum(state_means[h], min_state), max_state)
 
@@ -447,35 +465,35 @@ def _update_gaussian(
     """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by unexplained_rates (3,) =
     state_sensitivity' state_mean + noise, state_sensitivity (N, 3).
 
-    Returns the square of the residual in its own covariance, and the log determinant of that. A residual far
-    out in the tail of the t distribution counts less, and one that is too far nothing.
+    Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
+    The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
     """
-    states, dof = len(state_mean), noise.t_degrees_of_freedom
-    cross = np.zeros((states, 3))
-    s = noise_covariance.copy()
-    v = unexplained_rates.copy()
-    for i in range(states):
+    n_states, dof = len(state_mean), noise.t_degrees_of_freedom
+    cross = np.zeros((n_states, 3))
+    residual_covariance = noise_covariance.copy()
+    residual = unexplained_rates.copy()
+    for i in range(n_states):
         for j in range(3):
-            v[j] -= state_mean[i] * state_sensitivity[i, j]
-            for k in range(states):
+            residual[j] -= state_mean[i] * state_sensitivity[i, j]
+            for k in range(n_states):
                 cross[i, j] += state_covariance[i, k] * state_sensitivity[k, j]
-    for i in range(states):
+    for i in range(n_states):
         for j in range(3):
             for k in range(3):
-                s[j, k] += state_sensitivity[i, j] * cross[i, k]
-    inverse, determinant = _invert_symmetric(s)
-    gain = np.zeros((states, 3))
+                residual_covariance[j, k] += state_sensitivity[i, j] * cross[i, k]
+    inverse, determinant = _invert_symmetric(residual_covariance)
+    gain = np.zeros((n_states, 3))
     square = 0.0
     for j in range(3):
         for k in range(3):
-            square += v[j] * inverse[j, k] * v[k]
-            for i in range(states):
+            square += residual[j] * inverse[j, k] * residual[k]
+            for i in range(n_states):
                 gain[i, j] += cross[i, k] * inverse[k, j]
     gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.max_squared_residual else 0.0
     for j in range(3):
-        for i in range(states):
-            state_mean[i] += gain[i, j] * v[j]
-            # mirrored: what rounding makes of an unsymmetric matrix grows without bound
+        for i in range(n_states):
+            state_mean[i] += gain[i, j] * residual[j]
+            # symmetric by construction: an asymmetry from rounding would grow without bound
             for k in range(i + 1):
                 state_covariance[i, k] -= gain[i, j] * cross[k, j]
                 state_covariance[k, i] = state_covariance[i, k]

@@ -199,7 +199,7 @@ def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
     if not diagnosis.diagnoses_all_types:
         return estimators[layout.loss_estimator[one.surface]].is_excluded
     surface = estimators[layout.position_estimator[one.surface]].is_excluded
-    return surface or bool(diagnosis.surface_fault_types[one.surface].is_excluded[one.kind])
+    return surface or bool(diagnosis.surface_fault_types[one.surface].is_type_excluded[one.kind])
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
@@ -254,7 +254,7 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
         return
     for s, kind in _left(tape):
         actuator = tape.last.diagnosis.surface_fault_types[s].actuator
-        low, high = RELATIONS[kind].theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+        low, high = RELATIONS[kind].theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
         if low < high:
             low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
         if low <= high:
@@ -276,7 +276,7 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
             if e >= 0 and not estimators[e].is_excluded:
                 yield s, LOSS
         elif not estimators[layout.position_estimator[s]].is_excluded:
-            yield from ((s, kind) for kind in RELATIONS if not surface.is_excluded[kind])
+            yield from ((s, kind) for kind in RELATIONS if not surface.is_type_excluded[kind])
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
@@ -286,7 +286,7 @@ def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
         return []
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.estimators[diagnosis.layout.position_estimator[s]].is_excluded:
-            kinds = np.flatnonzero(~surface.is_excluded)
+            kinds = np.flatnonzero(~surface.is_type_excluded)
             found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in RELATIONS]
     return sorted(set(found))
 

@@ -165,7 +165,7 @@ def test_when_it_has_long_been_open_whether_elevator_or_flap(
 def alarmed(known=0, speaks=0, score=2.0):
     frame = new_frame()
     fdi = frame["fdi"]
-    fdi["verdict"]["detected"], fdi["config"]["authority"] = known, WORST_CASE_DETECTOR
+    fdi["verdict"]["detected"], fdi["config"]["alarm_authority"] = known, WORST_CASE_DETECTOR
     fdi["sensor_monitor"]["config"]["enabled"] = fdi["sensor_monitor"]["output"]["alarmed"] = speaks
     fdi["bank"]["output"]["threshold"] = 0.1
     fdi["bank"]["output"]["residual"][0, 1] = 0.1 * score

@@ -249,5 +249,5 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
-    flow = bounds.level_flow_angle_noise_std(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return bounds.gust_estimate_noise_std_for(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    flow = bounds.flow_angle_in_level_axes_noise_std(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
+    return bounds.gust_acceleration_noise_std(flow, design, *LEVEL_FLIGHT[1:], span_m)

@@ -45,7 +45,7 @@ SHORT = {
     "forgetting": "forgetting_factor", "instants": "n_substeps",
 }  # fmt: skip
 WHERE = {
-    **dict.fromkeys(("enabled", "authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
+    **dict.fromkeys(("enabled", "alarm_authority", "diagnoses_all_types", "abrupt", "dt"), "config"),
     **dict.fromkeys(("thresholds", "forgetting", "memory", "shared", "membership"), "isolation"),
     **dict.fromkeys(("eta_bar", "noise"), "bound"),
 }
@@ -65,7 +65,7 @@ def put(fdi, **values):
 _ACTUATOR = {
     **{name: name for name in ("travel_low", "travel_high", "reachable_low", "reachable_high")},
     "min_runaway_rate": "min_runaway_rate",
-    "approach": "lag_share_per_substep", "step": "max_motion_per_substep",
+    "approach": "approach_share_per_substep", "step": "max_motion_per_substep",
     "slowest_step": "min_rate_limited_motion_per_substep",
 }  # fmt: skip
 _OBSERVED = {
@@ -75,7 +75,7 @@ _OBSERVED = {
 }  # fmt: skip
 _EVIDENCE = (
     "n_rest_frames",
-    "n_frames_since_stop_could_hide",
+    "n_anomalous_frames_since_stop_could_hide",
     "first_anomalous_frame",
     "first_anomalous_position_low",
     "first_anomalous_position_high",
@@ -90,7 +90,7 @@ OF_SURFACE = {
     "evidence": ("evidence", "n_anomalous_frames"),
     **{name: ("evidence", name) for name in _EVIDENCE},
     "n_frames_without_sign_of_fault": ("accommodation", "n_frames_without_sign_of_fault"),
-    "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "decision_basis"),
+    "in_question": ("status", "may_be_sole_fault"), "standing": ("status", "can_be_at_fault_basis"),
     "named": ("status", "is_isolated"), "named_at_s": ("status", "isolated_at_s"),
     "type": ("status", "fault_type"), "type_at_s": ("status", "type_decided_at_s"),
 }  # fmt: skip

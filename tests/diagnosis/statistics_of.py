@@ -149,7 +149,9 @@ class Across:
     def excludes(fdi, s):
         record, column = (
             fdi["statistical"],
-            fdi["isolation"]["estimator"]["effect"]["regressor"][fdi["layout"]["position_estimator"][s]],
+            fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][
+                fdi["layout"]["position_estimator"][s]
+            ],
         )
         views = views_of(record)
         return parity.excludes_surface(

@@ -302,7 +302,7 @@ def test_the_noise_of_an_attitude_is_in_the_gust_that_is_followed(angle, axis):
     lags = np.array([4.0, 3.0]) * SPAN / (np.pi * 45.0)
     counted, reckoned = (
         np.std(seen, axis=0)[1:] * lags,
-        bounds.level_flow_angle_noise_std(SensorErrors(sensors), 45.0),
+        bounds.flow_angle_in_level_axes_noise_std(SensorErrors(sensors), 45.0),
     )
     assert (counted <= 1.02 * reckoned).all()
     if axis is not None:

@@ -36,9 +36,9 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         eta *= eta_share
         offset = rng.normal(size=3)
         (
-            fie["effect"]["regressor"],
-            fie["effect"]["acceleration_at_zero_theta"],
-            fie["effect"]["error_bound"],
+            fie["frame_mean_effect"]["regressor"],
+            fie["frame_mean_effect"]["acceleration_at_zero_theta"],
+            fie["frame_mean_effect"]["error_bound"],
         ) = (
             Z,
             offset,
@@ -46,7 +46,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
         )
         fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta_bar, noise_before
         isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
-        on(isolation.predict_estimators, fdi, x, believed)
+        on(isolation.advance_estimators, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
         for name, value in zip(fed, (Z, eta, eta_bar, noise_before, spread), strict=True):
             fed[name].append(value)
@@ -130,7 +130,7 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
         fie["filtered_regressor"],
         fie["filtered_uncertainty_bound"],
         fie["residual"],
-        fie["effect"]["regressor"],
+        fie["frame_mean_effect"]["regressor"],
     ) = omega, noise, residual, 1.0
     fie["theta"], fie["theta_variance"] = -0.5, 0.06
     total = isolation.joint_least_squares_step(fie, 1.0)
@@ -138,7 +138,7 @@ def test_a_shared_theta_is_corrected_axis_by_axis_with_what_is_left():
     assert total == pytest.approx(np.sum(omega * residual / noise**2) / information)
     assert fie["theta"] == pytest.approx([-0.5 + total] * 3)
     assert fie["theta_variance"] == pytest.approx([1.0 / information] * 3)
-    fie["effect"]["regressor"] = 0.0
+    fie["frame_mean_effect"]["regressor"] = 0.0
     assert isolation.joint_least_squares_step(fie, 0.5) == 0.0
 
 
@@ -209,7 +209,7 @@ def test_the_one_left_is_the_fault(excluded, isolated):
     fdi["verdict"]["isolated_estimator"], fdi["verdict"]["isolated_at_s"] = NOT_ISOLATED, -1.0
     assert on(isolation.decide_isolation, fdi, 4.0) == isolated
     for t in (4.0, 5.0):
-        on(conclusion.record_isolated_estimator, fdi, isolated, t)
+        on(conclusion.replace_isolated_estimator, fdi, isolated, t)
         assert fdi["verdict"]["isolated_estimator"] == isolated
         assert fdi["verdict"]["isolated_at_s"] == (-1.0 if isolated == NOT_ISOLATED else 4.0)
 
@@ -248,12 +248,12 @@ def test_what_is_supposed_of_a_frame(memory):
     fdi["isolation"]["config"]["uses_reach_test"], fdi["verdict"]["detected"] = memory, 0
     on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
-    assert fie["reachable_residual_low"][:3, :3].any() == memory
-    assert fie["effect"]["regressor"].any() == memory
+    assert fie["reachable_bank_residual_low"][:3, :3].any() == memory
+    assert fie["frame_mean_effect"]["regressor"].any() == memory
     fdi["verdict"]["detected"] = 1
     on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
-    assert fie["effect"]["regressor"] == pytest.approx(Gu[:, 2])
-    assert fie["effect"]["error_bound"] == pytest.approx(np.abs(spread[:, 2]))
+    assert fie["frame_mean_effect"]["regressor"] == pytest.approx(Gu[:, 2])
+    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(np.abs(spread[:, 2]))
 
 
 NAMING = 5.0
@@ -308,7 +308,7 @@ def doubtful(kind=LOSS, **switches):
     """An estimator within its limits, whose frame no theta of its set explains, and no more the bank."""
     fdi = new_fdi()
     fie = estimator(fdi, kind)
-    fie["filtered_uncertainty_bound"], fie["effect"]["regressor"] = 1.0, (1.0, 0.0, 0.0)
+    fie["filtered_uncertainty_bound"], fie["frame_mean_effect"]["regressor"] = 1.0, (1.0, 0.0, 0.0)
     fdi["bank"]["output"]["innovation"], fdi["bound"]["frame_innovation_bound"] = (9.0, 0.0, 0.0), 1.0
     fdi["bank"]["output"]["residual"], fdi["bank"]["output"]["threshold"] = 9.0, 1.0
     put(fdi, **switches)
@@ -356,7 +356,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     (
         fdi["bound"]["has_declared_surface_errors"],
-        fdi["bound"]["effectiveness_error_per_rad"],
+        fdi["bound"]["surface_error_per_rad"],
         fdi["bound"]["frame_innovation_bound"],
     ) = (
         errors,
@@ -365,7 +365,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     )
     fdi["config"]["n_substeps"] = 1
     on(isolation.update_fault_effect, fdi, fie, G, Gu, np.full((3, 4), 0.1))
-    assert (fie["effect"]["error_bound"] > 0.1).tolist() == [wider] * 3
+    assert (fie["frame_mean_effect"]["error_bound"] > 0.1).tolist() == [wider] * 3
 
 
 def test_every_type_starts_with_no_knowledge_of_any_surface():
@@ -414,10 +414,10 @@ def test_a_frame_is_shown_to_every_type_alone_or_in_its_block(length, started, m
     ) = 4, 9, 1, 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
         fie["hypothesis_kind"], fie["surface"], fie["theta_min"], fie["theta_max"] = POSITION, s, -1.0, 1.0
-        fie["effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
+        fie["frame_mean_effect"]["regressor"] = np.eye(3)[(0, 1, 2, 1)[s]]
     measured = np.zeros(1, MEASURED).view(np.recarray)[0]
     adaptive_estimators.ISOLATION_VARIANTS["all", "worst-case"].isolate(fdi, measured, 1.0, started)
-    assert (fdi["types"]["frame_index"], fdi["types"]["block"]["n_frames"]) == (frame, filled)
+    assert (fdi["types"]["frame_index"], fdi["types"]["block"]["n_frames_so_far"]) == (frame, filled)
 
 
 def test_the_axes_of_a_shared_theta_agree_after_each_step():
@@ -427,7 +427,7 @@ def test_the_axes_of_a_shared_theta_agree_after_each_step():
         0.2,
         (0.02, 0.03, -0.01),
     )
-    fie["theta"], fie["theta_variance"], fie["effect"]["regressor"] = (
+    fie["theta"], fie["theta_variance"], fie["frame_mean_effect"]["regressor"] = (
         (-0.5, -0.9, -0.1),
         (0.06, 0.01, 0.09),
         1.0,
@@ -440,6 +440,6 @@ def test_the_axes_of_a_shared_theta_agree_after_each_step():
         0.2,
         fie["residual"],
     )
-    alone["theta"], alone["theta_variance"], alone["effect"]["regressor"] = -0.5, 0.06, 1.0
+    alone["theta"], alone["theta_variance"], alone["frame_mean_effect"]["regressor"] = -0.5, 0.06, 1.0
     isolation.joint_least_squares_step(alone, 1.0)
     assert alone["theta"].tolist() == fie["theta"].tolist(), "that of the first axis counts"

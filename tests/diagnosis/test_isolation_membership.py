@@ -28,7 +28,11 @@ def agreeing(innovation, **fields):
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
     fdi["bank"]["output"]["innovation"], fdi["bound"]["frame_innovation_bound"] = innovation, 0.1
-    fie["effect"]["regressor"], fie["effect"]["acceleration_at_zero_theta"], fie["effect"]["error_bound"] = (
+    (
+        fie["frame_mean_effect"]["regressor"],
+        fie["frame_mean_effect"]["acceleration_at_zero_theta"],
+        fie["frame_mean_effect"]["error_bound"],
+    ) = (
         (1.0, 2.0, -1.0),
         0.3,
         0.05,
@@ -41,16 +45,17 @@ def agreeing(innovation, **fields):
 def test_one_theta_has_to_explain_all_axes():
     theta = -0.5
     exact = 0.3 + theta * np.array([1.0, 2.0, -1.0])
-    assert on(isolation.is_theta_consistent, *agreeing(exact))
-    assert on(isolation.is_theta_consistent, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
+    assert on(isolation.some_theta_explains_innovation, *agreeing(exact))
+    assert on(isolation.some_theta_explains_innovation, *agreeing(exact + np.array([0.149, 0.149, -0.149])))
     # axis 0 allows theta up to -0.35 - ..., axis 2 asks for one below: no theta is left
-    assert not on(isolation.is_theta_consistent, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
+    assert not on(isolation.some_theta_explains_innovation, *agreeing(exact + np.array([0.16, 0.0, 0.16])))
     assert on(
-        isolation.is_theta_consistent, *agreeing(exact + np.array([0.16, 0.0, 0.16]), ignored_axes=(0, 0, 1))
+        isolation.some_theta_explains_innovation,
+        *agreeing(exact + np.array([0.16, 0.0, 0.16]), ignored_axes=(0, 0, 1)),
     )
-    assert on(isolation.is_theta_consistent, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
+    assert on(isolation.some_theta_explains_innovation, *agreeing(np.full(3, 0.1)))  # what is healthy agrees
     assert not on(
-        isolation.is_theta_consistent, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0]))
+        isolation.some_theta_explains_innovation, *agreeing(0.3 + 0.2 * np.array([1.0, 2.0, -1.0]))
     )  # a gain is no loss
 
 
@@ -90,11 +95,15 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
         (0.0, 0.9, 0.0),
         0.05,
     )
-    fdi["bound"]["effectiveness_error_per_rad"][:, 1], fdi["bound"]["surface_error_at_command"][:, 1] = (
+    fdi["bound"]["surface_error_per_rad"][:, 1], fdi["bound"]["surface_error_at_command"][:, 1] = (
         (0.1, 0.4, 0.2),
         (0.01, 0.02, 0.2),
     )
-    fie["effect"]["regressor"], fie["effect"]["acceleration_at_zero_theta"], fie["effect"]["error_bound"] = (
+    (
+        fie["frame_mean_effect"]["regressor"],
+        fie["frame_mean_effect"]["acceleration_at_zero_theta"],
+        fie["frame_mean_effect"]["error_bound"],
+    ) = (
         (0.1, 5.0, 1.0),
         -0.1,
         0.01,
@@ -108,7 +117,7 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
     on(isolation.widen_tolerance_by_surface_errors, fdi, fie)
     assert fie["max_possible_deflection"] == pytest.approx(reach)
     own = np.maximum(np.array([0.1, 0.4, 0.2]) * (reach + earlier) - [0.01, 0.02, 0.2], 0.0)
-    assert fie["effect"]["error_bound"] == pytest.approx(0.01 + own)
+    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(0.01 + own)
 
 
 def test_where_no_position_agrees_the_whole_travel_stays_possible():
@@ -123,8 +132,8 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
         (0.0, 9.0, 0.0),
         0.05,
     )
-    fdi["bound"]["effectiveness_error_per_rad"][:, 1] = 0.1
-    fie["effect"]["regressor"] = 0.1, 5.0, 1.0
+    fdi["bound"]["surface_error_per_rad"][:, 1] = 0.1
+    fie["frame_mean_effect"]["regressor"] = 0.1, 5.0, 1.0
     on(isolation.widen_tolerance_by_surface_errors, fdi, fie)
     assert fie["max_possible_deflection"] == 0.6
-    assert fie["effect"]["error_bound"] == pytest.approx([0.06] * 3)
+    assert fie["frame_mean_effect"]["error_bound"] == pytest.approx([0.06] * 3)

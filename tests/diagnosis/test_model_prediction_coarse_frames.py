@@ -88,7 +88,7 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
         moment0 + (n - 1) * moment,
     )
     over(frames)
-    fie["effect"]["regressor"][0], fie["effect"]["error_bound"][0] = (
+    fie["frame_mean_effect"]["regressor"][0], fie["frame_mean_effect"]["error_bound"][0] = (
         prediction["frame_means"]["Gu"][0, 0],
         prediction["frame_means"]["Gu_tolerance_for_fault_change"][0, 0],
     )

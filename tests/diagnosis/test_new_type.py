@@ -55,7 +55,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="reversed", has_constant_parameter=True, consistent_interval=consistent_interval,
-        possible_deflection_range=deflection, estimate=estimate,
+        possible_deflection_range=deflection, estimate_parameter=estimate,
     ),
 )  # fmt: skip
 '''
@@ -135,9 +135,9 @@ TYPES = (
     FaultType(
         name="overdrive", has_constant_parameter=False, sort_rank=5, reset_memory=reset_memory,
         consistent_interval=consistent_interval, memory_record_name="overdrive",
-        memory_dtype=record(least=float), accommodation_mode=SUBTRACT_OFFSET, estimate=estimate,
+        memory_dtype=record(least=float), accommodation_mode=SUBTRACT_OFFSET, estimate_parameter=estimate,
         deflection_relation=DeflectionRelation(
-            1.0, theta_is_share=True, theta_range=lambda low, high: (0.0, MOST - 1.0)
+            1.0, theta_is_share=True, theta_range_for_travel=lambda low, high: (0.0, MOST - 1.0)
         ),
     ),
 )  # fmt: skip

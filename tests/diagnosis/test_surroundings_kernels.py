@@ -434,7 +434,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi = new_fdi()
     (
         fdi["statistical"]["test_config"]["enabled"],
-        fdi["config"]["authority"],
+        fdi["config"]["alarm_authority"],
         fdi["statistical"]["alarm"]["score_over_alarm_level"],
     ) = (
         enabled,

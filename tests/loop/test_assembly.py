@@ -105,7 +105,7 @@ EXPECTED = {
     "fdi.types.surface.0.actuator.travel_low": -0.5, "fdi.types.surface.3.actuator.travel_high": 1.0,
     "fdi.types.surface.1.accommodation.mode": -1,
     "fdi.types.surface.1.status.fault_type": -1, "fdi.types.surface.0.status.may_be_sole_fault": 1,
-    "fdi.types.surface.1.actuator.lag_share_per_substep": 1.0 - exp(-25.0 * DT / 2),
+    "fdi.types.surface.1.actuator.approach_share_per_substep": 1.0 - exp(-25.0 * DT / 2),
     "fdi.types.surface.1.actuator.max_motion_per_substep": pi / 2 * DT / 2,
     "fdi.types.surface.1.actuator.min_runaway_rate": pi / 4,
     "fdi.types.surface.1.actuator.min_rate_limited_motion_per_substep": radians(3.0) * DT / 2,

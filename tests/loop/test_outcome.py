@@ -199,7 +199,7 @@ NOISY = {"q": {"noise_std_deg_s": 1.0}}
         ({}, ALARM | {"fdi.verdict.detected_at_s": 2.0 - TIME_TOLERANCE_S}, False, True),
         ({}, ALARM | {"fdi.verdict.detected_at_s": 1.99}, False, False),
         ({}, {"fdi.verdict.detected_at_s": 1.99}, False, True),
-        ({}, {"fdi.config.authority": STATISTICAL_DETECTOR}, False, False),
+        ({}, {"fdi.config.alarm_authority": STATISTICAL_DETECTOR}, False, False),
         ({}, {"fdi.sensor_monitor.output.alarmed": 1}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.5}]}, {}, False, False),
         ({"faults": [FAULT, BROKEN | {"at_s": 2.51}]}, {}, False, True),

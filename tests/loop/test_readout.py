@@ -72,7 +72,9 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
     _, _, now, row, _ = flown
     diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
     shares = [
-        one.score / diagnosis.alarm_level for block in diagnosis.filter_blocks for one in block.hypotheses
+        one.score / diagnosis.statistical_alarm_level
+        for block in diagnosis.filter_blocks
+        for one in block.hypotheses
     ]
     logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
     assert max(shares) == pytest.approx(max(logged), rel=1e-12)
@@ -80,7 +82,7 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
         assert block.onset_tests.score.shape[0] == len(block.hypotheses)
         assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled
-    assert (monitor.worst_test_ratio, monitor.worst_test) == (row["watch_share"], row["watch_test"])
+    assert (monitor.worst_test_ratio, monitor.worst_test_index) == (row["watch_share"], row["watch_test"])
     assert len(monitor.predicted_reading) == len(SENSORS)
 
 

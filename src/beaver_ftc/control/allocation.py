@@ -33,7 +33,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
-from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, main_surfaces
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW, main_surface_index_by_axis
 from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
 
 LOW, FREE, HIGH = -1, 0, 1
@@ -204,7 +204,7 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
     layout = control["layout"]
     layout["low"], layout["high"] = travel
-    layout["main"], layout["stand_in"] = main_surfaces(aircraft), _stand_in(aircraft)
+    layout["main"], layout["stand_in"] = main_surface_index_by_axis(aircraft), _stand_in(aircraft)
     layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     step = control["reference"]["config"]["dt"] / config.hand_over_s

@@ -114,7 +114,8 @@ def declared_errors_dtype(n: int) -> np.dtype:
 def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
-    anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere: more than one may.
+    one_surface_may_be_anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere:
+    more than one may.
     is_outside_all_boxes: whether the state is outside all boxes; box, time_row: where it is in the map.
     surface_positions_before: deflections in the frame before, rad; error_now: error here, rad/s2.
     engine_asymmetry_bound: bound on the yawing moment of healthy engines, by box."""
@@ -134,9 +135,10 @@ def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
 @sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
-    gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_bound: on the innovation of one
-    frame, rad/s2. effectiveness_error_per_rad, surface_error_at_command: errors of the own terms of n
-    surfaces, per rad of deflection and at the command, means over the frame.
+    gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_innovation_bound: on the innovation
+    of one frame, rad/s2. surface_error_per_rad, surface_error_at_command: error of each surface's own terms
+    in the acceleration, per rad of deflection (rad/s2 per rad) and at the command (rad/s2), means over the
+    frame.
     additional_error_by_travel_level: by how much the map's error with a surface at each share of its travel
     exceeds that in eta_bar."""
     return record(
@@ -145,7 +147,7 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
         model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
         gyro_error_change_bound_before=3,
         frame_innovation_bound=3,
-        has_declared_surface_errors=int, effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        has_declared_surface_errors=int, surface_error_per_rad=(3, n), surface_error_at_command=(3, n),
         additional_error_by_travel_level=(MAX_LEVELS, 3),
     )  # fmt: skip
 
@@ -156,8 +158,8 @@ def fill_error_map(
     one_surface_may_be_anywhere: bool,
     several_surfaces_may_be_anywhere: bool,
 ) -> None:
-    """Write an aircraft's map, if it has one; one_surface_may_be_anywhere: one surface may be, in its travel;
-    several_surfaces_may_be_anywhere: more."""
+    """Write the map of the aircraft, if it has one. one_surface_may_be_anywhere: a faulty surface may be
+    anywhere in its travel; several_surfaces_may_be_anywhere: more than one may."""
     declared_map = aircraft.file.model_error_map
     if declared_map is None:
         return
@@ -233,7 +235,8 @@ def slipstream_error_bound(declared_errors, y):
 
 @kernel
 def fill_signal_magnitudes(declared_errors, x, y, u):
-    """Fill the scratch with |signal| as measured and as large as it may be; for airspeed, as small."""
+    """Fill the scratch fields with |signal| as measured and the largest |signal| that the errors allow; for
+    airspeed, the smallest."""
     for i in range(3):
         declared_errors.magnitude_x[i] = abs(x[i])
         declared_errors.max_magnitude_x[i] = abs(x[i]) + reading_error_bound(declared_errors, i, x[i])
@@ -260,7 +263,8 @@ def fill_signal_magnitudes(declared_errors, x, y, u):
 
 @kernel
 def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
-    """Fill moment (3,), the sum of the magnitudes of a moment's terms, and slack (3,), their error; N m."""
+    """Fill moment_magnitude (3,), the sum of the magnitudes of a moment's terms, and moment_error_bound (3,),
+    the bound on the error of this sum; N m."""
     measured_pressure, max_pressure = (
         declared_errors.magnitude_y[QDYN],
         declared_errors.magnitude_bound_y[QDYN],
@@ -288,13 +292,13 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
 
 @kernel
 def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_magnitude):
-    """Error of a coefficient times a signal."""
+    """Bound the error of a coefficient times a signal; tolerance: error of the coefficient."""
     return (abs(coefficient) + tolerance) * max_signal_magnitude - abs(coefficient) * signal_magnitude
 
 
 @kernel
 def inertia_times_moment_error_bound(declared_errors, axis, coefficient, tolerance):
-    """Error of an inertia coefficient times the moment about an axis."""
+    """Bound the error of an inertia coefficient times the moment about an axis, rad/s2."""
     moment_magnitude = declared_errors.moment_magnitude[axis]
     return product_error_bound(
         coefficient, tolerance, moment_magnitude, moment_magnitude + declared_errors.moment_error_bound[axis]
@@ -303,7 +307,7 @@ def inertia_times_moment_error_bound(declared_errors, axis, coefficient, toleran
 
 @kernel
 def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, tolerance):
-    """Error of an inertia coefficient times rates i and j."""
+    """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
     magnitude, max_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
         coefficient, tolerance, magnitude[i] * magnitude[j], max_magnitude[i] * max_magnitude[j]
@@ -331,9 +335,10 @@ def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
 
 @kernel
 def fill_acceleration_error_per_rad(declared_errors, design, s):
-    """Fill per_rad (3, s) rad/s2 per rad: what the declared errors can do to the effect of surface s.
+    """Fill acceleration_error_per_rad[:, s], rad/s2 per rad: bound on the error of the effect of surface s.
 
-    The bound is affine in |u_s|; this is its slope. `add_declared_error_bound` comes first.
+    The declared bound is affine in |u_s|; this is its slope. Call `add_declared_error_bound` first: it fills
+    the scratch fields.
     """
     inertia_tolerance, per_rad = declared_errors.inertia_tolerance, declared_errors.acceleration_error_per_rad
     roll, max_roll = surface_moment_magnitudes_per_rad(declared_errors, design, 0, s)
@@ -348,7 +353,7 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
 
 @kernel
 def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
-    """Add to eta_bar (3,) rad/s2 what the declared errors can do; x (3,), y, u (surfaces,) as measured."""
+    """Add to eta_bar (3,) rad/s2 the bound by the declared errors; x (3,), y, u (surfaces,) as measured."""
     fill_signal_magnitudes(declared_errors, x, y, u)
     signals(
         design.moments,
@@ -403,7 +408,7 @@ def is_inside_box(error_map, box_index):
 
 @kernel
 def is_coordinate_outside_all_boxes(error_map, coordinate_index):
-    """Whether this coordinate of the state is outside what any box spans."""
+    """Whether this coordinate of the state is outside the range that the boxes span together."""
     low, high = np.inf, -np.inf
     for k in range(error_map.n_boxes):
         low, high = (
@@ -416,7 +421,8 @@ def is_coordinate_outside_all_boxes(error_map, coordinate_index):
 
 @kernel
 def map_travel_level_for_positions(error_map, u):
-    """The first share of the travel that covers surfaces u (n,) rad; the last if all of it may be used."""
+    """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
+    travel may be used."""
     if error_map.several_surfaces_may_be_anywhere:
         return error_map.n_levels - 1
     travel_share = 0.0
@@ -429,7 +435,7 @@ def map_travel_level_for_positions(error_map, u):
 
 @kernel
 def map_travel_level_for_share(error_map, travel_share):
-    """The first level of the map for so large a share of the travel."""
+    """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
     last_level = error_map.n_levels - 1
     for j in range(last_level):
         if travel_share <= error_map.travel_share[j]:
@@ -441,8 +447,8 @@ def map_travel_level_for_share(error_map, travel_share):
 def max_travel_share_used(error_map, s, position_interval, share_before, n_instants):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
-    position_interval: (low, high) rad, in the mean over them; share_before: the share as the frame began,
-    where it may be yet at the first.
+    position_interval: (low, high) rad, of the mean position over the instants; share_before: the share at the
+    start of the frame, where the surface may still be at the first instant.
     """
     used, (low, high) = 0.0, position_interval
     if high > 0.0:
@@ -456,7 +462,7 @@ def max_travel_share_used(error_map, s, position_interval, share_before, n_insta
 
 @kernel
 def error_map_time_row(error_map):
-    """The row for the flight as old as it is, -1 if none was measured so late."""
+    """The row of the map for the present flight time, -1 if the map ends before."""
     for a in range(error_map.n_time_rows):
         if error_map.time_s <= error_map.until_s[a]:
             return a
@@ -465,7 +471,7 @@ def error_map_time_row(error_map):
 
 @kernel
 def look_up_map_error(error_map, x, y, u):
-    """Fill `coordinates` and `now`, the error measured about this state; x (3,) rad/s, y (4 + declared,), u
+    """Fill `coordinates` and `error_now`, the mapped error at this state; x (3,) rad/s, y (4 + declared,), u
     (n,) rad."""
     coordinates = error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
@@ -484,7 +490,8 @@ def look_up_map_error(error_map, x, y, u):
 
 @kernel
 def additional_error_at_travel_level(error_map, level, axis):
-    """By how much the error of an axis at this instant is larger with a surface at this level, rad/s2."""
+    """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
+    travel, rad/s2."""
     if error_map.is_outside_all_boxes:
         return 0.0
     return max(
@@ -494,7 +501,7 @@ def additional_error_at_travel_level(error_map, level, axis):
 
 @kernel
 def add_map_error(error_map, x, y, u, eta_bar):
-    """Add to eta_bar (3,) rad/s2 the error measured about this state; x (3,) rad/s, y, u (n,) rad."""
+    """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
     look_up_map_error(error_map, x, y, u)
     for i in range(3):
         eta_bar[i] += error_map.error_now[i]
@@ -506,41 +513,41 @@ def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate_rad_s |x| on any axis, and the inertia coupling makes `max_rate_coupling` times as much of it.
+    earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by `max_rate_coupling_by_axis`.
     """
     p, q, r = x[0], x[1], x[2]
     rates = abs(p) + abs(q) + abs(r)
-    roll, pitch, yaw = max_rate_coupling(design)
+    roll, pitch, yaw = max_rate_coupling_by_axis(design)
     eta_bar[0] += (
         inertia_coupling[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
-        + earth_rotation_bound(earth_rate_rad_s, rates, roll)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, roll)
     )
     eta_bar[1] += (
         inertia_coupling[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
-        + earth_rotation_bound(earth_rate_rad_s, rates, pitch)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, pitch)
     )
     eta_bar[2] += (
         inertia_coupling[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
-        + earth_rotation_bound(earth_rate_rad_s, rates, yaw)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, yaw)
     )
 
 
 @kernel
-def max_rate_coupling(design):
-    """How much of one rate times another the inertia coupling makes on each axis, at most; 1 where it is
-    less, as it is of most aircraft."""
+def max_rate_coupling_by_axis(design):
+    """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
+    least 1."""
     roll, yaw = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
     pitch = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
     return max(roll, 1.0), max(pitch, 1.0), max(yaw, 1.0)
 
 
 @kernel
-def earth_rotation_bound(earth_rate_rad_s, sum_of_rates, rate_coupling):
-    """Return the bound by the Earth's rotation and rounding on an axis, rad/s2; sum_of_rates: |p| + |q| +
-    |r|, rad/s."""
+def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rates, rate_coupling):
+    """Bound the angular acceleration on an axis by the Earth's rotation and by rounding, rad/s2;
+    sum_of_rates: |p| + |q| + |r|, rad/s."""
     return (
         earth_rate_rad_s * ((1.0 + rate_coupling) * sum_of_rates + rate_coupling * earth_rate_rad_s)
         + ROUNDING_RAD_S2
@@ -549,8 +556,9 @@ def earth_rotation_bound(earth_rate_rad_s, sum_of_rates, rate_coupling):
 
 @kernel
 def min_true_height_m(altitude, error_offset_m, error_slope):
-    """The least height, m, that a measured altitude leaves: off by so much and by a share. The ground is at
-    sea level; the model of turbulence has no height below LEAST_HEIGHT_M."""
+    """The least true height, m. The error of `altitude`, as measured, is up to error_offset_m +
+    error_slope |truth|. The ground is at sea level; the model of turbulence has no height below
+    LEAST_HEIGHT_M."""
     return max(
         altitude - (error_offset_m + error_slope * abs(altitude)) / (1.0 - error_slope), LEAST_HEIGHT_M
     )
@@ -558,7 +566,7 @@ def min_true_height_m(altitude, error_offset_m, error_slope):
 
 @kernel
 def set_air_rotation_bound(declared_errors, altitude):
-    """Bring the bound on the air's rotation to this altitude, m as measured."""
+    """Set the bound on the air's rotation, rad/s, for this altitude, m as measured."""
     if declared_errors.air_rotation_bound_at_1_m > 0.0:
         height = min_true_height_m(
             altitude, declared_errors.altitude_error_bound_m, declared_errors.altitude_error_share
@@ -593,7 +601,7 @@ def fill_uncertainty_bound_now(bound, design, measured, u):
     )
 
 
-GUST_LIMIT_SIGMA = 6.0  # once in 5e8 samples beyond, were they independent
+GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
 _INERTIA_NAMES = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
 POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
@@ -602,7 +610,8 @@ POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds 
 def max_inertia_coefficient_errors(tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
-    Each is monotonic in each inertia as long as the others stay put, so the corners tell.
+    Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
+    corner.
     """
     nominal = np.array(inertia_coefficients(mass))
     max_change = np.zeros(12)
@@ -620,8 +629,8 @@ def max_inertia_coefficient_errors(tolerance: float, mass: MassProperties) -> np
 def configure_uncertainty_bound(
     bound: np.void, scenario: "Scenario", declared: Declared, design: np.void
 ) -> None:
-    """Fill in the declared bound, and what the aircraft's terms leave: where it is mapped, or everywhere the
-    same; design: the designer's record."""
+    """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
+    for all states. design: record of the design model."""
     config, aircraft = scenario.fdi, declared.aircraft
     bound["inertia_coupling"], bound["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
     bound["constant_error_bound"] = declared.constant_rad_s2
@@ -640,7 +649,7 @@ def configure_uncertainty_bound(
 def fill_declared_errors(
     declared_errors: np.void, declared: Declared, design: np.void, mass: MassProperties
 ) -> None:
-    """Fill the record; the design record and mass are the designer's."""
+    """Fill the declared errors; design, mass: record and mass properties of the design model."""
     tolerance = declared.coefficients.absolute(declared.aircraft.moments, design["moments"]["value"])
     declared_errors["coefficient_tolerance"][: tolerance.size] = tolerance
     declared_errors["inertia_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
@@ -664,9 +673,9 @@ def fill_declared_errors(
 
 
 def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", declared: Declared) -> None:
-    """Admit errors of dpt where those are declared of which it is worked out.
+    """Fill in the errors of dpt if errors are declared of an instrument from which dpt is computed.
 
-    The engine may be set anywhere between here and its highest manifold pressure.
+    The engine may have any setting between the initial one and its highest manifold pressure.
     """
     sensors = declared.sensors
     has_instrument_errors = any(not getattr(sensors.declared, name).is_ideal for name in OF_THE_SLIPSTREAM)
@@ -683,7 +692,8 @@ def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", 
 
 
 def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> tuple[float, ...]:
-    """Poles (1/s) that find the smallest constant fault phi within each of DELAYS_S, despite gyro noise.
+    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DESIGN_DELAYS_S, despite gyro
+    noise.
 
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
     of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
@@ -713,8 +723,8 @@ _AXIS_OF_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
 def declared_errors_for_plugin(
     declared: Declared, actuators: Actuators, design: np.ndarray, y: np.ndarray, u: np.ndarray
 ) -> "DeclaredErrors":
-    """Return the declared errors as a plug-in is given them, trimmed at y and u rad; design: the designer's
-    record, (1,)."""
+    """Return the declared errors for a plug-in, at the trim y and u rad; design: record of the design model,
+    (1,)."""
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
     aircraft, errors = declared.aircraft, declared.sensors
@@ -755,7 +765,7 @@ def model_error_std(
     coefficients: np.ndarray,
     deflection_rad: float,
 ) -> np.ndarray:
-    """Standard deviation (3,) rad/s2 of f + G u at y and u, every error standing for itself.
+    """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
     air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficients: absolute errors.
     """
@@ -781,10 +791,10 @@ def _design_acceleration_at_zero_rates(design: np.ndarray, y: np.ndarray, u: np.
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
-def level_flow_angle_noise_std(errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
-    """Estimate the noise of the flow's angles (2,) against the level axes, as vanes, airspeed and attitude
-    have them, standard deviation in rad: what pitch attitude and heading are off turns the flow as much as
-    what a vane is off."""
+def flow_angle_in_level_axes_noise_std(errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
+    """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
+    airspeed and attitude. An error of pitch attitude or heading turns the flow as much as an error of a
+    vane."""
     cross_axis_share = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
     vane_noise_std = [hypot(errors[vane].random, errors[angle].random) for vane, angle in vane_attitude_pairs]
@@ -793,10 +803,11 @@ def level_flow_angle_noise_std(errors: SensorErrors, airspeed_mps: float) -> np.
     )
 
 
-def gust_estimate_noise_std_for(
+def gust_acceleration_noise_std(
     flow_angle_noise_std: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float
 ) -> np.ndarray:
-    """Standard deviation, rad/s2 on each axis, of what noise of the flow's angles (2,) rad adds to a gust."""
+    """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise (2,) rad of the flow's
+    angles."""
     V, span = y[AIRSPEED], span_m
     pitch_gust_noise, yaw_gust_noise = flow_angle_noise_std * pi * V / (np.array([4.0, 3.0]) * span)
     damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
@@ -804,7 +815,7 @@ def gust_estimate_noise_std_for(
 
 
 def moment_axis_of_term(term: Term) -> int:
-    """The axis of a moment's term."""
+    """The axis of the moment to which a term belongs."""
     return MOMENTS.index(term.coefficient)
 
 
@@ -821,7 +832,7 @@ def moment_term_tolerances(
     relative_tolerance = np.full(
         coefficient.shape, max(inertia_error[i] / nominal_inertia[i] for i in own_axis_coefficients)
     )
-    relative_tolerance += [_relative_reading_error(errors, term) for term in aircraft.moments]
+    relative_tolerance += [_relative_signal_error_of_term(errors, term) for term in aircraft.moments]
     tolerance = (
         declared.coefficients.absolute(aircraft.moments, coefficient) + relative_tolerance * coefficient
     )
@@ -835,8 +846,9 @@ def moment_term_tolerances(
     return tolerance
 
 
-def _relative_reading_error(errors: SensorErrors, term: Term) -> float:
-    """Relative error of what a term multiplies, by the slopes of gyros, vanes, airspeed and pressure."""
+def _relative_signal_error_of_term(errors: SensorErrors, term: Term) -> float:
+    """Relative error of the signals that a term multiplies, by the slopes of gyros, vanes, airspeed and
+    pressure."""
     own_gyro = AXES[
         moment_axis_of_term(term)
     ]  # a gyro's slope is counted once for all terms of its own_gyro axis

@@ -57,21 +57,21 @@ def reset_conclusion(conclusion: np.void) -> None:
 
 @kernel
 def latch_alarm(conclusion, axis, t):
-    """Latch an alarm at t s that showed on an axis, -1 for one of no axis: the first alarm counts."""
+    """Latch an alarm at t s on an axis, -1 if it has no axis: only the first alarm is recorded."""
     if not conclusion.detected:
         conclusion.detected, conclusion.detected_at_s, conclusion.detected_axis = 1, t, axis
 
 
 @kernel
-def record_isolated_estimator(conclusion, isolated_estimator, t):
-    """Replace the isolated fault, and at t s its instant if it is another one."""
+def replace_isolated_estimator(conclusion, isolated_estimator, t):
+    """Replace the isolated fault; if it is another one, its time of isolation becomes t s."""
     if isolated_estimator != conclusion.isolated_estimator:
         conclusion.isolated_estimator, conclusion.isolated_at_s = isolated_estimator, t
 
 
 @kernel
 def record_fault_type_finding(conclusion, finding):
-    """Replace fault, type and lead by the finding of the fault types.
+    """Replace isolated fault, type and accommodation by the finding of the fault types.
 
     finding: (isolated, isolated_at_s, type, type_at_s, accommodated_surface, accommodation_mode).
     """
@@ -85,14 +85,17 @@ def record_plugin_verdict(conclusion, plugin_verdict, t):
     """Replace the built-in conclusion at t s by the verdict of a plug-in."""
     if plugin_verdict.detected:
         latch_alarm(conclusion, plugin_verdict.axis, t)
-    record_isolated_estimator(conclusion, plugin_verdict.isolated if conclusion.detected else NOT_ISOLATED, t)
+    replace_isolated_estimator(
+        conclusion, plugin_verdict.isolated if conclusion.detected else NOT_ISOLATED, t
+    )
     conclusion.has_effectiveness = plugin_verdict.has_effectiveness
     conclusion.effectiveness[:] = plugin_verdict.effectiveness
 
 
 @kernel
-def discard_conclusion(conclusion):
-    """Discard the conclusion: a sensor is broken, not a surface."""
+def withdraw_conclusion_for_sensor_fault(conclusion):
+    """Withdraw alarm, isolation and type, because a sensor is broken and no surface; times of isolation of
+    single surfaces and withdrawn isolations stay."""
     conclusion.detected, conclusion.isolated_estimator, conclusion.fault_type = 0, NOT_ISOLATED, -1
     conclusion.detected_at_s = conclusion.isolated_at_s = -1.0
     conclusion.accommodated_surface = conclusion.accommodation_mode = -1
@@ -100,8 +103,8 @@ def discard_conclusion(conclusion):
 
 @kernel
 def update_isolation_interval(conclusion, surface, is_isolated, t):
-    """Note at t s whether a surface is isolated, and keep a withdrawn isolation; once the room for them is
-    used up the latest takes the last place."""
+    """Record at t s whether a surface is isolated, and store an isolation that is withdrawn. If the store is
+    full, the latest one replaces the last."""
     isolated_from_s = conclusion.isolated_from_s[surface]
     if is_isolated and isolated_from_s < 0.0:
         conclusion.isolated_from_s[surface] = t
@@ -121,8 +124,9 @@ def isolated_surface(conclusion, estimators):
 
 
 @kernel
-def is_cause_unknown(conclusion):
-    """Whether the cause is open: no surface is isolated or leads, and no plug-in estimates effectiveness."""
+def no_surface_to_accommodate(conclusion):
+    """True if the law has no surface to accommodate: none is isolated or accommodated, and no plug-in
+    estimates effectiveness."""
     return (
         conclusion.isolated_estimator < 0
         and conclusion.accommodated_surface < 0
@@ -130,7 +134,7 @@ def is_cause_unknown(conclusion):
     )
 
 
-# one over the variance of an effectiveness known to 0.05, which need not be eased in
+# 1 / variance of an effectiveness that is known to 0.05: it is precise enough to be applied at once
 MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY = 400.0
 
 
@@ -138,7 +142,7 @@ MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY = 400.0
 def assessment_dtype(n: int) -> np.dtype:
     """The assessment of n surfaces.
 
-    detected: a fault; is_cause_unknown: no surface is isolated or accommodated; isolated_surface: -1 for
+    detected: a fault; no_surface_to_accommodate: true without a fault as well; isolated_surface: -1 for
     none. any_surface_lags: a surface follows its command late. accommodation_mode: of each surface, -1 where
     open, or where faults of every type are not diagnosed; effectiveness; apply_immediately: whether the law
     applies it at once, not gradually; deflection_offset, deflection_lag rad. unknown_acceleration (3,)
@@ -146,7 +150,7 @@ def assessment_dtype(n: int) -> np.dtype:
     open which.
     """
     return record(
-        detected=int, is_cause_unknown=int, diagnoses_all_types=int, isolated_surface=int,
+        detected=int, no_surface_to_accommodate=int, diagnoses_all_types=int, isolated_surface=int,
         any_surface_lags=int,
         accommodation_mode=(int, n),
         effectiveness=n, apply_immediately=(int, n), deflection_offset=n, deflection_lag=n,
@@ -157,14 +161,14 @@ def assessment_dtype(n: int) -> np.dtype:
 
 @kernel
 def assess_surfaces(assessment, config, conclusion, types, layout, estimators, statistical_detector):
-    """Bring the assessment to this frame, by the stages' outputs; statistical_detector: of
+    """Fill the assessment of this frame from the outputs of the stages; statistical_detector: of
     `statistical_dtype`."""
     diagnoses_all_types, isolated = config.diagnoses_all_types, isolated_surface(conclusion, estimators)
     assessment.detected, assessment.diagnoses_all_types = conclusion.detected, diagnoses_all_types
-    assessment.isolated_surface, assessment.any_surface_lags, assessment.is_cause_unknown = (
+    assessment.isolated_surface, assessment.any_surface_lags, assessment.no_surface_to_accommodate = (
         isolated,
         0,
-        is_cause_unknown(conclusion),
+        no_surface_to_accommodate(conclusion),
     )
     for s in range(assessment.accommodation_mode.size):
         assessment.accommodation_mode[s] = types.surface[s].accommodation.mode if diagnoses_all_types else -1
@@ -175,7 +179,9 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
         elif assessment.accommodation_mode[s] >= 0:
             assess_surface_at_fault(assessment, types, layout, estimators, s)
         elif s == isolated and not diagnoses_all_types:
-            uses_statistics = uses_statistical_estimates(statistical_detector.test_config, config.authority)
+            uses_statistics = uses_statistical_estimates(
+                statistical_detector.test_config, config.alarm_authority
+            )
             is_precise = (
                 uses_statistics
                 and statistical.estimate_loss(statistical_detector.block, s)[1]
@@ -189,7 +195,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
 
 @kernel
 def assess_surface_at_fault(assessment, types, layout, estimators, s):
-    """Fill the assessment of surface s, at fault by the diagnosis of every type."""
+    """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     surface = types.surface[s]
     is_at_fault, mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
     if mode == SCALE_COMMAND:
@@ -209,24 +215,25 @@ def assess_surface_at_fault(assessment, types, layout, estimators, s):
 @kernel
 def estimated_theta_of_isolated_loss(config, conclusion, layout, estimators, statistical_detector, s):
     """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
-    if uses_statistical_estimates(statistical_detector.test_config, config.authority):
+    if uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority):
         return statistical.estimate_loss(statistical_detector.block, s)[0]
     return estimators[conclusion.isolated_estimator].theta[layout.dominant_axis[s]]
 
 
 @kernel
-def uses_statistical_estimates(tests, authority):
+def uses_statistical_estimates(tests, alarm_authority):
     """Whether the estimates of the statistical detector are used."""
-    return tests.enabled and authority != WORST_CASE_DETECTOR
+    return tests.enabled and alarm_authority != WORST_CASE_DETECTOR
 
 
 @kernel
 def assess_unknown_acceleration(
     assessment, config, conclusion, types, layout, statistical_detector, fdae, bound
 ):
-    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound: what is declared.
+    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound: what is
+    declared.
 
-    No acceleration is asked for what a slow surface lags: it would only wind the command up.
+    The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
     unknown_acceleration, diagnoses_all_types = assessment.unknown_acceleration, config.diagnoses_all_types
     unknown_acceleration[:] = 0.0
@@ -234,7 +241,7 @@ def assess_unknown_acceleration(
     if (
         conclusion.detected
         and not lags
-        and uses_statistical_estimates(statistical_detector.test_config, config.authority)
+        and uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority)
     ):
         statistical.fill_statistical_unknown_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration

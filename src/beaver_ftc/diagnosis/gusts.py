@@ -49,8 +49,8 @@ from beaver_ftc.design.model import (
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import (
-    gust_estimate_noise_std_for,
-    level_flow_angle_noise_std,
+    flow_angle_in_level_axes_noise_std,
+    gust_acceleration_noise_std,
     min_true_height_m,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
@@ -685,7 +685,7 @@ def add_gust_estimate_noise(
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    flow_angle_noise_std = level_flow_angle_noise_std(errors, y[AIRSPEED])
+    flow_angle_noise_std = flow_angle_in_level_axes_noise_std(errors, y[AIRSPEED])
     span_m = float(statistical["gust"]["config"]["wing_span"])
     if statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]:
         flow_angle_noise_std += (
@@ -696,12 +696,12 @@ def add_gust_estimate_noise(
         flow_angle_noise_by_forces = np.sqrt(forces["accelerometer_innovation_variance"]) / np.abs(
             forces["vane_error_effect_per_rad"][:, 1]
         )
-        statistical["forces"]["gust_estimate_noise_std"] = gust_estimate_noise_std_for(
+        statistical["forces"]["gust_estimate_noise_std"] = gust_acceleration_noise_std(
             flow_angle_noise_by_forces, design, y, u, span_m
         )
     for name in ("input_noise_variance_without_air_data", "input_noise_variance"):
         statistical["noise"][name] += (
-            gust_estimate_noise_std_for(flow_angle_noise_std, design, y, u, span_m) ** 2
+            gust_acceleration_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )
 
 

@@ -130,7 +130,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
     round gives a valid bound. If a frame has several substeps, the surface may still be where it was a frame
     before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
     """
-    s, effect = fie.surface, fie.effect
+    s, effect = fie.surface, fie.frame_mean_effect
     axis = axis_of_largest_effect(effect.regressor)
     previous_max_deflection, max_deflection = (
         fie.max_possible_deflection,
@@ -146,7 +146,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
     deflection_at_first_substep = 2.0 * previous_max_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         surface_error = max(
-            bound.effectiveness_error_per_rad[axis, s] * (max_deflection + deflection_at_first_substep)
+            bound.surface_error_per_rad[axis, s] * (max_deflection + deflection_at_first_substep)
             - bound.surface_error_at_command[axis, s],
             0.0,
         )
@@ -169,7 +169,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         )
     for i in range(3):
         effect.error_bound[i] += max(
-            bound.effectiveness_error_per_rad[i, s] * (max_deflection + deflection_at_first_substep)
+            bound.surface_error_per_rad[i, s] * (max_deflection + deflection_at_first_substep)
             - bound.surface_error_at_command[i, s],
             0.0,
         )
@@ -194,14 +194,14 @@ def map_travel_level_at_position(error_map, fie, position_range, n_substeps):
 
 
 @kernel
-def is_theta_consistent(fie, innovation, innovation_bound):
+def some_theta_explains_innovation(fie, innovation, innovation_bound):
     """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
     if uncertainty_explains_innovation(innovation, innovation_bound):
         return True
     low, high = fie.theta_min, fie.theta_max
     for i in range(3):
         axis_low, axis_high = consistent_theta_interval_on_axis(
-            innovation, innovation_bound, fie, fie.effect, i
+            innovation, innovation_bound, fie, fie.frame_mean_effect, i
         )
         low, high = max(low, axis_low), min(high, axis_high)
     return low <= high
@@ -233,7 +233,7 @@ def narrow_feasible_theta_sets(fie, innovation, innovation_bound, shared_by_axes
     """
     for i in range(3):
         consistent_in_frame = consistent_theta_interval_on_axis(
-            innovation, innovation_bound, fie, fie.effect, i
+            innovation, innovation_bound, fie, fie.frame_mean_effect, i
         )
         intersect_feasible_theta_sets(fie, i, consistent_in_frame, shared_by_axes)
         filtered_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
@@ -289,11 +289,12 @@ ISOLATION_ESTIMATOR_RECORD = record(
     # Omega, and the same of the positive and the negative part of Z
     filtered_regressor=3, filtered_positive_regressor=3, filtered_negative_regressor=3,
     filtered_uncertainty_bound=3, filtered_eta_bar=3, filtered_gyro_error_bound=3, theta=3, theta_variance=3,
-    effect=FAULT_EFFECT_RECORD, block_mean_effect=FAULT_EFFECT_RECORD,  # of the frame; mean over a block
+    frame_mean_effect=FAULT_EFFECT_RECORD, block_mean_effect=FAULT_EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
     max_possible_deflection=float, max_possible_travel_share=float,
     # on the residuals of the bank (filters.py)
-    parity_direction=3, reachable_residual_low=(MAX_POLES, 4), reachable_residual_high=(MAX_POLES, 4),
+    parity_direction=3,
+    reachable_bank_residual_low=(MAX_POLES, 4), reachable_bank_residual_high=(MAX_POLES, 4),
     feasible_theta_min=3, feasible_theta_max=3,  # what the frames since the alarm leave of the known set
 )  # fmt: skip
 
@@ -312,16 +313,16 @@ def isolation_dtype(surfaces: int) -> np.dtype:
     return record(config=config, estimator=(ISOLATION_ESTIMATOR_RECORD, 2 * surfaces))
 
 
-DAMAGE_ISOLATION_HOLD_OFF_S = (
+ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S = (
     4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
 )
 LOSS_THETA_RANGE = (-1.0, 0.0)
 _THRESHOLD_KIND_OF_NAME = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
 
-EstimatorEntry = tuple[str, int, int]  # of a fault class: name, kind and surface of its estimator
+EstimatorNameKindSurface = tuple[str, int, int]  # of an isolation estimator; surface: its index
 
 
-def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntry, ...]:
+def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorNameKindSurface, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
     published: a loss of the surface that leads each axis, and of what turns with it. all: a loss and a
@@ -345,7 +346,7 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def configure_isolation(
-    isolation: np.void, scenario: Scenario, entries: tuple[EstimatorEntry, ...], travel: np.ndarray
+    isolation: np.void, scenario: Scenario, entries: tuple[EstimatorNameKindSurface, ...], travel: np.ndarray
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
@@ -375,7 +376,9 @@ def configure_isolation(
     # not isolated yet.
     weakly_excluded = WEAKLY_EXCLUDED_BY_DAMAGE if config.weighs_chance and aircraft.damage else 0
     isolation["estimator"]["weakly_excluded"] = weakly_excluded
-    isolation["config"]["isolation_hold_off_s"] = DAMAGE_ISOLATION_HOLD_OFF_S if aircraft.damage else 0.0
+    isolation["config"]["isolation_hold_off_s"] = (
+        ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S if aircraft.damage else 0.0
+    )
     losable_surfaces = {surface for damage_case in aircraft.damage.values() for surface in damage_case.takes}
     isolation["config"]["can_be_lost_by_damage"] = [
         surface in losable_surfaces for surface in aircraft.surfaces
@@ -402,7 +405,7 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
     G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame.
     effect_error_bound (3, n) rad/s2: error of the mean if a fault changes within the frame.
     """
-    effect = fie.effect
+    effect = fie.frame_mean_effect
     fill_effect_of_hypothesis(
         fie.hypothesis_kind, fie.surface, G, Gu, effect.acceleration_at_zero_theta, effect.regressor
     )
@@ -417,7 +420,7 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
 
 @kernel
 def update_fault_effects(isolation, bank, bound, config, detected, G, Gu, effect_error_bound):
-    """`update_fault_effect` for every estimator, where something will ask for it."""
+    """Call `update_fault_effect` for every estimator, if a later stage reads the effects."""
     if isolation.config.uses_reach_test or config.diagnoses_all_types or detected:
         for fie in isolation.estimator[: isolation.config.n_estimators]:
             update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error_bound)
@@ -437,7 +440,7 @@ def start_estimators(isolation, gyro_error_change_bound, x):
 
 @kernel
 def update_residual_and_thresholds(fie, threshold_kind, x):
-    """Form the residual and its thresholds; true if it is within them on every axis that counts."""
+    """Compute the residual and its thresholds; true if it is within them on every axis not ignored."""
     is_within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
@@ -486,7 +489,9 @@ def update_and_test_if_fault_possible(isolation, fie, bank, innovation_bound, ab
     if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION) and (
         isolation_has_run or isolation.config.uses_reach_test
     ):
-        is_possible = is_possible and is_theta_consistent(fie, bank.output.innovation, innovation_bound)
+        is_possible = is_possible and some_theta_explains_innovation(
+            fie, bank.output.innovation, innovation_bound
+        )
     if isolation.config.narrows_theta_sets and abrupt and isolation_has_run and fie.hypothesis_kind == LOSS:
         is_possible = is_possible and narrow_feasible_theta_sets(
             fie, bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
@@ -570,12 +575,13 @@ def gradient_step(fie, i, gain, dt):
 
 @kernel
 def joint_least_squares_step(fie, forgetting_factor):
-    """The same for one theta shared by the axes: each axis corrects what the axes before left."""
+    """A least-squares step of one theta shared by the axes: each axis corrects the residual that the axes
+    before left; returns the step."""
     total_step = 0.0
     for i in range(3):
         if i > 0:
             fie.theta[i], fie.theta_variance[i] = fie.theta[i - 1], fie.theta_variance[i - 1]
-        if fie.effect.regressor[i] != 0.0:
+        if fie.frame_mean_effect.regressor[i] != 0.0:
             unexplained_residual = fie.residual[i] - fie.filtered_regressor[i] * total_step
             total_step += least_squares_step(
                 fie,
@@ -591,16 +597,16 @@ def joint_least_squares_step(fie, forgetting_factor):
 
 
 @kernel
-def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
-    """Advance one estimator by a frame.
+def advance_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
+    """Advance one estimator by a frame: estimate, predicted rates, and filtered regressor and bounds.
 
     x (3,) rad/s: at the start of the frame; predicted_acceleration (3,) rad/s2: mean of f + G u over
-    the frame; fie.effect must be that of this frame.
+    the frame; fie.frame_mean_effect must be that of this frame.
     """
     for i in range(3):
         acceleration_at_zero_theta, regressor, theta, decay = (
-            fie.effect.acceleration_at_zero_theta[i],
-            fie.effect.regressor[i],
+            fie.frame_mean_effect.acceleration_at_zero_theta[i],
+            fie.frame_mean_effect.regressor[i],
             fie.theta[i],
             isolation.config.filter_decay[i],
         )
@@ -611,7 +617,7 @@ def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
         )
     adapt_estimate(isolation, fie, dt)
     for i in range(3):
-        regressor, decay = fie.effect.regressor[i], isolation.config.filter_decay[i]
+        regressor, decay = fie.frame_mean_effect.regressor[i], isolation.config.filter_decay[i]
         fie.filtered_positive_regressor[i] = decay * fie.filtered_positive_regressor[i] + dt * max(
             regressor, 0.0
         )
@@ -619,7 +625,7 @@ def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
             regressor, 0.0
         )
         fie.filtered_eta_bar[i] = advance_residual_bound(
-            fie.filtered_eta_bar[i], bound.eta_bar[i] + fie.effect.error_bound[i], decay, dt
+            fie.filtered_eta_bar[i], bound.eta_bar[i] + fie.frame_mean_effect.error_bound[i], decay, dt
         )
         fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
             fie.filtered_gyro_error_bound[i], bound.gyro_error_change_bound_before[i], decay
@@ -631,7 +637,8 @@ def predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
 
 @kernel
 def adapt_estimate(isolation, fie, dt):
-    """Correct the estimate by the residual at the start of the frame, and the prediction by Omega[k+1]."""
+    """Correct the estimate by the residual at the start of the frame, and the predicted rates by Omega[k+1]
+    times the step of the estimate."""
     joint_step = (
         joint_least_squares_step(fie, isolation.config.forgetting_factor)
         if isolation.config.shares_theta_across_axes
@@ -652,16 +659,17 @@ def adapt_estimate(isolation, fie, dt):
                 fie.feasible_theta_max[i],
             )
         fie.filtered_regressor[i] = (
-            isolation.config.filter_decay[i] * fie.filtered_regressor[i] + dt * fie.effect.regressor[i]
+            isolation.config.filter_decay[i] * fie.filtered_regressor[i]
+            + dt * fie.frame_mean_effect.regressor[i]
         )
         fie.xhat[i] += fie.filtered_regressor[i] * theta_step
 
 
 @kernel
-def predict_estimators(isolation, bound, x, predicted_acceleration, dt):
-    """Advance the estimators by a frame; arguments as in `predict_estimator`."""
+def advance_estimators(isolation, bound, x, predicted_acceleration, dt):
+    """Advance the estimators by a frame; arguments as in `advance_estimator`."""
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        predict_estimator(isolation, fie, bound, x, predicted_acceleration, dt)
+        advance_estimator(isolation, fie, bound, x, predicted_acceleration, dt)
 
 
 @kernel

@@ -28,7 +28,7 @@ def frame_sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
         f=3, G=(3, n), Gu=(3, n), eta_bar=3,
-        effectiveness_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        surface_error_per_rad=(3, n), surface_error_at_command=(3, n),
         first_instant_Gu=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
@@ -99,9 +99,7 @@ def add_instant_to_sums(prediction, bound, layout, diagnoses_all_types):
             sums.G[i, s] += G[i, s]
             sums.Gu[i, s] += G[i, s] * u[s]
             if bound.has_declared_surface_errors:
-                sums.effectiveness_error_per_rad[i, s] += bound.declared_errors.acceleration_error_per_rad[
-                    i, s
-                ]
+                sums.surface_error_per_rad[i, s] += bound.declared_errors.acceleration_error_per_rad[i, s]
                 sums.surface_error_at_command[i, s] += bound.declared_errors.acceleration_error_per_rad[
                     i, s
                 ] * abs(u[s])
@@ -136,7 +134,7 @@ def fill_frame_means(prediction, bound):
     means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
     means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
     if bound.has_declared_surface_errors:
-        bound.effectiveness_error_per_rad[:] = frame_share * sums.effectiveness_error_per_rad
+        bound.surface_error_per_rad[:] = frame_share * sums.surface_error_per_rad
         bound.surface_error_at_command[:] = frame_share * sums.surface_error_at_command
     if frame_share < 1.0:
         fill_effect_tolerance_for_fault_change(prediction)
@@ -196,7 +194,7 @@ def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
     if bound.has_declared_surface_errors:
-        sums.effectiveness_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
+        sums.surface_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
     bound.additional_error_by_travel_level[:] = 0.0
     add_instant_to_sums(prediction, bound, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu

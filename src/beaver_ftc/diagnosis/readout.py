@@ -60,21 +60,21 @@ class Actuator(NamedTuple):
     """The actuator of a surface as fault types take it; rad, rad/s.
 
     min_runaway_rate_rad_s: of a hardover. min_rate_limited_motion_per_substep_rad: of a rate limit, in an
-    instant. lag_share_per_substep: share of the way to the command that is made in an instant.
+    instant. approach_share_per_substep: share of the way to the command that is made in an instant.
     """
 
     travel_low_rad: float
     travel_high_rad: float
     min_runaway_rate_rad_s: float
     min_rate_limited_motion_per_substep_rad: float
-    lag_share_per_substep: float
+    approach_share_per_substep: float
 
 
 class SurfaceFaultTypes(NamedTuple):
-    """The conclusion on the fault types of one surface: is_excluded (types,), and its actuator."""
+    """The conclusion on the fault types of one surface: is_type_excluded (types,), and its actuator."""
 
     actuator: Actuator
-    is_excluded: np.ndarray
+    is_type_excluded: np.ndarray
 
 
 class DeclaredBounds(NamedTuple):
@@ -172,19 +172,19 @@ class SensorTest(NamedTuple):
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; alarmed: an alarm of its own stands.
 
-    worst_test: index of the test with the largest ratio of residual to bound; worst_test_ratio: that ratio;
-    test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced (sensors,): whether a
-    reading is not used any more. sample_time_s: between two samples. gust_change_bound_mps (poles,): bound on
-    the changes of a gust through the filters. predicted_reading, reading_error_bound (sensors,): SI.
+    worst_test_index: of the test with the largest ratio of residual to bound; worst_test_ratio: that ratio;
+    worst_test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced (sensors,): whether
+    a reading is not used any more. sample_time_s: between two samples. gust_change_bound_mps (poles,): bound
+    on the changes of a gust through the filters. predicted_reading, reading_error_bound (sensors,): SI.
     commanded_engine_readings (2,): engine speed rpm, manifold pressure inHg, which the engine's sensors
     should read.
     """
 
     enabled: bool
     alarmed: bool
-    worst_test: int
+    worst_test_index: int
     worst_test_ratio: float
-    test: SensorTest
+    worst_test: SensorTest
     isolated_sensor: int
     is_replaced: np.ndarray
     sample_time_s: float
@@ -202,7 +202,7 @@ class DiagnosisReadout:
 
     @cached_property
     def enabled(self) -> bool:
-        """Whether it runs."""
+        """Whether the diagnosis runs."""
         return bool(self._fdi["config"]["enabled"])
 
     @cached_property
@@ -259,7 +259,7 @@ class DiagnosisReadout:
     @cached_property
     def n_frames_in_block(self) -> int:
         """Frames that the block in progress has so far."""
-        return int(self._fdi["types"]["block"]["n_frames"])
+        return int(self._fdi["types"]["block"]["n_frames_so_far"])
 
     @cached_property
     def surface_fault_types(self) -> tuple[SurfaceFaultTypes, ...]:
@@ -305,7 +305,7 @@ class DiagnosisReadout:
         return np.array(self._fdi["statistical"]["noise"]["input_noise_variance"])
 
     @cached_property
-    def alarm_level(self) -> float:
+    def statistical_alarm_level(self) -> float:
         """Statistic at which the statistical detector raises its alarm, standard deviations."""
         return float(self._fdi["statistical"]["test_config"]["alarm_level"])
 
@@ -351,9 +351,9 @@ def certificate_arrays_of_every_frame(
     estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     views = {
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
-        "offset": estimators["effect"]["acceleration_at_zero_theta"],
-        "slope": estimators["effect"]["regressor"],
-        "spread": estimators["effect"]["error_bound"], "excluded": estimators["excluded"],
+        "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
+        "slope": estimators["frame_mean_effect"]["regressor"],
+        "spread": estimators["frame_mean_effect"]["error_bound"], "excluded": estimators["excluded"],
         "types": surfaces["feasible_sets"]["excluded"],
     }  # fmt: skip
     if diagnoses_all_types:
@@ -372,7 +372,7 @@ RECORDED_BLOCK_FIELDS = (
 )  # fmt: skip
 
 
-def arrays_until_alarm(
+def certificate_arrays_until_alarm(
     fdi: np.void, n_estimators: int, has_statistical_detector: bool
 ) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants the frames up to the alarm, not copies.
@@ -383,8 +383,8 @@ def arrays_until_alarm(
     """
     estimators = fdi["isolation"]["estimator"][:n_estimators]
     views = {
-        "reach_low": estimators["reachable_residual_low"],
-        "reach_high": estimators["reachable_residual_high"],
+        "reach_low": estimators["reachable_bank_residual_low"],
+        "reach_high": estimators["reachable_bank_residual_high"],
     }
     if has_statistical_detector:
         detector = fdi["statistical"]
@@ -398,8 +398,8 @@ def arrays_until_alarm(
     return views
 
 
-def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
-    """Whether the alarm of the surfaces stands, and that of the sensor monitor."""
+def surface_and_sensor_alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
+    """(surfaces, sensors): whether the alarm of a surface fault stands, and that of the sensor monitor."""
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
@@ -421,7 +421,7 @@ def _read_surface(surface: np.void) -> SurfaceFaultTypes:
         "travel_high",
         "min_runaway_rate",
         "min_rate_limited_motion_per_substep",
-        "lag_share_per_substep",
+        "approach_share_per_substep",
     )
     actuator = Actuator(*(float(surface["actuator"][name]) for name in field_names))
     return SurfaceFaultTypes(actuator, surface["feasible_sets"]["excluded"].astype(bool))
@@ -452,15 +452,15 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
     output, redundancy = monitor["output"], monitor["redundancy"]
     config, memory = redundancy["config"], redundancy["memory"]
-    worst_test = int(output["worst_test"])
-    test = redundancy["test"][worst_test]
+    worst_test_index = int(output["worst_test"])
+    test = redundancy["test"][worst_test_index]
     worst_sensor_test = SensorTest(
         float(test["residual"]), float(test["bound_per_s"]), float(test["bound_per_sample"]),
         float(test["residual_per_gust_speed"]), test["filtered_residual"].copy(),
         test["filtered_bound"].copy(),
     )  # fmt: skip
     return SensorMonitor(
-        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test,
+        bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,
         float(output["worst_test_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
         output["is_replaced"].astype(bool), float(config["sample_time_s"]),
         config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),

@@ -1,6 +1,6 @@
 """Records that several stages of the diagnosis share, and the numbers that stand for names.
 
-The number of a scheme is the place of its kernels in SCHEME_PATHS, which plugins.yaml lists.
+The number of a scheme is the place of its kernels in SCHEME_KERNEL_PATHS, which plugins.yaml lists.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ NOT_ISOLATED, UNANTICIPATED = -1, -2
 WEAKLY_EXCLUDED_BY_DAMAGE = 2  # value of `weakly_excluded`: declared damage may have excluded the others
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
-_AUTHORITY_CODE_OF_NAME = {
+_ALARM_AUTHORITY_CODE_OF_NAME = {
     "either": EITHER_DETECTOR,
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
@@ -43,24 +43,25 @@ def layout_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that;
-# isolation_variant: its number (schemes/adaptive_estimators.py); authority: whose alarms count;
+# Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of
+# that scheme; isolation_variant: its number (schemes/adaptive_estimators.py); alarm_authority: the detector
+# whose alarms count, EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR;
 # diagnoses_all_types: faults of every type; abrupt: a fault is declared to stay as it is; n_substeps: JSBSim
 # frames in a frame; dt s.
 SHARED_CONFIG_RECORD = record(
-    enabled=int, scheme_number=int, isolation_variant=int, authority=int, diagnoses_all_types=int, abrupt=int,
-    n_substeps=int,
+    enabled=int, scheme_number=int, isolation_variant=int, alarm_authority=int, diagnoses_all_types=int,
+    abrupt=int, n_substeps=int,
     dt=float,
 )  # fmt: skip
 
 
 def configure_shared_config(shared_config: np.void, scenario: Scenario) -> None:
-    """Fill what several stages go by (dtype CONFIG)."""
+    """Fill the shared configuration (SHARED_CONFIG_RECORD)."""
     fdi_config = scenario.fdi
     shared_config["enabled"], shared_config["dt"] = fdi_config.diagnoses, 1.0 / scenario.rate_hz
     shared_config["scheme_number"] = scheme_number(fdi_config.scheme)
-    shared_config["authority"], shared_config["diagnoses_all_types"] = (
-        _AUTHORITY_CODE_OF_NAME[fdi_config.authority],
+    shared_config["alarm_authority"], shared_config["diagnoses_all_types"] = (
+        _ALARM_AUTHORITY_CODE_OF_NAME[fdi_config.authority],
         fdi_config.fault_class == "all",
     )
     shared_config["abrupt"], shared_config["n_substeps"] = (
@@ -74,7 +75,7 @@ def configure_layout(
 ) -> None:
     """Fill in axes, groups and estimators of the surfaces; estimator_entries: of isolation.py."""
     surface_index = {name: s for s, name in enumerate(aircraft.surfaces)}
-    layout["main"] = main_surfaces(aircraft)
+    layout["main"] = main_surface_index_by_axis(aircraft)
     layout["dominant_axis"] = aircraft.dominant_axis
     layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
@@ -86,8 +87,8 @@ def configure_layout(
         layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = estimator_index
 
 
-def main_surfaces(aircraft: Aircraft) -> list[int]:
-    """The surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
+def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
+    """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
     main_surface_of_axis = {
         aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
     }
@@ -98,15 +99,20 @@ def main_surfaces(aircraft: Aircraft) -> list[int]:
 
 
 _DETECTOR_ROWS = compiled_rows(DETECTORS)
-_PLUGIN_SCHEME_PATH = f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
-SCHEME_PATHS = (*dict.fromkeys(row["kernels"] for row in _DETECTOR_ROWS.values()), _PLUGIN_SCHEME_PATH)
-PLUGIN_SCHEME_NUMBER = SCHEME_PATHS.index(_PLUGIN_SCHEME_PATH)
+_PLUGIN_SCHEME_KERNEL_PATH = (
+    f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
+)
+SCHEME_KERNEL_PATHS = (
+    *dict.fromkeys(row["kernels"] for row in _DETECTOR_ROWS.values()),
+    _PLUGIN_SCHEME_KERNEL_PATH,
+)
+PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_SCHEME_KERNEL_PATH)
 
 
 def scheme_number(name: str) -> int:
-    """The place of a scheme's kernels among SCHEME_PATHS."""
+    """Index of the path of a scheme's kernels in SCHEME_KERNEL_PATHS."""
     return (
-        SCHEME_PATHS.index(_DETECTOR_ROWS[name]["kernels"])
+        SCHEME_KERNEL_PATHS.index(_DETECTOR_ROWS[name]["kernels"])
         if name in _DETECTOR_ROWS
         else PLUGIN_SCHEME_NUMBER
     )

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.readout import (
         FrameReadout,
         Instruments,
-        alarm_flags,
         command_power,
         diagnosis_record,
         end_outer_loops,
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
         recorded_until_alarm,
         set_ground,
         stop_diagnosis,
+        surface_and_sensor_alarm_flags,
     )
     from beaver_ftc.loop.simulation import Asked, Stepping
     from beaver_ftc.loop.stream import FLOW, Diagnosis

@@ -354,7 +354,7 @@ def monitor_sensors(frame):
 @kernel
 def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
-    conclusion.discard_conclusion(fdi.verdict)
+    conclusion.withdraw_conclusion_for_sensor_fault(fdi.verdict)
     verdict.clear_all_accommodation_modes(fdi.types.surface)
     filters.reset_network(fdi.fdae.network)
 

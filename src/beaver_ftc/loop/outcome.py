@@ -431,7 +431,7 @@ def guaranteed_delay_s(frame: np.void, scenario: Scenario, plugged: bool) -> flo
     early = verdict["detected"] and is_before(verdict["detected_at_s"], fault_s)
     if (
         early
-        or fdi["config"]["authority"] == STATISTICAL_DETECTOR
+        or fdi["config"]["alarm_authority"] == STATISTICAL_DETECTOR
         or fdi["sensor_monitor"]["output"]["alarmed"]
     ):
         return None

@@ -82,7 +82,7 @@ def finish(frames, references, log):
 def built_in_statistic(frames):
     """The built-in detection's statistic at this frame: see schemes.built_in_statistic."""
     fdi = frames[0].fdi
-    alarm, authority = fdi.statistical.alarm, fdi.config.authority
+    alarm, authority = fdi.statistical.alarm, fdi.config.alarm_authority
     return largest_statistic(
         fdi.bank, alarm, authority, uses_statistical_estimates(fdi.statistical.test_config, authority)
     )

@@ -96,7 +96,9 @@ def news_of(surface, slowest_half_cycle_frames, known):
     for kind in range(surface.feasible_sets.excluded.size):
         bits = 2 * bits + surface.feasible_sets.excluded[kind]
     early = surface.evidence.n_anomalous_frames - surface.evidence.n_rest_frames < slowest_half_cycle_frames
-    changed = replace(known, 0, surface.status.is_isolated) | replace(known, 1, surface.status.decision_basis)
+    changed = replace(known, 0, surface.status.is_isolated) | replace(
+        known, 1, surface.status.can_be_at_fault_basis
+    )
     changed |= replace(known, 2, surface.status.fault_type) | replace(known, 3, bits)
     return changed | replace(known, 4, 1 if early else 0)
 

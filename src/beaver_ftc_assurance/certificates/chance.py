@@ -53,7 +53,7 @@ def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: in
     if first is None or k - first > MAX_WRITTEN_FRAMES:
         return None
     hypothesis = diagnosis.filter_blocks[b].hypotheses[h]
-    score = hypothesis.score / diagnosis.alarm_level
+    score = hypothesis.score / diagnosis.statistical_alarm_level
     said = _likelihood_fields(tape, history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + LOGGED_SCORE_TOLERANCE:
         _remove_negligible(said, history)
@@ -84,7 +84,10 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
     for hypothesis in (
         each for block in diagnosis.filter_blocks for each in block.hypotheses if each.raises_alarm
     ):
-        column, share = _share_column(hypothesis, surfaces), hypothesis.score / diagnosis.alarm_level
+        column, share = (
+            _share_column(hypothesis, surfaces),
+            hypothesis.score / diagnosis.statistical_alarm_level,
+        )
         found[column] = max(found.get(column, 0.0), share)
     return found
 
@@ -216,7 +219,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     lists = zip(*(values.tolist() for values in its.values()), strict=True)
     frames = [dict(zip(its, row, strict=True)) for row in lists]
     return {
-        "level": diagnosis.alarm_level, "axes": axes, "sense": "less" if sense else "either",
+        "level": diagnosis.statistical_alarm_level, "axes": axes, "sense": "less" if sense else "either",
         "tolerance": [float(block.regressor_tolerance[j]) for j in known],
         "R": of["gyro_noise_variance"][0, felt].tolist(), "Y": Y.tolist(),
         "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart

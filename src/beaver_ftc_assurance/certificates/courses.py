@@ -188,7 +188,7 @@ def _exclude_rate_limit(
     min_step = actuator.min_rate_limited_motion_per_substep_rad
     min_approach = config.n_substeps * config.frames_per_block * min_step  # of a frame, rad
     lag_distance = (
-        min_step / actuator.lag_share_per_substep
+        min_step / actuator.approach_share_per_substep
     )  # from the order, within which the steps are smaller
     for axis, lower in enumerate(bounds.lower.T):
         is_beyond = bounds.is_unexplained & (lower > bounds.max_order + MIN_POSITION_DIFFERENCE_RAD)
@@ -238,7 +238,7 @@ def statement_by_course(
     diagnosis = tape.last.diagnosis
     direction, actuator = TYPES[fault_type].stop_direction, diagnosis.surface_fault_types[surface].actuator
     rule, slowest_rad_s = (
-        RULES[TYPES[fault_type].excluding_comparison],
+        RULES[TYPES[fault_type].excluding_frame_comparison],
         scenario.fdi.slowest_oscillation_rad_s,
     )
     for sign in (direction,) if direction else (1, -1):

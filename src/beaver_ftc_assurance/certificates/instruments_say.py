@@ -26,7 +26,7 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
 
     monitor: at the alarm.
     """
-    number, failed = monitor.worst_test, monitor.worst_test_ratio > 1.0
+    number, failed = monitor.worst_test_index, monitor.worst_test_ratio > 1.0
     if failed and number >= N_COMPUTED_TESTS:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
@@ -57,7 +57,7 @@ def with_missing_column(said: Document, rows: Mapping[str, np.ndarray]) -> Docum
 def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     """Triples (reading, prediction, largest difference with sound instruments) in the residual's unit: of the
     last sample; then what the filter and its bound keep of all samples before."""
-    test, number = monitor.test, monitor.worst_test
+    test, number = monitor.worst_test, monitor.worst_test_index
     if number >= RPM_TEST:
         predicted = float(monitor.commanded_engine_readings[number - RPM_TEST])
         bound = float(monitor.reading_error_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING

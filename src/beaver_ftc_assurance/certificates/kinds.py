@@ -27,7 +27,9 @@ EXCLUDED_BY_MANY_FRAMES = "frames of quiet excluded it, or what several say toge
 OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off may keep its sign"
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
-HELD_ANYWHERE = DeflectionRelation(gain=0.0, theta_is_share=False, theta_range=lambda low, high: (low, high))
+HELD_ANYWHERE = DeflectionRelation(
+    gain=0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
+)
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
@@ -67,12 +69,14 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}
-    if row.excluding_comparison:
-        return {f"{name}_course_{row.excluding_comparison.replace(' ', '_')}": row.stop_direction}
+    if row.excluding_frame_comparison:
+        return {f"{name}_course_{row.excluding_frame_comparison.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
     actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
-    low, high = row.deflection_relation.theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+    low, high = row.deflection_relation.theta_range_for_travel(
+        actuator.travel_low_rad, actuator.travel_high_rad
+    )
     return {
         f"{name}_gain": row.deflection_relation.gain,
         f"{name}_theta_is_share": float(row.deflection_relation.theta_is_share),
@@ -110,7 +114,7 @@ def _effect_of_relation(
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
         axes = (diagnosis.layout.dominant_axis[surface],)
     actuator = diagnosis.surface_fault_types[surface].actuator
-    low, high = relation.theta_range(actuator.travel_low_rad, actuator.travel_high_rad)
+    low, high = relation.theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
     offset, slope = (relation.gain - 1.0) * Gu, Gu if relation.theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0

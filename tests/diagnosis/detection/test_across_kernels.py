@@ -74,7 +74,7 @@ def fdi(rng):
         air["output"]["acceleration_variance_by_axes_turn"]
         @ air["output"]["acceleration_variance_by_axes_turn"].T
     )
-    fdi["bound"]["effectiveness_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
+    fdi["bound"]["surface_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
         1,
     )
@@ -204,7 +204,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
-    e = fdi["bound"]["effectiveness_error_per_rad"][[0, 2], AILERON]
+    e = fdi["bound"]["surface_error_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
     least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE * size)
@@ -309,7 +309,11 @@ def test_any_hypothesis_beyond_the_level_excludes_whom_it_is_not_felt_of(fdi):
     statistical["test_config"]["alarm_level"], fdi["layout"]["position_estimator"] = 5.0, range(4)
     statistical["test_config"]["enabled"] = fdi["config"]["diagnoses_all_types"] = 1
     for s, fie in enumerate(fdi["isolation"]["estimator"][:4]):
-        fie["hypothesis_kind"], fie["surface"], fie["effect"]["regressor"] = POSITION, s, np.eye(3, 4)[:, s]
+        fie["hypothesis_kind"], fie["surface"], fie["frame_mean_effect"]["regressor"] = (
+            POSITION,
+            s,
+            np.eye(3, 4)[:, s],
+        )
     view = statistical["views"][ROLL_AXIS]
     tried = int(view["block"]["n_hypotheses"])
     room = len(view["block"]["hypothesis"])

@@ -87,7 +87,11 @@ def test_the_direction_across_a_fault_is_of_unit_length_and_sees_nothing_of_it()
 def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
     fdi = new_fdi()
     fie = estimator(fdi, low=low, high=high)
-    fie["effect"]["acceleration_at_zero_theta"], fie["effect"]["regressor"], fie["effect"]["error_bound"] = (
+    (
+        fie["frame_mean_effect"]["acceleration_at_zero_theta"],
+        fie["frame_mean_effect"]["regressor"],
+        fie["frame_mean_effect"]["error_bound"],
+    ) = (
         offset,
         Z,
         spread,
@@ -103,14 +107,14 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
     for _ in range(3):
         on(filters.advance_reachable_residuals, fdi, fie)
-    effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
+    effect, across = fie["frame_mean_effect"], np.vstack([np.eye(3), fie["parity_direction"]])
     at_ends = [effect["acceleration_at_zero_theta"] + theta * effect["regressor"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
     spread = np.abs(across) @ effect["error_bound"]
     for m, decay in enumerate(np.exp(-POLES * DT)):
         kept = DT * weights(decay, 3).sum()
-        assert fie["reachable_residual_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
-        assert fie["reachable_residual_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
+        assert fie["reachable_bank_residual_low"][m] == pytest.approx(kept * (does.min(axis=0) - spread))
+        assert fie["reachable_bank_residual_high"][m] == pytest.approx(kept * (does.max(axis=0) + spread))
 
 
 @pytest.mark.parametrize("m", range(3))
@@ -119,7 +123,11 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
 def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
     def explained(beyond, ignored_axes=False):
         fdi, fie = reach_of(0.0, 0.0, 0.0, across=(0.0, 0.0, 0.0))
-        fie["reachable_residual_low"], fie["reachable_residual_high"], fdi["bank"]["output"]["threshold"] = (
+        (
+            fie["reachable_bank_residual_low"],
+            fie["reachable_bank_residual_high"],
+            fdi["bank"]["output"]["threshold"],
+        ) = (
             -0.3,
             0.5,
             0.1,
@@ -137,8 +145,8 @@ def test_a_fault_explains_what_is_within_its_reach_and_the_bound(m, axis, side):
 @pytest.mark.parametrize("side", [-1, 1])
 def test_across_its_direction_a_shared_parameter_confines_it_too(side):
     fdi, fie = reach_of(0.0, 0.0, 0.0)
-    fie["reachable_residual_low"][:, :3], fie["reachable_residual_high"][:, :3] = -9.0, 9.0
-    fie["reachable_residual_low"][:, 3], fie["reachable_residual_high"][:, 3] = -0.2, 0.3
+    fie["reachable_bank_residual_low"][:, :3], fie["reachable_bank_residual_high"][:, :3] = -9.0, 9.0
+    fie["reachable_bank_residual_low"][:, 3], fie["reachable_bank_residual_high"][:, 3] = -0.2, 0.3
     fdi["bank"]["output"]["threshold"][:3] = 0.1
     limit = (0.3 if side > 0 else -0.2) + side * (0.6 + 0.8) * 0.1
     for beyond, within in ((-1e-9, True), (1e-9, False)):

@@ -92,7 +92,7 @@ def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
 )  # fmt: skip
 def test_who_is_in_authority_raises_the_alarm(authority, filters, score, axis):
     fdi = new_fdi()
-    fdi["config"]["authority"] = authority
+    fdi["config"]["alarm_authority"] = authority
     fdi["bank"]["output"]["threshold"][:3], fdi["bank"]["output"]["residual"][1, 2] = 0.1, 0.1 * filters
     (
         fdi["statistical"]["alarm"]["score_over_alarm_level"],
@@ -178,7 +178,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
-    record["sums"]["surface_error_at_command"], record["sums"]["effectiveness_error_per_rad"] = (
+    record["sums"]["surface_error_at_command"], record["sums"]["surface_error_per_rad"] = (
         (99.0, 99.0) if has_declared_surface_errors else (0.0, 0.0)
     )
     fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
@@ -210,9 +210,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["effectiveness_error_per_rad"] == pytest.approx(
-        own if has_declared_surface_errors else 0.0
-    )
+    assert fdi["bound"]["surface_error_per_rad"] == pytest.approx(own if has_declared_surface_errors else 0.0)
     assert fdi["bound"]["surface_error_at_command"] == pytest.approx(
         at_command if has_declared_surface_errors else 0.0
     )

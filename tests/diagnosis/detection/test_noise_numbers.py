@@ -397,10 +397,10 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     gusts.add_gust_estimate_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = bound_kernels.gust_estimate_noise_std_for(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    added = bound_kernels.gust_acceleration_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["noise"]["input_noise_variance"]) == pytest.approx(added, rel=0.02)
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    expected = bound_kernels.gust_estimate_noise_std_for(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    expected = bound_kernels.gust_acceleration_noise_std(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert forces["gust_estimate_noise_std"] == pytest.approx(expected)
 
 

@@ -7,7 +7,7 @@ from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.rivals.kalman import GustStates
 from beaver_ftc.diagnosis.rivals.observer import SurfaceFit, healthy_residual_std
-from beaver_ftc.diagnosis.rivals.rls import InputOutputPair
+from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
 
 DT = 0.01
@@ -252,7 +252,7 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():
     """y[k] = 1.6 y[k-1] - 0.7 y[k-2] + b u[k-1]: predicted once learnt, an alarm when b halves."""
     rng = np.random.default_rng(5)
-    pair, y, scores = InputOutputPair(0.999, 0.995, 1e-4), [0.0, 0.0], []
+    pair, y, scores = InputOutputPredictionTest(0.999, 0.995, 1e-4), [0.0, 0.0], []
     u = rng.normal(size=3000)
     for k in range(2, 3000):
         b = 0.5 if k < 2500 else 0.25

@@ -9,13 +9,13 @@ import pytest
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.rivals.effectiveness import (
-    N_STATES,
+    N_STATES_WITHOUT_GUSTS,
     AugmentedEkf,
     AugmentedUkf,
     EffectivenessFilter,
 )
 from beaver_ftc.diagnosis.rivals.kalman import GustStates, unexplained_acceleration_size, update_state
-from beaver_ftc.diagnosis.rivals.rls import InputOutputPair, RecursiveLeastSquaresFit, RlsMonitor
+from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest, RecursiveLeastSquaresFit, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
 GUSTY = Declared(
@@ -77,14 +77,14 @@ def test_what_is_declared_adds_by_squares():
 def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
     detector = started(GUSTY, misfit_s=0.25, measurement_rad_s=0.004, drift_per_s=0.3)
     rates = GUSTY.rate_variance(0.004)
-    assert (detector.n_states, detector.z.tolist()) == (N_STATES + 3, [0.0] * 9)
+    assert (detector.n_states, detector.z.tolist()) == (N_STATES_WITHOUT_GUSTS + 3, [0.0] * 9)
     assert np.diag(detector.P) == pytest.approx([*rates, 0.01, 0.01, 0.01, *GUSTY.gust_rad_s**2])
     assert np.count_nonzero(detector.P) == 9
     assert pytest.approx(np.diag(rates)) == detector.R
     assert detector.theta_walk_variance == pytest.approx(0.3**2 * DT)
     assert detector.averaging_decay == pytest.approx(exp(-DT / 0.25))
     assert (detector.mean_innovation_square, detector.detected) == (3.0, False)
-    assert started().n_states == N_STATES
+    assert started().n_states == N_STATES_WITHOUT_GUSTS
 
 
 def test_its_noise_is_the_bounds_the_walks_and_the_airs():
@@ -154,7 +154,7 @@ def test_what_fits_no_surface_or_would_be_a_gain_is_outside_the_class(theta, squ
 def test_a_pairs_score_is_of_errors_against_those_before():
     """The model of least_squares.py, and mean and variance of its errors, both fading."""
     rng, fade, floor = np.random.default_rng(5), 0.9, 0.01
-    pair, model = InputOutputPair(0.98, fade, floor), RecursiveLeastSquaresFit(5, 0.98, 1e4)
+    pair, model = InputOutputPredictionTest(0.98, fade, floor), RecursiveLeastSquaresFit(5, 0.98, 1e4)
     inputs, outputs = rng.normal(size=(2, 40))
     mean = variance = 0.0
     for k in range(40):
@@ -242,7 +242,7 @@ def test_each_sigma_point_moves_by_the_model_its_losses_and_its_air():
         turning = turning + measured.contribution[:, :3] @ point[3:6] + GUSTY.gust_effect @ point[6:]
         after[:3] += DT * turning
         after[6:] = np.exp(-DT / GUSTY.gust_time_s) * point[6:]
-    assert detector.dynamics(points, measured) == pytest.approx(expected)
+    assert detector.propagate_points(points, measured) == pytest.approx(expected)
 
 
 def test_the_unscented_filters_statistic_sums_what_is_more_than_expected():

@@ -126,10 +126,10 @@ def test_the_residual_of_the_true_estimator_is_omega_times_what_the_estimate_mis
     for z in Z:
         fie.residual[:] = rate - fie.xhat
         assert fie.residual == pytest.approx(fie.filtered_regressor * (theta - fie.theta), abs=1e-9)
-        fie.effect.regressor[:] = z, -z, 0.5 * z
+        fie.frame_mean_effect.regressor[:] = z, -z, 0.5 * z
         before = rate.copy()
-        rate = before + DT * theta * fie.effect.regressor
-        isolation.predict_estimator(records, fie, bound, before, np.zeros(3), DT)
+        rate = before + DT * theta * fie.frame_mean_effect.regressor
+        isolation.advance_estimator(records, fie, bound, before, np.zeros(3), DT)
         if projects:
             assert ((fie.theta >= -1.0) & (fie.theta <= 0.0)).all()
 

@@ -99,7 +99,9 @@ def test_blocks_see_what_frames_do_not():
         plant.fdi["isolation"]["estimator"][plant.fdi["layout"]["position_estimator"][2]],
     )
     of_a_frame = (
-        2 * plant.fdi["bound"]["frame_innovation_bound"][2] / abs(estimator["effect"]["regressor"][2])
+        2
+        * plant.fdi["bound"]["frame_innovation_bound"][2]
+        / abs(estimator["frame_mean_effect"]["regressor"][2])
     )
     assert (
         known["last_observation"]["position_high"] - known["last_observation"]["position_low"]

@@ -75,7 +75,7 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     fdi = new({RUDDER: [STUCK]})
     (
         fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
-        fdi["types"]["surface"]["status"]["decision_basis"][RUDDER],
+        fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][RUDDER],
     ) = named, standing
     fdi["types"]["surface"]["estimator_excluded"][RUDDER] = excluded
     assert (f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
@@ -205,6 +205,6 @@ def test_a_parameter_is_said_of_its_own_surface_and_type(s):
     apart(low=sets["feasible_sets"]["low"], high=sets["feasible_sets"]["high"])
     for kind, off in ((STUCK, 0.0), (BIAS, 0.0), (CONSTANT_LOSS, 1.0)):
         low, high = sets["feasible_sets"]["low"][s, kind] - off, sets["feasible_sets"]["high"][s, kind] - off
-        assert TYPES[kind].estimate_interval(fdi, s, kind) == pytest.approx((low, high))
+        assert TYPES[kind].estimate_parameter_interval(fdi, s, kind) == pytest.approx((low, high))
     middle = 0.5 * (sets["feasible_sets"]["low"][s, STUCK] + sets["feasible_sets"]["high"][s, STUCK])
-    assert TYPES[STUCK].estimate(fdi, s, STUCK) == pytest.approx(middle)
+    assert TYPES[STUCK].estimate_parameter(fdi, s, STUCK) == pytest.approx(middle)

@@ -44,7 +44,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     (
         surface["actuator"]["travel_low"],
         surface["actuator"]["travel_high"],
-        surface["actuator"]["lag_share_per_substep"],
+        surface["actuator"]["approach_share_per_substep"],
         surface["actuator"]["max_motion_per_substep"],
     ) = LOW, HIGH, 0.5, 0.1
     surface["actuator"]["reachable_low"], surface["actuator"]["reachable_high"] = (
@@ -446,7 +446,7 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
         judged(TYPES[kind].consistent_interval, fdi, surface, kind, 5)
         assert surface["feasible_sets"]["excluded"][kind] == excluded
     if kind == STUCK:
-        assert TYPES[kind].estimate(fdi, 0, kind) == pytest.approx(0.175)
+        assert TYPES[kind].estimate_parameter(fdi, 0, kind) == pytest.approx(0.175)
 
 
 @pytest.mark.parametrize(
@@ -512,7 +512,7 @@ def test_where_types_have_a_surface():
     surface["actuator"]["travel_low"] = LOW
     assert on(held_surface.hardover_up_deflection_range, fdi, surface, UP) == pytest.approx((0.14, HIGH))
     assert on(held_surface.hardover_down_deflection_range, fdi, surface, DOWN) == pytest.approx((LOW, 0.16))
-    assert [TYPES[kind].estimate(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
+    assert [TYPES[kind].estimate_parameter(fdi, 0, kind) for kind in (FLOAT, UP, DOWN)] == [
         0.0,
         HIGH,
         LOW,
@@ -598,7 +598,7 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
         fdi, surface = released(low=0.2, high=0.2, order=0.9, judged=(shown, shown), instants=instants)
         (
             fdi["types"]["config"]["frames_per_block"],
-            surface["actuator"]["lag_share_per_substep"],
+            surface["actuator"]["approach_share_per_substep"],
             surface["actuator"]["max_motion_per_substep"],
         ) = (
             length,

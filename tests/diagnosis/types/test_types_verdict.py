@@ -69,7 +69,7 @@ def new_case(**left):
     (
         fdi["types"]["surface"]["status"]["may_be_sole_fault"],
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"],
-        fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"],
+        fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"],
     ) = 1, 99, 99
     fdi["types"]["surface"]["actuator"]["travel_low"], fdi["types"]["surface"]["actuator"]["travel_high"] = (
         -0.4,
@@ -173,7 +173,7 @@ def test_a_surface_is_possible_by_its_estimator_or_by_deduction():
         False,
         True,
     ]
-    fdi["types"]["surface"]["status"]["decision_basis"] = (
+    fdi["types"]["surface"]["status"]["can_be_at_fault_basis"] = (
         DEDUCED_HEALTHY,
         DEDUCED_FAULTY,
         DEDUCED_FAULTY,
@@ -265,7 +265,7 @@ def test_a_bias_that_grows_may_look_like_a_jam_or_a_loss():
 )
 def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, found, in_coarse_sets):
     """In sets that errors declared of our own make coarse, a constant proves nothing: one type of all."""
-    fdi, surface = one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence)
+    fdi, surface = one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence)
     surface["oscillatory"]["n_half_cycles"] = half_cycles
     assert on(verdict.fault_type_on_surface, fdi, surface) == found
     fdi["types"]["config"]["has_declared_surface_errors"] = 1
@@ -274,7 +274,9 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
 
 @pytest.mark.parametrize("kind", [STUCK, VARYING_LOSS, GROWING_BIAS])
 def test_what_a_stop_may_have_hidden_is_waited_for(kind):
-    fdi, surface = one(kind, OSCILLATORY, evidence=99, n_frames_since_stop_could_hide=2 * PATIENCE - 1)
+    fdi, surface = one(
+        kind, OSCILLATORY, evidence=99, n_anomalous_frames_since_stop_could_hide=2 * PATIENCE - 1
+    )
     assert on(verdict.fault_type_on_surface, fdi, surface) == -1
     leave(surface, kind)  # an oscillation that has been excluded is not
     assert on(verdict.fault_type_on_surface, fdi, surface) == kind
@@ -328,7 +330,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
         evidence,
         has_declared_surface_errors,
     )
-    fdi["types"]["surface"]["evidence"]["n_frames_since_stop_could_hide"][FLAP] = evidence
+    fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
     assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
         assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
@@ -470,7 +472,7 @@ def test_orders_are_kept_for_the_frames_before():
     fdi, means = new_case(), np.zeros(1, frame_means_dtype(4)).view(np.recarray)[0]
     for frame in ((0.1, 0.2), (0.3, -0.1), (0.9, 0.0)):
         for k, order in enumerate(frame):
-            fdi["types"]["config"]["frames_per_block"], fdi["types"]["block"]["n_frames"] = 2, k
+            fdi["types"]["config"]["frames_per_block"], fdi["types"]["block"]["n_frames_so_far"] = 2, k
             means["G_min"], means["G_max"] = -1.0 - order, 2.0 - k
             means["u_min"], means["u_max"] = order - 0.01, order + 0.02
             on(registry.record_commands, fdi, np.full(4, order), means)
@@ -481,8 +483,8 @@ def test_orders_are_kept_for_the_frames_before():
     assert commands["min_command"] == pytest.approx([0.0, -0.1, 0.1])
     assert commands["max_command"] == pytest.approx([0.5, 0.3, 0.2])
     assert (
-        fdi["types"]["surface"][0]["commands"]["min_effectiveness"],
-        fdi["types"]["surface"][0]["commands"]["max_effectiveness"],
+        fdi["types"]["surface"][0]["commands"]["min_acceleration_per_rad"],
+        fdi["types"]["surface"][0]["commands"]["max_acceleration_per_rad"],
     ) == (
         -1.9,
         2.0,
@@ -493,12 +495,18 @@ def test_orders_are_kept_for_the_frames_before():
 
 def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
     fdi = new_case()
-    effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
+    effect, surface = (
+        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+        fdi["types"]["surface"][RUDDER],
+    )
     effect["regressor"], surface["last_observation"]["weighted_mean_error_per_position_range"] = (
         (0.5, 0.0, -2.0),
         0.07,
     )
-    surface["commands"]["min_effectiveness"], surface["commands"]["max_effectiveness"] = -2.1, -1.8
+    surface["commands"]["min_acceleration_per_rad"], surface["commands"]["max_acceleration_per_rad"] = (
+        -2.1,
+        -1.8,
+    )
     locate(fdi, RUDDER, np.zeros(3), np.zeros(3), effect)
     assert (
         surface["last_observation"]["weighted_mean_error_per_position_range"],
@@ -508,7 +516,10 @@ def test_what_the_effectiveness_varies_by_is_a_share_of_its_mean():
 
 def test_a_surface_is_where_the_innovation_puts_it():
     fdi = new_case()
-    effect, surface = fdi["isolation"]["estimator"][4 + RUDDER]["effect"], fdi["types"]["surface"][RUDDER]
+    effect, surface = (
+        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+        fdi["types"]["surface"][RUDDER],
+    )
     effect["regressor"], effect["acceleration_at_zero_theta"] = (
         (0.5, 0.0, -2.0),
         (-0.05, 0.0, 0.2),
@@ -603,14 +614,17 @@ def test_evidence_counts_for_a_swing_since_a_stop_could_last_hide_one():
             0.2,
         )
         on(registry.judge_previous_frame, fdi)
-        counted.append(int(surface["evidence"]["n_frames_since_stop_could_hide"]))
+        counted.append(int(surface["evidence"]["n_anomalous_frames_since_stop_could_hide"]))
     assert counted == [1, 2, 0, 1, 0, 1, 2, 3]
     assert surface["evidence"]["n_anomalous_frames"] == 8
 
 
 def test_where_a_stop_is_follows_the_surface_by_a_frame():
     fdi = new_case()
-    surface, effect = fdi["types"]["surface"][RUDDER], fdi["isolation"]["estimator"][4 + RUDDER]["effect"]
+    surface, effect = (
+        fdi["types"]["surface"][RUDDER],
+        fdi["isolation"]["estimator"][4 + RUDDER]["frame_mean_effect"],
+    )
     effect["regressor"], effect["error_bound"], bound = (
         (0.5, 0.0, -2.0),
         (9.0, 9.0, 0.02),
@@ -704,11 +718,11 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
             noise[k],
             noise[k + 1],
         )
-        fdi["isolation"]["estimator"]["effect"]["regressor"][:8] = Z[k]
-        fdi["isolation"]["estimator"]["effect"]["acceleration_at_zero_theta"][:8] = offset[k]
-        fdi["isolation"]["estimator"]["effect"]["error_bound"][:8] = spread[k]
+        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][:8] = Z[k]
+        fdi["isolation"]["estimator"]["frame_mean_effect"]["acceleration_at_zero_theta"][:8] = offset[k]
+        fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][:8] = spread[k]
         on(registry.observe_and_judge_block, fdi)
-        assert fdi["types"]["block"]["n_frames"] == (k + 1) % length
+        assert fdi["types"]["block"]["n_frames_so_far"] == (k + 1) % length
         assert fdi["types"]["frame_index"] == (k + 1 == length)
     assert fdi["types"]["block"]["mean_innovation"] == pytest.approx(innovation.mean(axis=0))
     ends = (noise[0] + noise[-1]) / (length * DT)
@@ -846,14 +860,14 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         elevator["last_observation"]["healthy_position"],
     ) = 0.1, 0.14, 0.0
     (
-        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + ELEVATOR, PITCH],
-        fdi["isolation"]["estimator"]["effect"]["regressor"][4 + FLAP, PITCH],
+        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][4 + ELEVATOR, PITCH],
+        fdi["isolation"]["estimator"]["frame_mean_effect"]["regressor"][4 + FLAP, PITCH],
     ) = (
         -10.0,
         2.0,
     )
-    fdi["isolation"]["estimator"]["effect"]["error_bound"][4 + ELEVATOR, PITCH] = 0.01
-    fdi["isolation"]["estimator"]["effect"]["error_bound"][4 + FLAP, PITCH] = 0.02
+    fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][4 + ELEVATOR, PITCH] = 0.01
+    fdi["isolation"]["estimator"]["frame_mean_effect"]["error_bound"][4 + FLAP, PITCH] = 0.02
     (
         fdi["bound"]["frame_innovation_bound"][PITCH],
         fdi["bank"]["output"]["innovation"][PITCH],
@@ -863,7 +877,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         -1.2 + 0.4,
         0.05,
     )
-    on(pairs.locate_pitch_surfaces, fdi)
+    on(pairs.observe_pitch_surfaces, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (
         flap["last_observation"]["position_low"],
@@ -876,8 +890,8 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         0.14,
     )
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
-    on(pairs.locate_pitch_surfaces, fdi)
-    assert flap["status"]["decision_basis"] == DEDUCED_HEALTHY
+    on(pairs.observe_pitch_surfaces, fdi)
+    assert flap["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY
 
 
 @pytest.mark.parametrize(("innovation", "is_anomalous"), [(0.03, 0), (0.031, 1), (-0.031, 1)])
@@ -892,7 +906,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
         0.03,
         innovation,
     )
-    on(pairs.locate_pitch_surfaces, fdi)
+    on(pairs.observe_pitch_surfaces, fdi)
     assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [
         0,
         is_anomalous,
@@ -914,9 +928,12 @@ def test_what_is_known_of_the_first_is_kept_once_it_has_settled():
     elevator["feasible_sets"]["excluded"][STUCK], elevator["feasible_sets"]["low"][STUCK] = 1, 0.12
     for k in range(PATIENCE - 1):
         on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
-        assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.1, k + 1)
+        assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (
+            0.1,
+            k + 1,
+        )
     on(pairs.store_first_pitch_fault_sets, fdi, ELEVATOR)
-    assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_exclusion"]) == (0.12, 0)
+    assert (known["low"][STUCK], fdi["types"]["pair"]["n_frames_since_unstored_exclusion"]) == (0.12, 0)
 
 
 def test_a_second_begins_with_what_was_known_of_the_first():
@@ -939,7 +956,7 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible_sets"]["excluded"].any()
     for surface in (elevator, flap):
-        assert (surface["status"]["may_be_sole_fault"], surface["status"]["decision_basis"]) == (
+        assert (surface["status"]["may_be_sole_fault"], surface["status"]["can_be_at_fault_basis"]) == (
             0,
             DEDUCED_FAULTY,
         )
@@ -975,7 +992,7 @@ def test_when_a_first_fault_in_pitch_is_known_well_enough(kinds, evidence, patie
         bool(
             on(
                 pairs.alternative_types_would_have_shown,
-                *one(*kinds, evidence=evidence, n_frames_since_stop_could_hide=evidence),
+                *one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence),
             )
         )
         == patient
@@ -1039,18 +1056,23 @@ def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
     conclude(fdi, pairs.decide_pair_isolation, 3.0)
     assert not fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR]
-    assert not on(pairs.is_accommodated, fdi, ELEVATOR)
+    assert not on(pairs.should_be_accommodated, fdi, ELEVATOR)
 
 
 def test_the_likeliest_in_pitch_is_acted_upon_until_one_is_named():
     fdi = decided()
-    assert [bool(on(pairs.is_accommodated, fdi, s)) for s in range(4)] == [False, True, False, False]
+    assert [bool(on(pairs.should_be_accommodated, fdi, s)) for s in range(4)] == [False, True, False, False]
     only_flap = decided(aileron=None, rudder=None, elevator=COURSES)
-    assert [bool(on(pairs.is_accommodated, only_flap, s)) for s in range(4)] == [False, False, False, True]
+    assert [bool(on(pairs.should_be_accommodated, only_flap, s)) for s in range(4)] == [
+        False,
+        False,
+        False,
+        True,
+    ]
     assert not on(pairs.is_pitch_surface_isolated, fdi)
     fdi["types"]["surface"]["status"]["is_isolated"] = 1, 0, 0, 1
     assert on(pairs.is_pitch_surface_isolated, fdi)
-    assert [bool(on(pairs.is_accommodated, fdi, s)) for s in range(4)] == [True, False, False, True]
+    assert [bool(on(pairs.should_be_accommodated, fdi, s)) for s in range(4)] == [True, False, False, True]
 
 
 def test_the_verdict_is_that_of_the_first_named():
@@ -1165,7 +1187,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     spread, room = rng.uniform(0.01, 0.02, (2, 2)), np.array([0.03, 0.02])
     off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
     for k, s in enumerate((AILERON, RUDDER)):
-        effect = fdi["isolation"]["estimator"][4 + s]["effect"]
+        effect = fdi["isolation"]["estimator"][4 + s]["frame_mean_effect"]
         effect["regressor"][[ROLL, YAW]], effect["error_bound"][[ROLL, YAW]] = Z[:, k], spread[:, k]
         fdi["types"]["surface"][s]["last_observation"]["healthy_position"] = command[k]
     fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["frame_innovation_bound"][[ROLL, YAW]] = (
@@ -1197,7 +1219,7 @@ def test_a_second_pitch_fault_is_named_once_it_shows():
         ELEVATOR,
         (1, 0, 1, 0),
     )
-    fdi["types"]["surface"]["status"]["decision_basis"] = 0, DEDUCED_FAULTY, 0, DEDUCED_FAULTY
+    fdi["types"]["surface"]["status"]["can_be_at_fault_basis"] = 0, DEDUCED_FAULTY, 0, DEDUCED_FAULTY
     (
         fdi["types"]["surface"]["status"]["fault_type"][ELEVATOR],
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][FLAP],
@@ -1208,7 +1230,7 @@ def test_a_second_pitch_fault_is_named_once_it_shows():
     on(pairs.decide_pitch_isolation, fdi, 5.0)
     assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 1]
     assert fdi["types"]["surface"]["status"]["fault_type"].tolist()[1::2] == [BIAS, STUCK]
-    fdi["types"]["surface"]["status"]["decision_basis"][FLAP] = DEDUCED_HEALTHY
+    fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][FLAP] = DEDUCED_HEALTHY
     on(pairs.decide_pitch_isolation, fdi, 6.0)
     assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
 

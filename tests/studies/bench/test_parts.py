@@ -29,12 +29,12 @@ def test_the_loops_own_kernels_are_left_as_they_were():
 
     from beaver_ftc.diagnosis import isolation
 
-    before = stepping.fly_on, isolation.predict_estimators, compiled.kernel
+    before = stepping.fly_on, isolation.advance_estimators, compiled.kernel
     frame_with(1)
     from beaver_ftc.diagnosis import isolation as isolation_now
     from beaver_ftc.loop import stepping as stepping_now
 
-    assert (stepping_now.fly_on, isolation_now.predict_estimators, compiled.kernel) == before
+    assert (stepping_now.fly_on, isolation_now.advance_estimators, compiled.kernel) == before
 
 
 def test_with_reading_alone_the_truth_is_read_and_nothing_else_happens():

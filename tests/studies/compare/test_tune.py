@@ -9,7 +9,7 @@ import pytest
 from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
     TUNED_FILE,
-    TUNED_GROUP_NAMES,
+    TUNED_FILE_KEY_BY_PLUGIN_GROUP,
     tuned_parameters,
     tuned_values,
 )
@@ -34,7 +34,7 @@ from flying import scenario
 
 SHIPPED = json.loads(TUNED_FILE.read_text())
 ROWS = [pytest.param(row, id=f"{row['grade']}-{row['kind']}-{row['name']}") for row in SHIPPED["methods"]]
-GROUPS = {kind: group for group, kind in TUNED_GROUP_NAMES.items()}
+GROUPS = {kind: group for group, kind in TUNED_FILE_KEY_BY_PLUGIN_GROUP.items()}
 MINE = """
 from beaver_ftc.diagnosis.rivals.observer import ConstantThresholdObserver
 

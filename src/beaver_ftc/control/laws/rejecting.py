@@ -455,7 +455,7 @@ def accommodate(control, assessment, faults, prediction, measured):
     for s in range(surfaces.output.target.size):
         target = reported(surfaces.output, assessment, faults, s, 0.0, False)
         start = start_of(surfaces.output, assessment, s, False)
-        if assessment.is_cause_unknown and memory.estimator.active:
+        if assessment.no_surface_to_accommodate and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
         elif assessment.accommodation_mode[s] != GIVE_UP:
             target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)

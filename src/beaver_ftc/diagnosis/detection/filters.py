@@ -245,9 +245,9 @@ def update_max_residual_over_threshold(bank):
 @kernel
 def fault_acceleration_range(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
-    acceleration_at_zero_theta = fie.effect.acceleration_at_zero_theta[i]
-    acceleration_per_theta = fie.effect.regressor[i]
-    spread = fie.effect.error_bound[i]
+    acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
+    acceleration_per_theta = fie.frame_mean_effect.regressor[i]
+    spread = fie.frame_mean_effect.error_bound[i]
     at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
     at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
     return min(0.0, at_theta_min, at_theta_max) - spread, max(0.0, at_theta_min, at_theta_max) + spread
@@ -256,7 +256,7 @@ def fault_acceleration_range(fie, i):
 @kernel
 def fault_acceleration_range_along_parity(fie):
     """The same along `fie.parity_direction` (3,), in which the fault has little effect."""
-    effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.effect, 0.0, 0.0, 0.0
+    effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.frame_mean_effect, 0.0, 0.0, 0.0
     for i in range(3):
         spread += abs(fie.parity_direction[i]) * effect.error_bound[i]
         acceleration_at_zero_theta += fie.parity_direction[i] * effect.acceleration_at_zero_theta[i]
@@ -276,11 +276,11 @@ def advance_reachable_residuals(bank, fie, dt):
             else fault_acceleration_range_along_parity(fie)
         )
         for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
-            fie.reachable_residual_low[m, channel] = (
-                decay_factor * fie.reachable_residual_low[m, channel] + dt * low
+            fie.reachable_bank_residual_low[m, channel] = (
+                decay_factor * fie.reachable_bank_residual_low[m, channel] + dt * low
             )
-            fie.reachable_residual_high[m, channel] = (
-                decay_factor * fie.reachable_residual_high[m, channel] + dt * high
+            fie.reachable_bank_residual_high[m, channel] = (
+                decay_factor * fie.reachable_bank_residual_high[m, channel] + dt * high
             )
 
 
@@ -296,9 +296,9 @@ def are_residuals_reachable(bank, fie, axes_share_theta):
         for i in range(3):
             residual, threshold = bank.output.residual[m, i], bank.output.threshold[m, i]
             if (
-                not fie.reachable_residual_low[m, i] - threshold
+                not fie.reachable_bank_residual_low[m, i] - threshold
                 <= residual
-                <= fie.reachable_residual_high[m, i] + threshold
+                <= fie.reachable_bank_residual_high[m, i] + threshold
                 and not fie.ignored_axes[i]
             ):
                 return False
@@ -306,9 +306,9 @@ def are_residuals_reachable(bank, fie, axes_share_theta):
             parity_threshold += abs(fie.parity_direction[i]) * threshold
         if (
             axes_share_theta
-            and not fie.reachable_residual_low[m, 3] - parity_threshold
+            and not fie.reachable_bank_residual_low[m, 3] - parity_threshold
             <= parity_residual
-            <= fie.reachable_residual_high[m, 3] + parity_threshold
+            <= fie.reachable_bank_residual_high[m, 3] + parity_threshold
         ):
             return False
     return True

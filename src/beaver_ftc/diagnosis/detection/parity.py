@@ -404,7 +404,7 @@ def column_entry_and_error(view, forces, bound, G, j):
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
         return force.previous_surface_effect_per_rad[s], force.surface_effect_per_rad_error_bound[s]
-    return G[i, s], bound.effectiveness_error_per_rad[i, s] if bound.has_declared_surface_errors else 0.0
+    return G[i, s], bound.surface_error_per_rad[i, s] if bound.has_declared_surface_errors else 0.0
 
 
 @kernel

@@ -27,15 +27,16 @@ from beaver_ftc.plugins import DETECTORS, LAWS
 TUNED_FILE = Path(__file__).with_name("tuned.json")
 EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE = "exact", "actuators", "errors"
 FLIGHT_GRADES = (EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE)
-TUNED_GROUP_NAMES = {DETECTORS: "detectors", LAWS: "laws"}
+# key in TUNED_FILE of each group of plug-ins
+TUNED_FILE_KEY_BY_PLUGIN_GROUP = {DETECTORS: "detectors", LAWS: "laws"}
 
-TunedValues = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> its values
+TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method -> its values
 
 
 @cache
-def tuned_parameters() -> TunedValues:
+def tuned_parameters() -> TunedValuesByGrade:
     """Return the parameters that `beaver-ftc compare --tune` chose, as shipped."""
-    grades: TunedValues = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
+    grades: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
     return grades
 
 
@@ -47,9 +48,11 @@ def flight_grade(has_errors: bool, ideal_actuators: bool) -> str:
     return EXACT_GRADE if ideal_actuators else ACTUATORS_GRADE
 
 
-def tuned_values(tuned: TunedValues, grade: str, group: str, method: str) -> dict[str, float]:
+def tuned_values(tuned: TunedValuesByGrade, grade: str, group: str, method: str) -> dict[str, float]:
     """The values chosen for a method on a grade of flights; none if nothing was chosen there."""
-    values: dict[str, float] = tuned.get(grade, {}).get(TUNED_GROUP_NAMES[group], {}).get(method, {})
+    values: dict[str, float] = (
+        tuned.get(grade, {}).get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[group], {}).get(method, {})
+    )
     return values
 
 
@@ -67,7 +70,7 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
     )
     tuned_options = {
         option: value
-        for group in TUNED_GROUP_NAMES
+        for group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
         for option, value in tuned_values(tuned_parameters(), grade, group, name).items()
     }
     return {**defaults, **tuned_options, **context.options}

@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.rivals.kalman import (
 _DIFFERENCE_STEP_RAD_S = (
     1e-6  # rad/s, for df/dx: f is quadratic in x, so a central difference is exact to rounding
 )
-N_STATES = 6
+N_STATES_WITHOUT_GUSTS = 6
 DEFAULT_OPTIONS = {
     "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
     "drift_per_s": 0.1,  # random walk of theta, 1/sqrt(s)
@@ -48,7 +48,7 @@ class EffectivenessFilter:
         self.context, self.options = context, rival_options(self.name, self.defaults, context)
         self.leading_surfaces = list(context.leading)
         self.gust_states = GustStates(context)
-        self.n_states = N_STATES + self.gust_states.n_states
+        self.n_states = N_STATES_WITHOUT_GUSTS + self.gust_states.n_states
         rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.z = np.zeros(self.n_states)
         self.P = np.diag(np.concatenate((rate_variance, [0.01] * 3, self.gust_states.initial_variance)))
@@ -66,7 +66,7 @@ class EffectivenessFilter:
         self.propagate(measured)
         nu = measured.x - self.z[:3]
         self.z, self.P, S = update_state(self.z, self.P, nu, self.R)
-        self.z[3:N_STATES] = np.clip(self.z[3:N_STATES], -1.0, 1.0)
+        self.z[3:N_STATES_WITHOUT_GUSTS] = np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 1.0)
         innovation_square = float(nu @ np.linalg.solve(S, nu))
         self.mean_innovation_square = self.averaging_decay * self.mean_innovation_square + (
             1.0 - self.averaging_decay
@@ -74,7 +74,7 @@ class EffectivenessFilter:
         return self.verdict(measured, self.statistic(innovation_square))
 
     def propagate(self, measured: Measured) -> None:
-        """Bring z and P over the elapsed frame."""
+        """Predict z and P over the elapsed frame."""
         raise NotImplementedError
 
     def statistic(self, innovation_square: float) -> float:
@@ -91,7 +91,7 @@ class EffectivenessFilter:
 
     def wald_statistics(self) -> np.ndarray:
         """theta^2 / variance of each surface, chi-square with one degree of freedom when healthy, (3,)."""
-        return self.z[3:N_STATES] ** 2 / np.diagonal(self.P)[3:N_STATES]
+        return self.z[3:N_STATES_WITHOUT_GUSTS] ** 2 / np.diagonal(self.P)[3:N_STATES_WITHOUT_GUSTS]
 
     def verdict(self, measured: Measured, statistic: float) -> Verdict:
         """Name the surface whose theta is most significantly off, or none: innovations misfit, or a surface
@@ -100,7 +100,7 @@ class EffectivenessFilter:
         if not self.detected:
             return Verdict(statistic=statistic)
         effectiveness = np.ones(len(self.context.surfaces))
-        effectiveness[self.leading_surfaces] += np.clip(self.z[3:N_STATES], -1.0, 0.0)
+        effectiveness[self.leading_surfaces] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
         most_significant = int(np.argmax(self.wald_statistics()))
         if self.mean_innovation_square > 3.0 * self.options["misfit"] or self.z[3 + most_significant] > 0.0:
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
@@ -123,11 +123,12 @@ class AugmentedEkf(EffectivenessFilter):
         F = self.jacobian(measured)
         dt = self.context.dt_s
         self.z[:3] += dt * (
-            measured.acceleration + measured.contribution[:, self.leading_surfaces] @ self.z[3:N_STATES]
+            measured.acceleration
+            + measured.contribution[:, self.leading_surfaces] @ self.z[3:N_STATES_WITHOUT_GUSTS]
         )
         if self.gust_states.n_states:
-            self.z[:3] += self.gust_states.rate_effect @ self.z[N_STATES:]
-            self.z[N_STATES:] *= self.gust_states.decay_factor
+            self.z[:3] += self.gust_states.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
+            self.z[N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
         self.P = F @ self.P @ F.T
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
@@ -138,9 +139,11 @@ class AugmentedEkf(EffectivenessFilter):
         steps = _DIFFERENCE_STEP_RAD_S * np.eye(3)
         f_at_steps = f(np.concatenate((measured.x + steps, measured.x - steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
-        F[:3, 3:N_STATES] = dt * measured.contribution[:, self.leading_surfaces]
-        F[:3, N_STATES:] = self.gust_states.rate_effect
-        F[range(N_STATES, self.n_states), range(N_STATES, self.n_states)] = self.gust_states.decay_factor
+        F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surfaces]
+        F[:3, N_STATES_WITHOUT_GUSTS:] = self.gust_states.rate_effect
+        F[range(N_STATES_WITHOUT_GUSTS, self.n_states), range(N_STATES_WITHOUT_GUSTS, self.n_states)] = (
+            self.gust_states.decay_factor
+        )
         return F
 
     def statistic(self, innovation_square: float) -> float:
@@ -155,7 +158,7 @@ class AugmentedUkf(EffectivenessFilter):
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {
         "alarm": 20.0,
         "allowance": 3.0,
-        "spread": float(N_STATES),
+        "spread": float(N_STATES_WITHOUT_GUSTS),
     }
 
     def reset(self, context: Context) -> None:
@@ -166,24 +169,27 @@ class AugmentedUkf(EffectivenessFilter):
     def propagate(self, measured: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
         points, weights = sigma_points(self.z, self.P, self.options["spread"] + self.gust_states.n_states)
-        points = self.dynamics(points, measured)
+        points = self.propagate_points(points, measured)
         self.z = weights @ points
         deviations = points - self.z
         self.P = (deviations.T * weights) @ deviations
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
-    def dynamics(self, points: np.ndarray, measured: Measured) -> np.ndarray:
+    def propagate_points(self, points: np.ndarray, measured: Measured) -> np.ndarray:
         """Each sigma point a frame later; f differs between points by its change from the measured state."""
         dt, f = self.context.dt_s, self.context.model.f
         propagated = points.copy()
         f_difference = f(points[:, :3], measured.y) - f(measured.x, measured.y)
         loss_acceleration = np.array(
-            [measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES] for point in points]
+            [
+                measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES_WITHOUT_GUSTS]
+                for point in points
+            ]
         )
         propagated[:, :3] += dt * (measured.acceleration + f_difference + loss_acceleration)
         if self.gust_states.n_states:
-            propagated[:, :3] += points[:, N_STATES:] @ self.gust_states.rate_effect.T
-            propagated[:, N_STATES:] *= self.gust_states.decay_factor
+            propagated[:, :3] += points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
+            propagated[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
         return propagated
 
     def statistic(self, innovation_square: float) -> float:

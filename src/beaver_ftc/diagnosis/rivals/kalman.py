@@ -17,10 +17,10 @@ from beaver_ftc.design.context import Context
 
 
 class GustStates:
-    """n: states, 3, or none without a declaration. keep (n,): their decay over a frame.
+    """The model of turbulence: rotation of the air about n_states axes, 3, or 0 if no turbulence is declared.
 
-    noise (n,): their process noise, variance. effect (3, n): what they add to the rates over a frame.
-    variance (n,): what is known of them at the start.
+    decay_factor (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
+    rate_effect (3, n): dt B, change of the rates over a frame per rad/s of the air.
     """
 
     def __init__(self, context: Context) -> None:

@@ -44,8 +44,9 @@ class RecursiveLeastSquaresFit:
         return prediction_error
 
 
-class InputOutputPair:
-    """One input, one output: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a constant."""
+class InputOutputPredictionTest:
+    """Test of the prediction of one output by one input: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a
+    constant."""
 
     def __init__(self, forgetting_factor: float, averaging_decay: float, min_error_std: float) -> None:
         self._model = RecursiveLeastSquaresFit(5, forgetting_factor, 1e4)
@@ -55,7 +56,7 @@ class InputOutputPair:
         self.error_mean, self.error_variance = 0.0, 0.0
 
     def step(self, u: float, y: float) -> float:
-        """|z| of the newest output; then learn from it."""
+        """Return |z| of the newest output, then learn from it."""
         prediction_error = self._model.step(self._regressor, y)
         score = abs(prediction_error - self.error_mean) / sqrt(self.error_variance + self._min_error_std**2)
         self.error_mean += (1.0 - self._averaging_decay) * (prediction_error - self.error_mean)
@@ -86,7 +87,8 @@ class RlsMonitor:
         averaging_decay = exp(-context.dt_s / self.options["score_s"])
         min_error_std = np.hypot(self.options["floor_rad_s"], context.declared.gyro_rad_s)
         self.pairs = [
-            InputOutputPair(forgetting_factor, averaging_decay, float(min_error_std[i])) for i in range(3)
+            InputOutputPredictionTest(forgetting_factor, averaging_decay, float(min_error_std[i]))
+            for i in range(3)
         ]
         self.leading_surfaces, self.leaders = context.leading, context.leaders
         self.verdict = Verdict()

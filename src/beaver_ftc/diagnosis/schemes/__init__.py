@@ -1,7 +1,7 @@
 """The diagnosis as a whole: its record, its configuration, and the kernels of the scheme in charge.
 
 `begin_scheme`, `advance_to_frame`, `update_verdict`, `prepare_next_frame` and `accumulate_substep` call the
-kernel of a scheme by its number (adaptive_estimators.CompiledScheme; state.SCHEME_PATHS). The frame
+kernel of a scheme by its number (adaptive_estimators.CompiledScheme; state.SCHEME_KERNEL_PATHS). The frame
 (loop/frame.py) calls them.
 
 fdi: of `diagnosis_dtype`; t s.
@@ -22,7 +22,7 @@ from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme
-from beaver_ftc.diagnosis.state import SCHEME_PATHS, STATISTICAL_DETECTOR
+from beaver_ftc.diagnosis.state import SCHEME_KERNEL_PATHS, STATISTICAL_DETECTOR
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.declared import Declared
@@ -133,7 +133,7 @@ def _load_scheme(path: str) -> CompiledScheme:
     return scheme
 
 
-SCHEMES = tuple(map(_load_scheme, SCHEME_PATHS))
+SCHEMES = tuple(map(_load_scheme, SCHEME_KERNEL_PATHS))
 
 begin_scheme = one_of([scheme.begin_scheme for scheme in SCHEMES])
 advance_to_frame = one_of([scheme.advance_to_frame for scheme in SCHEMES])

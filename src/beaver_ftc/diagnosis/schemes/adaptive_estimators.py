@@ -101,7 +101,7 @@ def update_isolation_estimators(fdi, prediction):
         frame_means.Gu_tolerance_for_fault_change,
     )
     if is_detected:
-        isolation.predict_estimators(
+        isolation.advance_estimators(
             isolation_record, bound, prediction.x_before, frame_means.acceleration, config.dt
         )
 
@@ -193,7 +193,7 @@ def parity_excludes(fdi, fie):
     detector, position_estimator = fdi.statistical, fdi.layout.position_estimator[fie.surface]
     views, effect_column = (
         detector.views[: detector.n_views],
-        fdi.isolation.estimator[position_estimator].effect.regressor,
+        fdi.isolation.estimator[position_estimator].frame_mean_effect.regressor,
     )
     return parity.excludes_surface(
         views, detector.test_config, detector.forces, detector.gust, fie.surface, effect_column
@@ -211,7 +211,7 @@ def exclude_by_worst_case(fdi, x, t, isolation_has_run):
 @kernel
 def decide_isolated_loss(fdi, t):
     """Isolate the loss of effectiveness whose estimator is the only one left."""
-    conclusion.record_isolated_estimator(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
+    conclusion.replace_isolated_estimator(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
 
 
 @apart
@@ -488,9 +488,9 @@ def detect_alarm_axis_or_engine_failure(fdi, y, t):
     if not conclusion_record.detected and monitors.detect_engine_failure(
         fdi.engine_monitor, engine_asymmetry_bound, y
     ):
-        conclusion.record_isolated_estimator(conclusion_record, UNANTICIPATED, t)
+        conclusion.replace_isolated_estimator(conclusion_record, UNANTICIPATED, t)
         return YAW
-    return filters.alarm_axis(fdi.bank, fdi.config.authority, fdi.statistical.alarm)
+    return filters.alarm_axis(fdi.bank, fdi.config.alarm_authority, fdi.statistical.alarm)
 
 
 @apart

@@ -70,12 +70,12 @@ class DeflectionRelation(NamedTuple):
 
     p = gain u + theta, or p = (gain + theta) u where theta is a share of the command (theta_is_share).
 
-    theta_range(low, high): the least and greatest theta; low, high: the travel, rad.
+    theta_range_for_travel(low, high): returns the least and greatest theta; low, high: the travel, rad.
     """
 
     gain: float
     theta_is_share: bool
-    theta_range: Callable[[float, float], tuple[float, float]]
+    theta_range_for_travel: Callable[[float, float], tuple[float, float]]
 
 
 def _no_estimate(fdi: np.void, s: int, type_index: int) -> None:
@@ -143,24 +143,30 @@ class FaultType:
     accommodation_mode      SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET or WAIT_FOR_SURFACE
     other_accommodation_modes
                             other modes that serve it
-    limit_type_name         name of the type that it becomes at the end of its range: where both are left, the
+    type_name_at_end_of_range
+                            name of the type that it becomes at the end of its range: where both are left, the
                             modes of that one serve this one too
     deflection_error(surface, type_index)
                             kernel: how far the surface is off its command, rad; not finite if not known
-    deflection_error_rank   the type of least rank, of those left, gives the deflection error
+    deflection_error_precedence
+                            of the types left, the one with the least number gives the deflection error
 
     What shows from outside that it is excluded, and by which deflections it differs from another:
 
     deflection_relation     deflection by command and one parameter, where that is all that the type says; of
                             a type that is not constant theta may differ from frame to frame
-    excluding_comparison    name of the comparison of frames that excludes it, where one frame or two do not
+    excluding_frame_comparison
+                            name of the comparison of frames that excludes it, where one frame or two do not
                             suffice: "offset", "growing offset", "runaway", "swing" or "approach"
 
     Words, Python functions (verdict.py):
 
-    estimate(fdi, s, type_index)          its parameter, None without one
-    estimate_interval(fdi, s, type_index) the set that the parameter is certain to lie in, or None
-    frequency_rad_s(fdi, s, type_index)   of a periodic type, or None
+    estimate_parameter(fdi, s, type_index)
+                            its parameter, None without one
+    estimate_parameter_interval(fdi, s, type_index)
+                            the set that the parameter is certain to lie in, or None
+    estimate_frequency_rad_s(fdi, s, type_index)
+                            of a periodic type, or None
     """
 
     name: str
@@ -188,14 +194,14 @@ class FaultType:
     stop_direction: int = 0
     accommodation_mode: int = SUBTRACT_OFFSET
     other_accommodation_modes: tuple[int, ...] = ()
-    limit_type_name: str = ""
+    type_name_at_end_of_range: str = ""
     deflection_error: Kernel | None = None
-    deflection_error_rank: int = 100
+    deflection_error_precedence: int = 100
     deflection_relation: DeflectionRelation | None = None
-    excluding_comparison: str = ""
-    estimate: Callable[[np.void, int, int], float | None] = _no_estimate
-    estimate_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
-    frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
+    excluding_frame_comparison: str = ""
+    estimate_parameter: Callable[[np.void, int, int], float | None] = _no_estimate
+    estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
+    estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
 
 
 @kernel
@@ -219,7 +225,7 @@ def feasible_set(fdi: np.void, s: int, type_index: int) -> tuple[float, float]:
 
 
 def parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
-    """The middle of that set."""
+    """The middle of the feasible set of a type's parameter on surface s."""
     low, high = feasible_set(fdi, s, type_index)
     return 0.5 * (low + high)
 
@@ -260,7 +266,7 @@ def exclude_type(surface, type_index):
 
 @kernel
 def restore_first_pitch_fault_sets(surface):
-    """Return to the sets that were kept when the surface was named (pairs.py)."""
+    """Restore the sets that were stored when the surface was isolated (pairs.py)."""
     surface.feasible_sets.low[:], surface.feasible_sets.high[:] = (
         surface.first_pitch_fault_sets.low,
         surface.first_pitch_fault_sets.high,
@@ -294,7 +300,7 @@ def reset_observation(surface):
 
 @kernel
 def shift_observations(surface):
-    """Make room for the elapsed frame."""
+    """Shift the observations by one frame: the last becomes the judged one, and that one the earlier one."""
     copy_observation(surface.earlier_observation, surface.judged_observation)
     copy_observation(surface.judged_observation, surface.last_observation)
 
@@ -331,7 +337,7 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     )
     observation.weighted_mean_error_per_position_range = (
         0.25
-        * (commands.max_effectiveness - commands.min_effectiveness)
+        * (commands.max_acceleration_per_rad - commands.min_acceleration_per_rad)
         / abs(hypothesis_effect.regressor[axis])
     )
     observation.position_low, observation.position_high = fie.theta_min, fie.theta_max
@@ -377,8 +383,9 @@ def set_observed_deflection_error(surface, error, tolerance):
 
 
 @kernel
-def set_explained_position(surface, low, high):
-    """A surface whose fault is known was between low and high (rad): that explains what was wrong."""
+def set_position_of_known_fault(surface, low, high):
+    """Set the interval (low, high) rad in which a surface with a known fault was; the frame is no longer
+    anomalous for it."""
     (
         surface.last_observation.position_low,
         surface.last_observation.position_high,
@@ -388,13 +395,13 @@ def set_explained_position(surface, low, high):
 
 @kernel
 def set_is_anomalous(surface, is_anomalous):
-    """Replace whether something was wrong in the elapsed frame."""
+    """Set whether the elapsed frame is anomalous: more than the declared uncertainty was at work."""
     surface.last_observation.is_anomalous = is_anomalous
 
 
 @kernel
 def clear_anomalies(surface):
-    """Nothing has been wrong so far."""
+    """Mark all three observations as not anomalous."""
     surface.last_observation.is_anomalous = surface.judged_observation.is_anomalous = (
         surface.earlier_observation.is_anomalous
     ) = 0
@@ -410,8 +417,8 @@ def observed_deflection_error(surface):
     )
 
 
-def read_deflection_error(surface: np.void) -> float:
-    """The same of a record outside compiled code, rad."""
+def read_observed_deflection_error(surface: np.void) -> float:
+    """`observed_deflection_error` of a record outside compiled code, rad."""
     observation = surface["last_observation"]
     return float(
         0.5 * (observation["position_low"] + observation["position_high"]) - observation["healthy_position"]

@@ -25,13 +25,13 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     clear_anomalies,
     observed_deflection_error,
+    registry,
     restore_first_pitch_fault_sets,
-    set_explained_position,
     set_is_anomalous,
     set_observed_deflection_error,
+    set_position_of_known_fault,
     verdict,
 )
-from beaver_ftc.diagnosis.types import registry as frames
 from beaver_ftc.diagnosis.types.registry import (
     ACCOMMODATION_MODES,
     N_CONSTANT_PARAMETER_TYPES,
@@ -47,7 +47,7 @@ from beaver_ftc.diagnosis.types.verdict import (
 
 @kernel
 def record_group_alarms(pair, bank):
-    """In which group of surfaces a filter of the bank has left its bound."""
+    """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for i in range(3):
         group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
         for filter_index in range(bank.config.n_filters):
@@ -61,8 +61,8 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
     innovation (3,), |eta| <= innovation_bound (3,) rad/s2."""
     aileron, rudder = layout.main[ROLL], layout.main[YAW]
     aileron_effect, rudder_effect = (
-        estimators[layout.position_estimator[aileron]].effect,
-        estimators[layout.position_estimator[rudder]].effect,
+        estimators[layout.position_estimator[aileron]].frame_mean_effect,
+        estimators[layout.position_estimator[rudder]].frame_mean_effect,
     )
     aileron_roll, aileron_yaw, rudder_roll, rudder_yaw = (
         aileron_effect.regressor[ROLL],
@@ -104,8 +104,9 @@ def possible_deflection_range_of_constant_types(config, surface, k):
 
 
 @kernel
-def locate_pitch_surfaces(types, layout, estimators, innovation, innovation_bound):
-    """Whether pitch shows a fault; after the begin of a second fault, where the second surface was."""
+def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bound):
+    """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
+    surface was."""
     first = types.pair.first_pitch_fault_surface
     if first != NO_SURFACE and not types.surface[first].status.may_be_sole_fault:
         locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound)
@@ -120,13 +121,13 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
     """Find the position of the second surface, given the sets of the first."""
     first = types.pair.first_pitch_fault_surface
     second = layout.partner[first]
-    first_effect = estimators[layout.position_estimator[first]].effect
-    second_effect = estimators[layout.position_estimator[second]].effect
+    first_effect = estimators[layout.position_estimator[first]].frame_mean_effect
+    second_effect = estimators[layout.position_estimator[second]].frame_mean_effect
     surface = types.surface[first]
     min_deflection, max_deflection = possible_deflection_range_of_constant_types(
         types.config, surface, types.frame_index
     )
-    set_explained_position(surface, min_deflection, max_deflection)
+    set_position_of_known_fault(surface, min_deflection, max_deflection)
     second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
     first_acceleration = first_regressor * observed_deflection_error(surface)
     tolerance = abs(first_regressor) * 0.5 * (max_deflection - min_deflection)
@@ -136,7 +137,7 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
         (innovation[PITCH] - first_acceleration) / second_regressor,
         tolerance / abs(second_regressor),
     ):
-        types.surface[second].status.decision_basis = verdict.DEDUCED_HEALTHY
+        types.surface[second].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
@@ -144,10 +145,10 @@ def observe_and_judge_pairs(types, layout, estimators, bank, innovation_bound):
     """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
     it."""
     record_group_alarms(types.pair, bank)
-    frames.infer_surface_positions(types, layout, estimators, bank.output.innovation, innovation_bound)
+    registry.infer_surface_positions(types, layout, estimators, bank.output.innovation, innovation_bound)
     locate_roll_and_yaw_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
-    locate_pitch_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
-    frames.judge_previous_frame(types)
+    observe_pitch_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
+    registry.judge_previous_frame(types)
 
 
 @kernel
@@ -164,7 +165,8 @@ def set_isolation_status(surface, is_isolated, type_index, t):
 
 @kernel
 def decide_roll_and_yaw_isolation(types, layout, t):
-    """Which of the two is at fault, if any. Returns whether the plane's fault is outside the class."""
+    """Set the isolation of the surfaces of roll and yaw. Returns whether the fault of this plane is outside
+    the class."""
     config, pair = types.config, types.pair
     roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     roll_can_be_at_fault, yaw_can_be_at_fault = can_be_at_fault(roll_surface), can_be_at_fault(yaw_surface)
@@ -207,12 +209,14 @@ def store_first_pitch_fault_sets(types, s):
             has_new_exclusion
             or surface.feasible_sets.excluded[type_index] != stored_sets.excluded[type_index]
         )
-    pair.n_frames_since_exclusion = pair.n_frames_since_exclusion + 1 if has_new_exclusion else 0
+    pair.n_frames_since_unstored_exclusion = (
+        pair.n_frames_since_unstored_exclusion + 1 if has_new_exclusion else 0
+    )
     if (
         pair.first_pitch_fault_surface != s
-        or pair.n_frames_since_exclusion >= types.config.slowest_half_cycle_frames
+        or pair.n_frames_since_unstored_exclusion >= types.config.slowest_half_cycle_frames
     ):
-        pair.first_pitch_fault_surface, pair.n_frames_since_exclusion = s, 0
+        pair.first_pitch_fault_surface, pair.n_frames_since_unstored_exclusion = s, 0
         stored_sets.low[:], stored_sets.high[:] = surface.feasible_sets.low, surface.feasible_sets.high
         stored_sets.excluded[:] = 1
         stored_sets.excluded[:N_CONSTANT_PARAMETER_TYPES] = surface.feasible_sets.excluded[
@@ -228,9 +232,9 @@ def begin_second_pitch_fault(types, layout):
         types.surface[layout.partner[types.pair.first_pitch_fault_surface]],
     )
     restore_first_pitch_fault_sets(first)
-    frames.restart_fault_types_of_surface(second)
+    registry.restart_fault_types_of_surface(second)
     for surface in (first, second):
-        surface.status.may_be_sole_fault, surface.status.decision_basis = 0, verdict.DEDUCED_FAULTY
+        surface.status.may_be_sole_fault, surface.status.can_be_at_fault_basis = 0, verdict.DEDUCED_FAULTY
         clear_anomalies(surface)
 
 
@@ -356,8 +360,8 @@ def is_pitch_surface_isolated(types, layout):
 
 
 @kernel
-def is_accommodated(types, layout, s):
-    """Whether the law acts on surface s: it is named, or the likeliest in pitch."""
+def should_be_accommodated(types, layout, s):
+    """Whether the law is to act on surface s: it is isolated, or it is the most likely one in pitch."""
     if types.surface[s].status.is_isolated:
         return True
     if (
@@ -377,7 +381,7 @@ def choose_pair_accommodation(types, layout):
     accommodated_surface, accommodation_mode = NO_SURFACE, -1
     for s, surface in enumerate(types.surface):
         verdict.set_accommodation_mode(surface, -1)
-        if is_accommodated(types, layout, s):
+        if should_be_accommodated(types, layout, s):
             is_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
             mode = verdict.choose_accommodation_mode(surface) if is_at_fault else SUBTRACT_OFFSET
             if verdict.update_fault_presence(types.config, surface, mode, is_at_fault):

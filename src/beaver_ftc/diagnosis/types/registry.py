@@ -88,7 +88,7 @@ def _kernels_by_type(name: str) -> dict[int, Kernel]:
     return {type_index: part for type_index, part in parts.items() if part is not None}
 
 
-def _looks_like(fault_type: FaultType, other_type: FaultType) -> bool:
+def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
     return other_type.name in fault_type.can_look_like
 
 
@@ -103,7 +103,7 @@ SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
 ERROR_DEPENDS_ON_COMMAND = _column_of_types("error_depends_on_command")
 MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
 CAN_LOOK_LIKE = np.array(
-    [[_looks_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]
+    [[_can_look_like(fault_type, other_type) for other_type in TYPES] for fault_type in TYPES]
 )
 MODE_SERVES_TYPE = np.array(
     [
@@ -112,14 +112,18 @@ MODE_SERVES_TYPE = np.array(
     ]
 )
 # Types that give the deflection error of a surface, in the order in which they are used.
-DEFLECTION_ERROR_ORDER = np.array(
+DEFLECTION_ERROR_TYPES_BY_PRECEDENCE = np.array(
     sorted(
-        _kernels_by_type("deflection_error"), key=lambda type_index: TYPES[type_index].deflection_error_rank
+        _kernels_by_type("deflection_error"),
+        key=lambda type_index: TYPES[type_index].deflection_error_precedence,
     ),
     dtype=int,
 )
-LIMIT_TYPE_INDEX = np.array(
-    [TYPE_NAMES.index(row.limit_type_name) if row.limit_type_name else -1 for row in TYPES]
+TYPE_INDEX_AT_END_OF_RANGE = np.array(
+    [
+        TYPE_NAMES.index(row.type_name_at_end_of_range) if row.type_name_at_end_of_range else -1
+        for row in TYPES
+    ]
 )
 
 
@@ -221,35 +225,38 @@ COMMANDS_RECORD = record(
     command_history=(N_COMMAND_BLOCKS_KEPT, MAX_FRAMES_PER_BLOCK), min_command=N_COMMAND_BLOCKS_KEPT,
     max_command=N_COMMAND_BLOCKS_KEPT,
     min_healthy_position=2, max_healthy_position=2,  # where a healthy surface was within it
-    min_effectiveness=float, max_effectiveness=float,  # its effectiveness within the elapsed frame or block
+    # G of the surface within the elapsed frame or block, on its dominant axis, rad/s2 per rad
+    min_acceleration_per_rad=float, max_acceleration_per_rad=float,
 )  # fmt: skip
 
 # Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
 # to zero.
 ACTUATOR_RECORD = record(
     travel_low=float, travel_high=float, reachable_low=float, reachable_high=float, min_runaway_rate=float,
-    lag_share_per_substep=float, max_motion_per_substep=float, min_rate_limited_motion_per_substep=float,
+    approach_share_per_substep=float, max_motion_per_substep=float, min_rate_limited_motion_per_substep=float,
 )  # fmt: skip
 
 # The set of each type's parameter: types/__init__.py.
 FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
-# Frames in which something was wrong, and of them those in which a surface that was given up was quiet, and
-# those since a stop could last hide something; the first, and where the surface was in it.
+# Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
+# rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
+# was in it, rad.
 EVIDENCE_RECORD = record(
     n_anomalous_frames=int,
     n_rest_frames=int,
-    n_frames_since_stop_could_hide=int,
+    n_anomalous_frames_since_stop_could_hide=int,
     first_anomalous_frame=int,
     first_anomalous_position_low=float,
     first_anomalous_position_high=float,
 )
 
-# Whether the surface may be the one at fault by itself, and what decides whether it can be (verdict.py);
+# Whether the surface may be the only one at fault; what decides whether it can be at fault:
+# DECIDED_BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
 STATUS_RECORD = record(
     may_be_sole_fault=int,
-    decision_basis=int,
+    can_be_at_fault_basis=int,
     is_isolated=int,
     isolated_at_s=float,
     fault_type=int,
@@ -280,17 +287,19 @@ TYPES_CONFIG_RECORD = record(
 )  # fmt: skip
 
 # Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
+# n_frames_since_unstored_exclusion: frames since a type was excluded on its surface that is not yet excluded
+# in the stored sets.
 FAULT_PAIR_RECORD = record(
     enabled=int,
     group_has_alarm=(int, 2),
     lateral_fault_outside_class=int,
     first_pitch_fault_surface=int,
-    n_frames_since_exclusion=int,
+    n_frames_since_unstored_exclusion=int,
 )
 
 # Blocks of frames.
 FRAME_BLOCK_RECORD = record(
-    n_frames=int, mean_innovation=3, mean_innovation_bound=3, gyro_error_change_bound_at_start=3
+    n_frames_so_far=int, mean_innovation=3, mean_innovation_bound=3, gyro_error_change_bound_at_start=3
 )
 
 
@@ -349,7 +358,7 @@ def configure_fault_types(
         rate_deg_s, actuator = getattr(scenario.actuators, surface_name).rate_limit_deg_s, surface["actuator"]
         actuator["travel_low"], actuator["travel_high"] = low, high
         actuator["reachable_low"], actuator["reachable_high"] = min(low, 0.0), max(high, 0.0)
-        actuator["lag_share_per_substep"], actuator["max_motion_per_substep"] = (
+        actuator["approach_share_per_substep"], actuator["max_motion_per_substep"] = (
             prediction_actuators["approach"][s],
             prediction_actuators["step"][s],
         )
@@ -376,7 +385,7 @@ def restart_fault_types_of_surface(surface):
     reset_observation(surface)
     surface.evidence.first_anomalous_frame = -1
     surface.evidence.n_anomalous_frames = surface.evidence.n_rest_frames = (
-        surface.evidence.n_frames_since_stop_could_hide
+        surface.evidence.n_anomalous_frames_since_stop_could_hide
     ) = 0
     reset_memory_each(surface)
 
@@ -389,7 +398,7 @@ def record_commands(types, commanded_rad, frame_means):
     frames_per_block = types.config.frames_per_block
     for s, surface in enumerate(types.surface):
         commands = surface.commands
-        if types.block.n_frames == 0:
+        if types.block.n_frames_so_far == 0:
             for age in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
                 commands.command_history[age, :frames_per_block] = commands.command_history[
                     age - 1, :frames_per_block
@@ -404,19 +413,19 @@ def record_commands(types, commanded_rad, frame_means):
                 commands.max_healthy_position[0],
             )
             commands.min_healthy_position[0], commands.max_healthy_position[0] = np.inf, -np.inf
-            commands.min_effectiveness, commands.max_effectiveness = np.inf, -np.inf
+            commands.min_acceleration_per_rad, commands.max_acceleration_per_rad = np.inf, -np.inf
         limited_command = min(
             max(commanded_rad[s], surface.actuator.travel_low), surface.actuator.travel_high
         )
-        commands.command_history[0, types.block.n_frames] = limited_command
+        commands.command_history[0, types.block.n_frames_so_far] = limited_command
         commands.min_command[0], commands.max_command[0] = (
             min(commands.min_command[0], limited_command),
             max(commands.max_command[0], limited_command),
         )
         commands.min_healthy_position[0] = min(commands.min_healthy_position[0], frame_means.u_min[s])
         commands.max_healthy_position[0] = max(commands.max_healthy_position[0], frame_means.u_max[s])
-        commands.min_effectiveness = min(commands.min_effectiveness, frame_means.G_min[s])
-        commands.max_effectiveness = max(commands.max_effectiveness, frame_means.G_max[s])
+        commands.min_acceleration_per_rad = min(commands.min_acceleration_per_rad, frame_means.G_min[s])
+        commands.max_acceleration_per_rad = max(commands.max_acceleration_per_rad, frame_means.G_max[s])
 
 
 @kernel
@@ -430,7 +439,7 @@ def infer_surface_positions(types, layout, estimators, innovation, innovation_bo
         shift_observations(surface)
         set_is_anomalous(surface, is_anomalous)
         fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.effect
+        effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
         infer_position(types.config, surface, fie, axis, innovation, innovation_bound, effect)
 
 
@@ -439,12 +448,12 @@ def count_anomalous_frame(surface):
     """Count a frame as evidence, and as evidence since a stop could last hide a swing
     (`judge_previous_frame`)."""
     surface.evidence.n_anomalous_frames += 1
-    surface.evidence.n_frames_since_stop_could_hide += 1
+    surface.evidence.n_anomalous_frames_since_stop_could_hide += 1
 
 
 @kernel
 def narrow_feasible_sets(config, surface, k):
-    """Hold every type of one surface against the frame before the elapsed one: something was wrong in it."""
+    """Test every type of one surface with the judged frame, in which something was wrong."""
     evidence, observation = surface.evidence, surface.judged_observation
     if observation.position_low > observation.position_high:
         return
@@ -490,7 +499,7 @@ def judge_previous_frame(types):
             surface.judged_observation.stop_can_hide_deflection[0]
             or surface.judged_observation.stop_can_hide_deflection[1]
         ):
-            surface.evidence.n_frames_since_stop_could_hide = 0
+            surface.evidence.n_anomalous_frames_since_stop_could_hide = 0
     types.frame_index += 1
 
 
@@ -523,7 +532,9 @@ def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
         block.mean_innovation_bound[i] += frame_share * eta_bar[i]
     for estimator_index in layout.position_estimator:
         isolation.add_to_mean_effect(
-            estimators[estimator_index].block_mean_effect, estimators[estimator_index].effect, frame_share
+            estimators[estimator_index].block_mean_effect,
+            estimators[estimator_index].frame_mean_effect,
+            frame_share,
         )
 
 
@@ -531,13 +542,13 @@ def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
 def observe_and_judge_block(types, layout, estimators, innovation, bound):
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
-    if block.n_frames == 0:
+    if block.n_frames_so_far == 0:
         begin_frame_block(types, layout, estimators, bound.gyro_error_change_bound_before)
     add_frame_to_block(types, layout, estimators, innovation, bound.eta_bar)
-    block.n_frames += 1
-    if block.n_frames < config.frames_per_block:
+    block.n_frames_so_far += 1
+    if block.n_frames_so_far < config.frames_per_block:
         return
-    block.n_frames = 0
+    block.n_frames_so_far = 0
     for i in range(3):
         block.mean_innovation_bound[i] += (
             block.gyro_error_change_bound_at_start[i] + bound.gyro_error_change_bound[i]

@@ -5,7 +5,7 @@ of one surface assume that it is at fault; `can_be_at_fault` says whether it can
 `fault_types_dtype`; conclusion: of `conclusion_dtype`; estimators: those of the isolation.
 
 `fault_findings` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and in
-which unit, the type's row says (`FaultType.estimate`).
+which unit, the type's row says (`FaultType.estimate_parameter`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -28,18 +28,18 @@ from beaver_ftc.diagnosis.types import (
 from beaver_ftc.diagnosis.types.registry import (
     ACCOMMODATION_MODES,
     CAN_LOOK_LIKE,
-    DEFLECTION_ERROR_ORDER,
+    DEFLECTION_ERROR_TYPES_BY_PRECEDENCE,
     ERROR_DEPENDS_ON_COMMAND,
     EVIDENCE_AT_REST,
     FIRST_TYPE_WITH_SAME_NAME,
     HALF_CYCLES_BEFORE_ISOLATING_OTHERS,
-    LIMIT_TYPE_INDEX,
     MODE_SERVES_TYPE,
     MUST_SHOW_ITSELF,
     N_CONSTANT_PARAMETER_TYPES,
     N_TYPES,
     SHOWS_WITHIN_HALF_CYCLES,
     STOP_DIRECTIONS,
+    TYPE_INDEX_AT_END_OF_RANGE,
     deflection_error_under_type,
     has_shown,
     motion_rules_out,
@@ -63,8 +63,8 @@ def record_excluded_estimators(surfaces, layout, estimators):
 @kernel
 def can_be_at_fault(surface):
     """Whether anything on a surface can be the fault."""
-    if surface.status.decision_basis != DECIDED_BY_ESTIMATOR:
-        return surface.status.decision_basis == DEDUCED_FAULTY
+    if surface.status.can_be_at_fault_basis != DECIDED_BY_ESTIMATOR:
+        return surface.status.can_be_at_fault_basis == DEDUCED_FAULTY
     return not surface.estimator_excluded
 
 
@@ -101,7 +101,7 @@ def types_would_have_shown(config, surface):
     for type_index in range(N_TYPES):
         if (
             type_remains(surface, type_index)
-            and surface.evidence.n_frames_since_stop_could_hide
+            and surface.evidence.n_anomalous_frames_since_stop_could_hide
             < SHOWS_WITHIN_HALF_CYCLES[type_index] * config.slowest_half_cycle_frames
         ):
             return False
@@ -365,9 +365,9 @@ def serves_all_constant_types(surface, mode):
         if type_remains(surface, type_index):
             is_own_mode = is_own_mode or ACCOMMODATION_MODES[type_index] == mode
             serves_limit_type = (
-                LIMIT_TYPE_INDEX[type_index] >= 0
-                and type_remains(surface, LIMIT_TYPE_INDEX[type_index])
-                and MODE_SERVES_TYPE[mode, LIMIT_TYPE_INDEX[type_index]]
+                TYPE_INDEX_AT_END_OF_RANGE[type_index] >= 0
+                and type_remains(surface, TYPE_INDEX_AT_END_OF_RANGE[type_index])
+                and MODE_SERVES_TYPE[mode, TYPE_INDEX_AT_END_OF_RANGE[type_index]]
             )
             if not (MODE_SERVES_TYPE[mode, type_index] or serves_limit_type):
                 return False
@@ -449,7 +449,7 @@ def deflection_error(surface, is_at_fault):
     """Return the deflection error of a surface, rad: by the types left if it is at fault, or as the last
     frame shows it."""
     if is_at_fault:
-        for type_index in DEFLECTION_ERROR_ORDER:
+        for type_index in DEFLECTION_ERROR_TYPES_BY_PRECEDENCE:
             if type_remains(surface, type_index):
                 error_rad = deflection_error_under_type(surface, type_index)
                 if np.isfinite(error_rad):
@@ -564,14 +564,16 @@ def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Se
         if fault_type >= 0
         else tuple(_remaining_type_names(fdi, s)),
         "estimate": estimate_fault_size(fdi, s, fault_type),
-        "estimate_interval": _call_type_attribute(fault_type, "estimate_interval", fdi, s, fault_type),
-        "frequency_rad_s": _call_type_attribute(fault_type, "frequency_rad_s", fdi, s, fault_type),
+        "estimate_interval": _call_type_attribute(
+            fault_type, "estimate_parameter_interval", fdi, s, fault_type
+        ),
+        "frequency_rad_s": _call_type_attribute(fault_type, "estimate_frequency_rad_s", fdi, s, fault_type),
     }
 
 
 def estimate_fault_size(fdi: np.void, s: int, type_index: int) -> float | None:
     """Estimate the size of a fault of this type on surface s; None if it has none."""
-    estimate: float | None = _call_type_attribute(type_index, "estimate", fdi, s, type_index)
+    estimate: float | None = _call_type_attribute(type_index, "estimate_parameter", fdi, s, type_index)
     return estimate
 
 
@@ -582,9 +584,11 @@ def _call_type_attribute(type_index: int, attribute: str, *arguments: Any) -> An
 
 def _can_be_at_fault(fdi: np.void, s: int) -> bool:
     surface = fdi["types"]["surface"][s]
-    if surface["status"]["is_isolated"] or surface["status"]["decision_basis"] == DEDUCED_FAULTY:
+    if surface["status"]["is_isolated"] or surface["status"]["can_be_at_fault_basis"] == DEDUCED_FAULTY:
         return True
-    return not (surface["status"]["decision_basis"] == DEDUCED_HEALTHY or surface["estimator_excluded"])
+    return not (
+        surface["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY or surface["estimator_excluded"]
+    )
 
 
 def _remaining_type_names(fdi: np.void, s: int) -> list[str]:

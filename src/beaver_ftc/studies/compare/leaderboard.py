@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.diagnosis.rivals import TunedValues
+from beaver_ftc.diagnosis.rivals import TunedValuesByGrade
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY
@@ -181,7 +181,7 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
 
 def run_comparison(
     out: Path, name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], workers: int,
-    progress: Progress | None, chosen: TunedValues | None = None,
+    progress: Progress | None, chosen: TunedValuesByGrade | None = None,
 ) -> Document:  # fmt: skip
     """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document.
 

@@ -8,7 +8,7 @@ from time import thread_time
 
 from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
-    TunedValues,
+    TunedValuesByGrade,
     flight_grade,
     tuned_parameters,
     tuned_values,
@@ -133,7 +133,7 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
     return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
 
 
-def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValues | None = None) -> Scenario:
+def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | None = None) -> Scenario:
     """The scenario with this scheme and this law, each with the values chosen for it on such flights.
 
     chosen: as tuned.json has them; without it, each flies with its defaults. What the scenario says of the
@@ -178,7 +178,10 @@ def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
 
 
 def fly_case(
-    case: SetFlight, entries: Sequence[Entry], chosen: TunedValues | None = None, trade_off: bool = True
+    case: SetFlight,
+    entries: Sequence[Entry],
+    chosen: TunedValuesByGrade | None = None,
+    trade_off: bool = True,
 ) -> Trial:
     """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme.
 
@@ -206,7 +209,7 @@ def fly_case(
     return trial
 
 
-def _fly(scenario: Scenario, entry: Entry, chosen: TunedValues) -> Result:
+def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result:
     try:
         loop = Loop(with_entry(scenario, entry, chosen))
         began = thread_time()

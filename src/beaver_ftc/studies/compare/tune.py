@@ -15,7 +15,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES, TUNED_GROUP_NAMES, tuned_parameters, tuned_values
+from beaver_ftc.diagnosis.rivals import (
+    FLIGHT_GRADES,
+    TUNED_FILE_KEY_BY_PLUGIN_GROUP,
+    tuned_parameters,
+    tuned_values,
+)
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plugins import DETECTORS, LAWS, Range, is_compiled, options_of, plugin_class, tunable
 from beaver_ftc.results.model import Document
@@ -101,7 +106,9 @@ def tune(
     )
     grades: Document = {}
     for method, row in zip(methods, rows, strict=True):
-        of_kind = grades.setdefault(method.grade, {}).setdefault(TUNED_GROUP_NAMES[method.group], {})
+        of_kind = grades.setdefault(method.grade, {}).setdefault(
+            TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group], {}
+        )
         of_kind[method.name] = row["values"]
     counts = {grade: len(flights(grade, most)) for grade in grades}
     how = {"procedure": PROCEDURE, "trials": trials, "seed": seed, "draw": draw}
@@ -134,7 +141,7 @@ def is_adopted(again: Document) -> bool:
 def _row(method: Method, found: Found) -> Document:
     return {
         "grade": method.grade,
-        "kind": TUNED_GROUP_NAMES[method.group],
+        "kind": TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group],
         "name": method.name,
         "start_cost": found.start_cost,
         "cost": found.cost,

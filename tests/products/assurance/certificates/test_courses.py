@@ -37,7 +37,7 @@ ACTUATOR = Actuator(
     1.0,
     min_runaway_rate_rad_s=2.0,
     min_rate_limited_motion_per_substep_rad=0.025,
-    lag_share_per_substep=0.5,
+    approach_share_per_substep=0.5,
 )
 CONFIG = FaultTypesConfig(
     frame_shows_single_instant=True,
@@ -290,12 +290,12 @@ def tape(travel=(-0.2, 0.7), blocks=1):
 def test_the_checker_defines_every_type_as_its_row_does(kind):
     """It is written apart from the rows; of the types of the package it takes nothing from the log."""
     row, words, travel = TYPES[kind], TYPE_DESCRIPTIONS[kind], (-0.2, 0.7)
-    if row.excluding_comparison:
+    if row.excluding_frame_comparison:
         assert check_certificate.COURSES[words] == (
-            row.excluding_comparison.replace(" ", "_"),
+            row.excluding_frame_comparison.replace(" ", "_"),
             row.stop_direction,
         )
-        assert row.excluding_comparison in courses.RULES
+        assert row.excluding_frame_comparison in courses.RULES
     else:
         expected = (
             row.deflection_relation.gain,
@@ -304,7 +304,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
         )
         assert check_certificate.RELATIONS[words](*travel) == (
             *expected,
-            *row.deflection_relation.theta_range(*travel),
+            *row.deflection_relation.theta_range_for_travel(*travel),
         )
     assert kinds.type_definition_columns(tape(), "aileron", 1, kind) == {}
 
@@ -312,7 +312,7 @@ def test_the_checker_defines_every_type_as_its_row_does(kind):
 @pytest.mark.parametrize(("course", "direction"), [("runaway", -1), ("growing offset", 0), ("", 0)])
 def test_what_a_type_is_that_the_checker_does_not_define_stands_in_the_log(monkeypatch, course, direction):
     added = dataclasses.replace(
-        TYPES[STUCK], name="creeps", excluding_comparison=course, stop_direction=direction,
+        TYPES[STUCK], name="creeps", excluding_frame_comparison=course, stop_direction=direction,
         deflection_relation=None
         if course
         else DeflectionRelation(-1.0, True, lambda low, high: (0.5 * low, high)),

@@ -34,7 +34,7 @@ from beaver_ftc.diagnosis.types import (
     feasible_set_midpoint,
     limit_to_travel,
     parameter_estimate,
-    read_deflection_error,
+    read_observed_deflection_error,
 )
 
 
@@ -105,22 +105,22 @@ def loss_theta_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, f
 
 
 LOSS_DEFLECTION_RELATION = DeflectionRelation(
-    gain=1.0, theta_is_share=True, theta_range=lambda low, high: (-1.0, 0.0)
+    gain=1.0, theta_is_share=True, theta_range_for_travel=lambda low, high: (-1.0, 0.0)
 )
 LOSS = FaultType(
     name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
     parameter_range=effectiveness_range, consistent_interval=consistent_loss_interval,
     possible_deflection_range=loss_deflection_range,
-    accommodation_mode=SCALE_COMMAND, limit_type_name="float", deflection_relation=LOSS_DEFLECTION_RELATION,
-    estimate=loss_theta_estimate,
-    estimate_interval=loss_theta_interval,
+    accommodation_mode=SCALE_COMMAND, type_name_at_end_of_range="float",
+    deflection_relation=LOSS_DEFLECTION_RELATION, estimate_parameter=loss_theta_estimate,
+    estimate_parameter_interval=loss_theta_interval,
 )  # fmt: skip
 VARYING_LOSS = FaultType(
     name="loss_of_effectiveness", description="loss_of_effectiveness that varies",
     has_constant_parameter=False, sort_rank=1,
     consistent_interval=consistent_varying_loss_interval, half_cycles_before_isolating_others=2,
     accommodation_mode=SCALE_COMMAND, deflection_relation=LOSS_DEFLECTION_RELATION,
-    estimate=loss_theta_from_isolation_estimator,
+    estimate_parameter=loss_theta_from_isolation_estimator,
 )  # fmt: skip
 
 
@@ -282,18 +282,18 @@ def has_run_towards_stop(surface, direction):
 
 def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
     """Offset in the last frame, rad."""
-    return read_deflection_error(fdi["types"]["surface"][s])
+    return read_observed_deflection_error(fdi["types"]["surface"][s])
 
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
     consistent_interval=consistent_bias_interval, possible_deflection_range=bias_deflection_range,
-    accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_rank=2,
+    accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_precedence=2,
     deflection_relation=DeflectionRelation(
-        1.0, theta_is_share=False, theta_range=lambda low, high: (low - high, high - low)
+        1.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low - high, high - low)
     ),
-    excluding_comparison="offset", estimate=parameter_estimate,
-    estimate_interval=bias_interval,
+    excluding_frame_comparison="offset", estimate_parameter=parameter_estimate,
+    estimate_parameter_interval=bias_interval,
 )  # fmt: skip
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
@@ -311,7 +311,8 @@ GROWING_BIAS = FaultType(
     # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
     can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"),
     motion_rules_out=has_run_towards_stop,
-    accommodation_mode=SUBTRACT_OFFSET, excluding_comparison="growing offset", estimate=last_offset_rad,
+    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison="growing offset",
+    estimate_parameter=last_offset_rad,
 )  # fmt: skip
 
 
@@ -420,8 +421,9 @@ OSCILLATORY = FaultType(
     ),
     has_shown=oscillation_has_shown, shows_within_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
     can_look_like=("rate_limit",),
-    accommodation_mode=SUBTRACT_OFFSET, excluding_comparison="swing", estimate=oscillation_amplitude_rad,
-    frequency_rad_s=oscillation_frequency_rad_s,
+    accommodation_mode=SUBTRACT_OFFSET, excluding_frame_comparison="swing",
+    estimate_parameter=oscillation_amplitude_rad,
+    estimate_frequency_rad_s=oscillation_frequency_rad_s,
 )  # fmt: skip
 
 
@@ -461,7 +463,7 @@ def narrow_position_by_min_rate(config, surface, memory, side):
         config.n_substeps * config.frames_per_block * surface.actuator.min_rate_limited_motion_per_substep
     )
     lag_distance = (
-        surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.lag_share_per_substep
+        surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.approach_share_per_substep
     )
     min_command, max_command = command_range(config, surface)
     if side > 0:
@@ -507,6 +509,6 @@ RATE_LIMIT = FaultType(
     # a slow surface that has not been seen to creep looks as if it stood still
     evidence_at_rest=REST_HIDES_TYPE, can_look_like=("stuck", "float", "hardover"),
     accommodation_mode=WAIT_FOR_SURFACE,
-    excluding_comparison="approach",
+    excluding_frame_comparison="approach",
 )  # fmt: skip
 TYPES = LOSS, VARYING_LOSS, BIAS, GROWING_BIAS, OSCILLATORY, RATE_LIMIT

@@ -108,7 +108,7 @@ def mean_return_position(config, surface, start_position, release_side=0):
             position = nearer(
                 position,
                 command,
-                surface.actuator.lag_share_per_substep,
+                surface.actuator.approach_share_per_substep,
                 surface.actuator.max_motion_per_substep,
             )
             if release_side != 0:
@@ -448,11 +448,11 @@ STUCK = FaultType(
     on_possible_release=add_stuck_release, propagate_release=propagate_returns,
     possible_deflection_range=stuck_deflection_range,
     evidence_at_rest=REST_POSITION_IS_PARAMETER,
-    accommodation_mode=GIVE_UP, deflection_error=stuck_deflection_error, deflection_error_rank=3,
+    accommodation_mode=GIVE_UP, deflection_error=stuck_deflection_error, deflection_error_precedence=3,
     deflection_relation=DeflectionRelation(
-        0.0, theta_is_share=False, theta_range=lambda low, high: (low, high)
+        0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
     ),
-    estimate=parameter_estimate, estimate_interval=feasible_set,
+    estimate_parameter=parameter_estimate, estimate_parameter_interval=feasible_set,
 )  # fmt: skip
 FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
@@ -461,11 +461,13 @@ FLOAT = FaultType(
     possible_deflection_range=float_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
     deflection_error=float_deflection_error,
-    deflection_error_rank=1,
+    deflection_error_precedence=1,
     deflection_relation=DeflectionRelation(
-        0.0, theta_is_share=False, theta_range=lambda low, high: (neutral_position_rad(low, high),) * 2
+        0.0,
+        theta_is_share=False,
+        theta_range_for_travel=lambda low, high: (neutral_position_rad(low, high),) * 2
     ),
-    estimate=neutral_deflection_rad,
+    estimate_parameter=neutral_deflection_rad,
 )  # fmt: skip
 
 
@@ -572,7 +574,8 @@ HARDOVER_UP = FaultType(
     on_possible_release=add_hardover_up_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
     stop_direction=1,
-    accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=upper_stop_deflection_rad,
+    accommodation_mode=GIVE_UP, excluding_frame_comparison="runaway",
+    estimate_parameter=upper_stop_deflection_rad,
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
@@ -580,6 +583,7 @@ HARDOVER_DOWN = FaultType(
     on_possible_release=add_hardover_down_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
     stop_direction=-1,
-    accommodation_mode=GIVE_UP, excluding_comparison="runaway", estimate=lower_stop_deflection_rad,
+    accommodation_mode=GIVE_UP, excluding_frame_comparison="runaway",
+    estimate_parameter=lower_stop_deflection_rad,
 )  # fmt: skip
 TYPES = STUCK, FLOAT, HARDOVER_UP, HARDOVER_DOWN

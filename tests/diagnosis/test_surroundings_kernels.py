@@ -229,18 +229,19 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.map_travel_level_for_positions(new_map(), np.array(u)) == level
+    assert bounds.map_travel_level_index_for_positions(new_map(), np.array(u)) == level
     assert (
-        bounds.map_travel_level_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u)) == 2
+        bounds.map_travel_level_index_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u))
+        == 2
     )
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
     assert (
-        bounds.map_travel_level_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
+        bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
     )  # at rest at an end it uses none
 
 

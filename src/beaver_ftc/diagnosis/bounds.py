@@ -420,7 +420,7 @@ def is_coordinate_outside_all_boxes(error_map, coordinate_index):
 
 
 @kernel
-def map_travel_level_for_positions(error_map, u):
+def map_travel_level_index_for_positions(error_map, u):
     """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
     travel may be used."""
     if error_map.several_surfaces_may_be_anywhere:
@@ -430,11 +430,11 @@ def map_travel_level_for_positions(error_map, u):
         if u[s] != 0.0:
             travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
             travel_share = max(travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return map_travel_level_for_share(error_map, travel_share)
+    return map_travel_level_index_for_share(error_map, travel_share)
 
 
 @kernel
-def map_travel_level_for_share(error_map, travel_share):
+def map_travel_level_index_for_share(error_map, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
     last_level = error_map.n_levels - 1
     for j in range(last_level):
@@ -476,7 +476,7 @@ def look_up_map_error(error_map, x, y, u):
     coordinates = error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    level, time_row = map_travel_level_for_positions(error_map, u), error_map_time_row(error_map)
+    level, time_row = map_travel_level_index_for_positions(error_map, u), error_map_time_row(error_map)
     for k in range(error_map.n_boxes if time_row >= 0 else 0):
         if is_inside_box(error_map, k):
             error_map.is_outside_all_boxes, error_map.error_now[:] = 0, error_map.error[time_row, k, level]

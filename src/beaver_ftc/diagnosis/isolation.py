@@ -40,7 +40,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import map_travel_level_for_share, max_travel_share_used
+from beaver_ftc.diagnosis.bounds import map_travel_level_index_for_share, max_travel_share_used
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_gyro_error_bound,
@@ -59,7 +59,7 @@ from beaver_ftc.diagnosis.state import (
     POSITION,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
-    WEAKLY_EXCLUDED_BY_DAMAGE,
+    WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED,
 )
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
@@ -133,7 +133,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
     s, effect = fie.surface, fie.frame_mean_effect
     axis = axis_of_largest_effect(effect.regressor)
     previous_max_deflection, max_deflection = (
-        fie.max_possible_deflection,
+        fie.max_abs_deflection_in_last_frame,
         max(abs(fie.theta_min), abs(fie.theta_max)),
     )
     error_bound, error_map, position_range = (
@@ -141,7 +141,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         bound.model_error_map,
         (fie.theta_min, fie.theta_max),
     )
-    map_level = map_travel_level_at_position(error_map, fie, position_range, n_substeps)
+    map_level = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
     measured_effect = innovation[axis] - effect.acceleration_at_zero_theta[axis]
     deflection_at_first_substep = 2.0 * previous_max_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
@@ -161,11 +161,11 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
         if low > high:
             break
         max_deflection, position_range = min(max_deflection, max(abs(low), abs(high))), (low, high)
-        map_level = map_travel_level_at_position(error_map, fie, position_range, n_substeps)
-    fie.max_possible_deflection = max_deflection
+        map_level = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
+    fie.max_abs_deflection_in_last_frame = max_deflection
     if error_map.one_surface_may_be_anywhere:
-        fie.max_possible_travel_share = max_travel_share_used(
-            error_map, s, position_range, fie.max_possible_travel_share, n_substeps
+        fie.max_travel_share_in_last_frame = max_travel_share_used(
+            error_map, s, position_range, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
         effect.error_bound[i] += max(
@@ -177,7 +177,7 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
 
 
 @kernel
-def map_travel_level_at_position(error_map, fie, position_range, n_substeps):
+def map_travel_level_index_at_position(error_map, fie, position_range, n_substeps):
     """The level of the error map that covers a surface at a mean position within `position_range`, (low,
     high) rad.
 
@@ -185,10 +185,10 @@ def map_travel_level_at_position(error_map, fie, position_range, n_substeps):
     """
     if not error_map.one_surface_may_be_anywhere:
         return 0
-    return map_travel_level_for_share(
+    return map_travel_level_index_for_share(
         error_map,
         max_travel_share_used(
-            error_map, fie.surface, position_range, fie.max_possible_travel_share, n_substeps
+            error_map, fie.surface, position_range, fie.max_travel_share_in_last_frame, n_substeps
         ),
     )
 
@@ -291,7 +291,7 @@ ISOLATION_ESTIMATOR_RECORD = record(
     filtered_uncertainty_bound=3, filtered_eta_bar=3, filtered_gyro_error_bound=3, theta=3, theta_variance=3,
     frame_mean_effect=FAULT_EFFECT_RECORD, block_mean_effect=FAULT_EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
-    max_possible_deflection=float, max_possible_travel_share=float,
+    max_abs_deflection_in_last_frame=float, max_travel_share_in_last_frame=float,
     # on the residuals of the bank (filters.py)
     parity_direction=3,
     reachable_bank_residual_low=(MAX_POLES, 4), reachable_bank_residual_high=(MAX_POLES, 4),
@@ -374,7 +374,7 @@ def configure_isolation(
             fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
-    weakly_excluded = WEAKLY_EXCLUDED_BY_DAMAGE if config.weighs_chance and aircraft.damage else 0
+    weakly_excluded = WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED if config.weighs_chance and aircraft.damage else 0
     isolation["estimator"]["weakly_excluded"] = weakly_excluded
     isolation["config"]["isolation_hold_off_s"] = (
         ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S if aircraft.damage else 0.0

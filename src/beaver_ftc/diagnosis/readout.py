@@ -117,7 +117,7 @@ class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
     kind: of `likelihood`; surface, axis: which. raises_alarm: whether it may raise the alarm. score: largest
-    log likelihood ratio over all onsets, in the unit of the alarm level.
+    normalised evidence over all onsets, standard deviations, like the alarm level.
     """
 
     kind: int
@@ -257,7 +257,7 @@ class DiagnosisReadout:
         )  # fmt: skip
 
     @cached_property
-    def n_frames_in_block(self) -> int:
+    def n_frames_in_block_so_far(self) -> int:
         """Frames that the block in progress has so far."""
         return int(self._fdi["types"]["block"]["n_frames_so_far"])
 

@@ -14,7 +14,9 @@ from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.schema import Scenario
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
-WEAKLY_EXCLUDED_BY_DAMAGE = 2  # value of `weakly_excluded`: declared damage may have excluded the others
+WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED = (
+    2  # value of `weakly_excluded`: declared damage may have excluded the others
+)
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
 _ALARM_AUTHORITY_CODE_OF_NAME = {

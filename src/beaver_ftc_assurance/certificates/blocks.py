@@ -69,7 +69,7 @@ def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, Blo
     """Tape, history and frame of the alarm by the blocks that types were tested with."""
     diagnosis = tape.alarm.diagnosis
     length = diagnosis.types_config.frames_per_block
-    begin = (alarm_frame + 1 - diagnosis.n_frames_in_block) % length
+    begin = (alarm_frame + 1 - diagnosis.n_frames_in_block_so_far) % length
     blocks, first_block = by_blocks(history, length, begin), ceil((tape.first - begin) / length)
     skipped = begin + first_block * length - tape.first
     kept = {

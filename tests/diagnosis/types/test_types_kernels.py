@@ -790,17 +790,17 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
         (-1.0, beyond) if end == "low" else (beyond, 1.0)
     )
-    assert on(held_surface.release_within_block_explains_it, fdi, surface, STUCK) == inside
+    assert on(held_surface.release_within_block_explains_block, fdi, surface, STUCK) == inside
     assert on(held_surface.return_explains_frame, fdi, surface, STUCK) == inside
     held = surface["release"]["held_position_min"][STUCK] <= surface["release"]["held_position_max"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["frames_per_block"] = 1
-    assert not on(held_surface.release_within_block_explains_it, fdi, surface, STUCK)
+    assert not on(held_surface.release_within_block_explains_block, fdi, surface, STUCK)
 
 
 def test_what_is_held_nowhere_is_not_let_go_within():
     fdi, surface = within_block(ORDERS, held=(0.3, 0.2))
-    assert not on(held_surface.release_within_block_explains_it, fdi, surface, STUCK)
+    assert not on(held_surface.release_within_block_explains_block, fdi, surface, STUCK)
 
 
 @pytest.mark.parametrize("joined", [False, True])

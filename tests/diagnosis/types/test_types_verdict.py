@@ -140,7 +140,7 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 
 
 @pytest.mark.parametrize(
-    ("kinds", "fixed", "one_type", "sole_shown_type"),
+    ("kinds", "fixed", "one_type", "sole_remaining_type_if_shown"),
     [
         ((CONSTANT_LOSS,), 0, CONSTANT_LOSS, CONSTANT_LOSS),
         ((VARYING_LOSS,), 0, -1, CONSTANT_LOSS),
@@ -156,12 +156,16 @@ def test_questions_about_the_types_left(kinds, constant, explained):
         ((SLOW, STUCK), 1, STUCK, -1),
     ],
 )
-def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown_type):
+def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_remaining_type_if_shown):
     _, surface = one(*kinds)
-    same_name = verdict.FIRST_TYPE_WITH_SAME_NAME[sole_shown_type] if sole_shown_type >= 0 else -1
+    same_name = (
+        verdict.FIRST_TYPE_WITH_SAME_NAME[sole_remaining_type_if_shown]
+        if sole_remaining_type_if_shown >= 0
+        else -1
+    )
     assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
     assert verdict.sole_remaining_constant_type(surface) == one_type
-    found = verdict.sole_shown_type(surface)
+    found = verdict.sole_remaining_type_if_shown(surface)
     assert (verdict.FIRST_TYPE_WITH_SAME_NAME[found] if found >= 0 else -1) == same_name
 
 

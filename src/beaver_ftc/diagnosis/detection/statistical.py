@@ -78,7 +78,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust_estimate,
     configure_speed_error,
 )
-from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE, WEAKLY_EXCLUDED_BY_DAMAGE
+from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE, WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import FdiConfig, Statistical
@@ -722,11 +722,11 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
     """True if a loss of this surface explains the data better than all alternatives, by the naming level.
 
     estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
-    is weakly excluded by WEAKLY_EXCLUDED_BY_DAMAGE, excluded losses are alternatives as well.
+    is weakly excluded by WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED, excluded losses are alternatives as well.
     """
     includes_excluded = (
         loss_estimator[surface] >= 0
-        and estimators[loss_estimator[surface]].weakly_excluded == WEAKLY_EXCLUDED_BY_DAMAGE
+        and estimators[loss_estimator[surface]].weakly_excluded == WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
     )
     for block in blocks:
         loss_lower_bound = 0.0

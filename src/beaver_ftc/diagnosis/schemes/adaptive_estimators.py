@@ -267,7 +267,7 @@ def decide_fault_type(fdi, t, isolation_has_run):
     estimators, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_excluded_estimators(types.surface, layout, estimators)
     if types.pair.enabled:
-        pairs.observe_and_judge_pairs(types, layout, estimators, bank, bound.frame_innovation_bound)
+        pairs.observe_and_judge_frame_for_pairs(types, layout, estimators, bank, bound.frame_innovation_bound)
         conclusion.record_fault_type_finding(
             conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
         )

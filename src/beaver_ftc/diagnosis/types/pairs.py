@@ -141,7 +141,7 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
 
 
 @kernel
-def observe_and_judge_pairs(types, layout, estimators, bank, innovation_bound):
+def observe_and_judge_frame_for_pairs(types, layout, estimators, bank, innovation_bound):
     """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
     it."""
     record_group_alarms(types.pair, bank)

@@ -130,7 +130,7 @@ def sole_remaining_constant_type(surface):
 
 
 @kernel
-def sole_shown_type(surface):
+def sole_remaining_type_if_shown(surface):
     """The one type left, constant or varying, or TYPE_UNDECIDED: in coarse sets a constant proves nothing."""
     remaining_type = sole_remaining_type(surface, N_TYPES)
     return remaining_type if remaining_type >= 0 and has_shown(surface, remaining_type) else TYPE_UNDECIDED
@@ -256,7 +256,7 @@ def fault_type_on_surface(config, surface):
     ):
         return TYPE_UNDECIDED
     if config.has_declared_surface_errors:
-        return sole_shown_type(surface)
+        return sole_remaining_type_if_shown(surface)
     types_have_had_time = types_would_have_shown(config, surface)
     if any_constant_type_remains(surface):
         remaining_type = sole_remaining_constant_type(surface)

@@ -123,7 +123,7 @@ def mean_return_position(config, surface, start_position, release_side=0):
 
 
 @kernel
-def release_within_block_explains_it(config, surface, type_index):
+def release_within_block_explains_block(config, surface, type_index):
     """Whether a release at an instant of the judged block explains the block."""
     held_position_min, held_position_max = (
         surface.release.held_position_min[type_index],
@@ -142,7 +142,7 @@ def release_within_block_explains_it(config, surface, type_index):
 @kernel
 def return_explains_frame(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
-    is_explained = release_within_block_explains_it(config, surface, type_index)
+    is_explained = release_within_block_explains_block(config, surface, type_index)
     if not is_explained:
         clear_held_interval(surface, type_index)
     for release_slot in (EARLIER_RELEASE, LATER_RELEASE):

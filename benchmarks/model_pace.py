@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc import load
-from beaver_ftc.diagnosis.detection.statistical import UNCERTAINTY_CHANGE_PER_TRAVEL
+from beaver_ftc.diagnosis.detection.statistical import UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Recorder
@@ -68,7 +68,9 @@ def row_of(name: str, flights: int, seed: int) -> list[str]:
     for k in range(flights):
         error, bound, places = flown(scenario(name, seed + k))
         change = np.abs(np.diff(error, axis=0)) / bound[1:]
-        moved = UNCERTAINTY_CHANGE_PER_TRAVEL * np.abs(np.diff(places, axis=0)).max(axis=1, keepdims=True)
+        moved = UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * np.abs(np.diff(places, axis=0)).max(
+            axis=1, keepdims=True
+        )
         left = (change - moved) / DT_S
         found = np.abs(error) / bound, change, np.minimum(change, moved), left
         largest = np.fmax(largest, [np.nanmax(of_it, initial=0.0) for of_it in found])

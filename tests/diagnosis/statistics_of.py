@@ -99,7 +99,9 @@ class Across:
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return parity.set_view_direction(view, record["forces"], record["gust"], fdi["bound"], G)
+        return parity.set_view_direction_and_return_leak(
+            view, record["forces"], record["gust"], fdi["bound"], G
+        )
 
     @staticmethod
     def subtracts_gust_estimate(record, view):
@@ -108,7 +110,7 @@ class Across:
     @staticmethod
     def blur(view, record, V):
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.set_view_noise(view, *parts, V)
+        parity.set_view_noise_drift_and_bound(view, *parts, V)
 
     @staticmethod
     def regress(fdi, view, innovation, share):
@@ -124,7 +126,7 @@ class Across:
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["test_config"]
-        parity.update_view_directions(views, record["forces"], record["gust"], bound, G, Gu)
+        parity.update_view_directions_and_signatures(views, record["forces"], record["gust"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
         parity.project_innovation(views, int(tests["has_regressors"]), *parts, innovation, y[2])
         parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
@@ -154,7 +156,7 @@ class Across:
             ],
         )
         views = views_of(record)
-        return parity.excludes_surface(
+        return parity.views_exclude_surface(
             views, record["test_config"], record["forces"], record["gust"], s, column
         )
 

@@ -53,7 +53,7 @@ def test_the_drift_of_the_detectors_blocks(moving):
         )
         (
             record["gust"]["output"]["rate_damping"],
-            record["gust"]["memory"]["gust_drift_intensity"],
+            record["gust"]["memory"]["gust_rotation_intensity_per_airspeed"],
             record["gust"]["memory"]["unmeasured_intensity_share"],
         ) = np.eye(3), 1e-3, 0.5
         record["gust"]["output"]["gust_axes_in_body"] = np.arange(9.0).reshape(3, 3)

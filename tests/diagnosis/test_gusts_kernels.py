@@ -153,12 +153,12 @@ def test_a_yawing_gust_that_turning_hides_fades_and_its_loss_fades_with_it():
     ):
         gusts.update_gust_rotation(record, y, np.array(attitude), DT)
         assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(gust)
-        assert record["memory"]["unmeasured_share_by_past_heading_turns"] == pytest.approx(turning)
+        assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(turning)
         record["memory"]["specific_force"] = 0.0, 0.0, -GRAVITY
     part = 0.5 * enough * DT
     gusts.update_gust_rotation(record, y, np.array([0, 0, turn + part]), DT)
-    assert record["memory"]["unmeasured_share_by_heading_turn"] == pytest.approx(0.25)
-    assert record["memory"]["unmeasured_share_by_past_heading_turns"] == pytest.approx(max(lag**3, 0.25))
+    assert record["memory"]["unmeasured_yawing_share_by_turn_now"] == pytest.approx(0.25)
+    assert record["memory"]["unmeasured_yawing_share_by_past_turns"] == pytest.approx(max(lag**3, 0.25))
     aside = 45.0 * np.sin(part)  # of the old course, from the left: a gust from the right has come up
     assert record["memory"]["air_rotation_in_level_axes"][2] == pytest.approx(
         0.05 * lag**5 - aside / (45.0 * tau_r)
@@ -210,16 +210,16 @@ def test_level_axes_are_a_rotation(seed):
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(
-        has_acceleration_before=1,
-        unmeasured_share_by_heading_turn=0.4,
-        unmeasured_share_by_past_heading_turns=0.3,
+        has_level_acceleration_before=1,
+        unmeasured_yawing_share_by_turn_now=0.4,
+        unmeasured_yawing_share_by_past_turns=0.3,
         air_rotation_in_level_axes=(0.1, 0.2, 0.3),
     )
     gusts.start_gust_estimate(record, *flight.reading())
     assert (
-        record["memory"]["has_acceleration_before"],
-        record["memory"]["unmeasured_share_by_heading_turn"],
-        record["memory"]["unmeasured_share_by_past_heading_turns"],
+        record["memory"]["has_level_acceleration_before"],
+        record["memory"]["unmeasured_yawing_share_by_turn_now"],
+        record["memory"]["unmeasured_yawing_share_by_past_turns"],
     ) == (
         0,
         0.0,
@@ -268,13 +268,13 @@ def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(
         (
             "air_rotation_in_level_axes",
-            "has_acceleration_before",
-            "unmeasured_share_by_heading_turn",
-            "unmeasured_share_by_past_heading_turns",
+            "has_level_acceleration_before",
+            "unmeasured_yawing_share_by_turn_now",
+            "unmeasured_yawing_share_by_past_turns",
             "acceleration_variance_by_axes_turn_now",
             "acceleration_variance_by_axes_turn_before",
             "acceleration_variance_by_axes_turn",
-            "n_frames_with_axes_turn_variance",
+            "n_frames_left_with_axes_turn_variance",
         ),
         1,
     )

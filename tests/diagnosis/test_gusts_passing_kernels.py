@@ -33,8 +33,8 @@ def in_moving_air():
     )
     (
         record["memory"]["air_relative_velocity"],
-        record["memory"]["gust_velocity"],
-        record["memory"]["initial_gust_variance_share"],
+        record["memory"]["gust_velocity_change_since_start"],
+        record["memory"]["remaining_initial_gust_variance_share"],
     ) = (
         (44.0, 1.5, 3.0),
         (5.0, -2.0, 0.7),
@@ -50,18 +50,18 @@ def test_the_speed_is_that_through_the_air_without_the_gust():
     )  # the gust has changed by 1.0, -0.4, 0.3
     kept = np.exp(-0.02 * dt)
     blown = kept * np.array([5.0, -2.0, 0.7]) + [1.0, -0.4, 0.3]
-    assert record["memory"]["gust_velocity"] == pytest.approx(blown)
+    assert record["memory"]["gust_velocity_change_since_start"] == pytest.approx(blown)
     assert record["output"]["speed_relative_to_mean_air"] == pytest.approx(
         np.linalg.norm(blown + np.array([44.0, 1.5, 3.0]))
     )
-    assert record["memory"]["initial_gust_variance_share"] == pytest.approx(0.8 * kept**2)
+    assert record["memory"]["remaining_initial_gust_variance_share"] == pytest.approx(0.8 * kept**2)
 
 
 def test_no_gust_is_taken_for_stronger_than_is_likely():
     record = in_moving_air()
     record["config"]["max_gust_velocity"] = 2.0
     gusts.update_gust_velocity_and_speed(record, 90.0, -70.0, 3.3, 44.1, 0.01)
-    assert record["memory"]["gust_velocity"][:2] == pytest.approx([2.0, -2.0])
+    assert record["memory"]["gust_velocity_change_since_start"][:2] == pytest.approx([2.0, -2.0])
 
 
 def test_where_no_gust_is_seen_the_airspeed_serves():
@@ -77,8 +77,8 @@ def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further
     record = in_moving_air()
     (
         record["memory"]["unmeasured_intensity_share"],
-        record["memory"]["unmeasured_share_by_start"],
-        record["memory"]["unmeasured_share_by_past_heading_turns"],
+        record["memory"]["unmeasured_pitching_share_by_start"],
+        record["memory"]["unmeasured_yawing_share_by_past_turns"],
     ) = (
         (1.0, 0.003, 0.03),
         0.02,
@@ -116,16 +116,18 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     h, b = max(height_ft, 10.0), SPAN_M / FT
     low, high = LOW[turbulence] * FT, HIGH[turbulence] * FT
     record = record_of(gusts.GUST_RECORD)
-    record["config"]["gust_drift_intensity_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
-    record["config"]["gust_drift_intensity_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(SPAN_M)
+    record["config"]["gust_rotation_intensity_per_airspeed_aloft"] = Dryden(turbulence).rotation_walk(SPAN_M)
+    record["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(
+        SPAN_M
+    )
     record["config"]["altitude_error_bound"], record["config"]["altitude_error_share"] = 0.7, 0.02
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
-    gusts.set_gust_drift_intensity(record, reading)
+    gusts.set_gust_rotation_intensity(record, reading)
     L = h * FT
     rolling = 2.0 * 1.9**2 * 2.6 * max(low**2 / L**1.5, high**2 / (1750 * FT) ** 1.5) / SPAN_M**1.5
     vertical = 3.0 * max(low**2 / L, high**2 / (1750 * FT))
     by_gusts = [rolling, vertical * (np.pi / 4 / SPAN_M) ** 2, vertical * (np.pi / 3 / SPAN_M) ** 2]
-    assert record["memory"]["gust_drift_intensity"] == pytest.approx(by_gusts)
+    assert record["memory"]["gust_rotation_intensity_per_airspeed"] == pytest.approx(by_gusts)
 
     declared_errors = record_of(declared_errors_dtype(4))
     declared_errors["air_rotation_bound_aloft"] = admitting.GUST_LIMIT_SIGMA * Dryden(

@@ -392,8 +392,8 @@ def test_the_row_of_a_fault_class_follows_from_the_detectors_in_authority():
         ("all", {}, "worst-case", ("all", "worst-case")),
     ):
         config = FdiConfig(fault_class=of, statistical=statistical, authority=authority)
-        assert rows[adaptive_estimators.isolation_variant_number(config)] == row
-    assert rows[adaptive_estimators.PUBLISHED_WORST_CASE_VARIANT] == ("published", "worst-case")
+        assert rows[adaptive_estimators.isolation_variant_index(config)] == row
+    assert rows[adaptive_estimators.PUBLISHED_WORST_CASE_VARIANT_INDEX] == ("published", "worst-case")
 
 
 @pytest.mark.parametrize(

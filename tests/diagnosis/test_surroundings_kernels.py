@@ -116,7 +116,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     rng = np.random.default_rng(7)
     record = new_air(
         has_fast_axes_turn=swings,
-        unmeasured_share_by_past_heading_turns=0.4,
+        unmeasured_yawing_share_by_past_turns=0.4,
         rolling_gust_correlation_length=30.0,
     )
     (
@@ -124,7 +124,10 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
         record["output"]["gust_axes_in_body"],
         record["memory"]["gust_axes_rate"],
     ) = rng.normal(size=(3, 3, 3))
-    record["memory"]["unmeasured_intensity_share"], record["memory"]["gust_drift_intensity"] = (
+    (
+        record["memory"]["unmeasured_intensity_share"],
+        record["memory"]["gust_rotation_intensity_per_airspeed"],
+    ) = (
         (1.0, 0.2, 0.7),
         (1e-3, 2e-3, 3e-3),
     )
@@ -149,7 +152,7 @@ def test_a_turning_heading_hides_a_yawing_gust():
     """(rate sigma)^2 lag over the walk's 3 sigma^2 V / scale, lag 3 span / pi V."""
     record, rate = new_air(turbulence_scale_length=500.0), 0.3
     lag = 3.0 * SPAN / (np.pi * V)
-    assert gusts.unmeasured_share_by_heading_rate(record, V, rate) == pytest.approx(
+    assert gusts.unmeasured_yawing_share_by_heading_rate(record, V, rate) == pytest.approx(
         rate**2 * lag / (3.0 * V / 500.0)
     )
 
@@ -288,7 +291,10 @@ def new_detector(**fields):
         record["test_config"]["frame_share_per_instant"],
         record["noise"]["drift_intensity_over_squared_bound"],
     ) = 0.25, 2.0
-    record["noise"]["input_noise_variance"], record["noise"]["deflection_error_effect_bound"] = (
+    (
+        record["noise"]["acceleration_variance_by_input_noise"],
+        record["noise"]["deflection_error_effect_bound"],
+    ) = (
         (0.1, 0.2, 0.3),
         (0.01, 0.02, 0.03),
     )
@@ -309,7 +315,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     )
     (
         record["gust"]["memory"]["unmeasured_intensity_share"],
-        record["gust"]["memory"]["gust_drift_intensity"],
+        record["gust"]["memory"]["gust_rotation_intensity_per_airspeed"],
     ) = (
         (1.0, 0.2, 0.3),
         (1e-3, 2e-3, 3e-3),
@@ -445,7 +451,7 @@ def test_the_built_in_statistic(enabled, authority, score, share, statistic):
     fdi["bank"]["output"]["threshold"][0], fdi["bank"]["output"]["residual"][0, 1] = 0.5, 0.5 * share
     likely = conclusion.uses_statistical_estimates(fdi["statistical"]["test_config"], authority)
     alarm = fdi["statistical"]["alarm"]
-    found = schemes.built_in_statistic(fdi["bank"], alarm, authority, likely)
+    found = schemes.built_in_detection_statistic(fdi["bank"], alarm, authority, likely)
     assert found == pytest.approx(statistic)
     assert bool(likely) == (enabled == 1 and authority != WORST_CASE_DETECTOR)
 

@@ -35,7 +35,7 @@ def names(scenario):
     while not sim.done:
         sim.step()
         named.add(sim.verdict.isolated)
-    assert not sim._loop.frames[0]["fdi"]["sensor_monitor"]["output"]["surface_was_isolated"]
+    assert not sim._loop.frames[0]["fdi"]["sensor_monitor"]["output"]["surface_was_isolated_at_alarm"]
     assert not sim.departed
     return named - {None}
 

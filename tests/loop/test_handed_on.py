@@ -31,7 +31,7 @@ GOES_ON = {
     },
     "scheme": {
         "fdi.bank.output.max_residual_over_threshold_so_far",
-        "fdi.statistical.alarm.max_score_over_alarm_level"},
+        "fdi.statistical.alarm.max_score_over_alarm_level_so_far"},
     "sensors": {
         f"instruments.{name}"
         for name in ("random", "counter", "lagged", "line", "reading", "broken", "fault")

@@ -68,7 +68,8 @@ CASES = {
         "fdi.verdict.withdrawn_isolations.to_s": [2.25, 3.0, 5.0],
     }),
     "statistical": ({"fdi": {"statistical": {}}}, ALARM | {
-        "fdi.statistical.alarm.detected_at_s": 2.0, "fdi.statistical.alarm.max_score_over_alarm_level": 0.95,
+        "fdi.statistical.alarm.detected_at_s": 2.0,
+        "fdi.statistical.alarm.max_score_over_alarm_level_so_far": 0.95,
         "fdi.statistical.test_config.alarm_level": 6.5,
     }),
     "engine": ({}, {

@@ -82,7 +82,10 @@ def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has
         assert block.onset_tests.score.shape[0] == len(block.hypotheses)
         assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled
-    assert (monitor.worst_test_ratio, monitor.worst_test_index) == (row["watch_share"], row["watch_test"])
+    assert (monitor.worst_residual_bound_ratio, monitor.worst_test_index) == (
+        row["watch_share"],
+        row["watch_test"],
+    )
     assert len(monitor.predicted_reading) == len(SENSORS)
 
 

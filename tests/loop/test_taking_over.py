@@ -121,7 +121,7 @@ def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
     frame, new = _frame("nominal"), _frame("nominal")
     (
         frame["fdi"]["bank"]["output"]["max_residual_over_threshold_so_far"],
-        frame["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level"],
+        frame["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level_so_far"],
     ) = 0.5, 0.75
     for same in (True, False):
         (
@@ -133,7 +133,7 @@ def test_a_diagnosis_begun_anew_keeps_what_healthy_flight_has_shown():
         take_diagnosis(then, new, 77)
         assert then["since"] == 77
         assert then["fdi"]["sensor_monitor"]["memory"]["substep"] == 0
-        assert then["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level"] == 0.75
+        assert then["fdi"]["statistical"]["alarm"]["max_score_over_alarm_level_so_far"] == 0.75
         assert set(then["fdi"]["bank"]["output"]["max_residual_over_threshold_so_far"]) == {
             0.5 if same else 0.0
         }

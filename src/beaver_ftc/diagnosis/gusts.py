@@ -19,8 +19,8 @@ coarse estimate (likelihood.py).
 V is the speed relative to the field of gusts. The mean wind carries that field [MIL-F-8785C, 3.7.1], so V is
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
 sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
-`gust_velocity` is that sum, with a decay as slow as this drift permits. A relative error e of V leaves at
-most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_variance`).
+`gust_velocity_change_since_start` is that sum, with a decay as slow as this drift permits. A relative error e
+of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_variance`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
@@ -74,10 +74,10 @@ GUST_CONFIG_RECORD = record(
     only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
     wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
     # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
-    gust_drift_intensity_aloft=3, gust_drift_intensity_at_1_m=3,
+    gust_rotation_intensity_per_airspeed_aloft=3, gust_rotation_intensity_per_airspeed_at_1_m=3,
     altitude_error_bound=float,
     altitude_error_share=float,  # bound on the altimeter's error: m; share of the reading
-    # limit of a gust component, m/s; decay of `gust_velocity`, 1/s
+    # limit of a gust component, m/s; decay of `gust_velocity_change_since_start`, 1/s
     max_gust_velocity=float, gust_velocity_decay_rate=float,
     # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
     # relative error of the speed leaves, over the variance of that error.
@@ -88,7 +88,7 @@ GUST_CONFIG_RECORD = record(
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
-    has_acceleration_before=int,  # whether `level_acceleration_before` is valid
+    has_level_acceleration_before=int,  # whether `level_acceleration_before` is valid
     accelerometer_reading=3,  # reading of the accelerometers, m/s2
     force_table=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
     # Velocity relative to the air, m/s in level axes; specific force, m/s2 in body axes; attitude.
@@ -98,21 +98,21 @@ GUST_MEMORY_RECORD = record(
     air_rotation_in_level_axes=3, air_rotation_in_body_axes=3,  # rad/s
     gust_angular_acceleration_sum=3,  # sum of `gust_acceleration` over the instants of a frame, rad/s2
     # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
-    gust_drift_intensity=3,
+    gust_rotation_intensity_per_airspeed=3,
     unmeasured_intensity_share=3,  # share of it that the vanes do not measure
     # Change of the gust's velocity since the start, m/s ahead, right, down; share of the variance of the
     # initial gust that still counts.
-    gust_velocity=3, initial_gust_variance_share=float,
+    gust_velocity_change_since_start=3, remaining_initial_gust_variance_share=float,
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
-    # the pitching gust that was present when the diagnosis has_acceleration_before.
-    unmeasured_share_by_heading_turn=float, unmeasured_share_by_past_heading_turns=float,
-    unmeasured_share_by_start=float,
+    # the pitching gust that was present when the diagnosis has_level_acceleration_before.
+    unmeasured_yawing_share_by_turn_now=float, unmeasured_yawing_share_by_past_turns=float,
+    unmeasured_pitching_share_by_start=float,
     # turn of the gusts' axes in the body, 1/s; whether it counts
     gust_axes_rate=(3, 3), has_fast_axes_turn=int,
     # Variance of the accelerations by that turn, (rad/s2)2: in the current frame, in the frame before; number
     # of frames for which there is any.
     acceleration_variance_by_axes_turn_now=(3, 3), acceleration_variance_by_axes_turn_before=(3, 3),
-    n_frames_with_axes_turn_variance=int,
+    n_frames_left_with_axes_turn_variance=int,
 )  # fmt: skip
 
 GUST_OUTPUT_RECORD = record(
@@ -197,15 +197,15 @@ def start_gust_estimate(gust, y, attitude):
     measure_air_relative_velocity(gust, y, attitude)
     update_gust_axes(gust, 0.0, 1.0)
     gust.memory.air_rotation_in_level_axes[:] = 0.0
-    gust.memory.has_acceleration_before, gust.memory.unmeasured_share_by_heading_turn = 0, 0.0
-    gust.memory.unmeasured_share_by_past_heading_turns = gust.memory.unmeasured_share_by_start = (
-        gust.memory.initial_gust_variance_share
+    gust.memory.has_level_acceleration_before, gust.memory.unmeasured_yawing_share_by_turn_now = 0, 0.0
+    gust.memory.unmeasured_yawing_share_by_past_turns = gust.memory.unmeasured_pitching_share_by_start = (
+        gust.memory.remaining_initial_gust_variance_share
     ) = float(gust.config.starts_in_flight)
-    gust.memory.gust_velocity[:], gust.output.speed_relative_to_mean_air = 0.0, y[AIRSPEED]
+    gust.memory.gust_velocity_change_since_start[:], gust.output.speed_relative_to_mean_air = 0.0, y[AIRSPEED]
     gust.memory.acceleration_variance_by_axes_turn_now[:] = 0.0
     gust.memory.acceleration_variance_by_axes_turn_before[:] = 0.0
     gust.output.acceleration_variance_by_axes_turn[:] = 0.0
-    gust.memory.n_frames_with_axes_turn_variance = 0
+    gust.memory.n_frames_left_with_axes_turn_variance = 0
 
 
 @kernel
@@ -245,7 +245,7 @@ def update_gust_axes_rate(gust, dt, V):
 
 
 @kernel
-def unmeasured_share_by_heading_rate(gust, V, heading_rate):
+def unmeasured_yawing_share_by_heading_rate(gust, V, heading_rate):
     """Share of the yawing gust's intensity that is unmeasured while the heading turns at `heading_rate`
     rad/s.
 
@@ -268,16 +268,16 @@ def update_gust_rotation(gust, y, attitude, dt):
 
     y (5,) and attitude (3,) rad as measured now; `specific_force` and attitude in memory are those dt s ago.
     If the heading turns so fast that the vanes mostly measure this turn, as when the nose passes the
-    vertical, the yawing gust only decays, and the sum of changes `gust_velocity` starts again. It does so one
-    instant longer: JSBSim's gusts turn a step after the heading.
+    vertical, the yawing gust only decays, and the sum of changes `gust_velocity_change_since_start` starts
+    again. It does so one instant longer: JSBSim's gusts turn a step after the heading.
     """
     level_acceleration = gust.memory.scratch
     for i in range(3):
         level_acceleration[i] = level_component(gust.memory.level_to_body, gust.memory.specific_force, i)
     level_acceleration[2] += gust.config.gravity
-    if not gust.memory.has_acceleration_before:
+    if not gust.memory.has_level_acceleration_before:
         gust.memory.level_acceleration_before[:] = level_acceleration[:3]
-        gust.memory.has_acceleration_before = 1
+        gust.memory.has_level_acceleration_before = 1
     for i in range(3):
         gust.memory.air_relative_velocity[i] += dt * (
             1.5 * level_acceleration[i] - 0.5 * gust.memory.level_acceleration_before[i]
@@ -296,18 +296,16 @@ def update_gust_rotation(gust, y, attitude, dt):
     update_gust_axes(gust, sin, cos)
     update_gust_axes_rate(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    share_before = gust.memory.unmeasured_share_by_heading_turn
-    gust.memory.unmeasured_share_by_heading_turn = unmeasured_share_by_heading_rate(
+    share_before = gust.memory.unmeasured_yawing_share_by_turn_now
+    gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(
         gust, V, heading_change / dt
     )
-    unmeasured_share = max(share_before, gust.memory.unmeasured_share_by_heading_turn)
-    gust.memory.unmeasured_share_by_past_heading_turns = min(
-        max(
-            np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_share_by_past_heading_turns, unmeasured_share
-        ),
+    unmeasured_share = max(share_before, gust.memory.unmeasured_yawing_share_by_turn_now)
+    gust.memory.unmeasured_yawing_share_by_past_turns = min(
+        max(np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns, unmeasured_share),
         1.0,
     )
-    gust.memory.unmeasured_share_by_start *= np.exp(-dt / pitching_lag_s)
+    gust.memory.unmeasured_pitching_share_by_start *= np.exp(-dt / pitching_lag_s)
     gust.memory.air_rotation_in_level_axes[1] = np.exp(
         -dt / pitching_lag_s
     ) * gust.memory.air_rotation_in_level_axes[1] + (
@@ -321,12 +319,15 @@ def update_gust_rotation(gust, y, attitude, dt):
             predicted_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
     else:
-        gust.memory.gust_velocity[:], gust.memory.initial_gust_variance_share = 0.0, 1.0
+        gust.memory.gust_velocity_change_since_start[:], gust.memory.remaining_initial_gust_variance_share = (
+            0.0,
+            1.0,
+        )
 
 
 @kernel
 def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, airspeed, dt):
-    """Update `gust_velocity` and `speed_relative_to_mean_air` for the elapsed dt s.
+    """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
 
     ahead, right, down, m/s: the velocity relative to the air if the gust had not changed. V m/s: airspeed; it
     is the speed if no gust is measured.
@@ -335,35 +336,46 @@ def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predi
     if not gust.output.is_gust_measured:
         return
     decay_factor = np.exp(-gust.config.gust_velocity_decay_rate * dt)
-    gust.memory.initial_gust_variance_share *= decay_factor * decay_factor
-    gust.memory.gust_velocity[0] = (
-        decay_factor * gust.memory.gust_velocity[0] + predicted_ahead - gust.memory.air_relative_velocity[0]
+    gust.memory.remaining_initial_gust_variance_share *= decay_factor * decay_factor
+    gust.memory.gust_velocity_change_since_start[0] = (
+        decay_factor * gust.memory.gust_velocity_change_since_start[0]
+        + predicted_ahead
+        - gust.memory.air_relative_velocity[0]
     )
-    gust.memory.gust_velocity[1] = (
-        decay_factor * gust.memory.gust_velocity[1] + predicted_right - gust.memory.air_relative_velocity[1]
+    gust.memory.gust_velocity_change_since_start[1] = (
+        decay_factor * gust.memory.gust_velocity_change_since_start[1]
+        + predicted_right
+        - gust.memory.air_relative_velocity[1]
     )
-    gust.memory.gust_velocity[2] = (
-        decay_factor * gust.memory.gust_velocity[2] + predicted_down - gust.memory.air_relative_velocity[2]
+    gust.memory.gust_velocity_change_since_start[2] = (
+        decay_factor * gust.memory.gust_velocity_change_since_start[2]
+        + predicted_down
+        - gust.memory.air_relative_velocity[2]
     )
     squared_speed = 0.0
     for i in range(3):
-        gust.memory.gust_velocity[i] = min(
-            max(gust.memory.gust_velocity[i], -gust.config.max_gust_velocity), gust.config.max_gust_velocity
+        gust.memory.gust_velocity_change_since_start[i] = min(
+            max(gust.memory.gust_velocity_change_since_start[i], -gust.config.max_gust_velocity),
+            gust.config.max_gust_velocity,
         )
-        squared_speed += (gust.memory.air_relative_velocity[i] + gust.memory.gust_velocity[i]) ** 2
+        squared_speed += (
+            gust.memory.air_relative_velocity[i] + gust.memory.gust_velocity_change_since_start[i]
+        ) ** 2
     gust.output.speed_relative_to_mean_air = max(np.sqrt(squared_speed), 0.5 * airspeed)
 
 
 @kernel
-def set_gust_drift_intensity(gust, altitude):
+def set_gust_rotation_intensity(gust, altitude):
     """Fill the intensity of turbulence at this altitude, m as measured."""
     height = min_true_height_m(altitude, gust.config.altitude_error_bound, gust.config.altitude_error_share)
-    gust.memory.gust_drift_intensity[0] = max(
-        gust.config.gust_drift_intensity_aloft[0], gust.config.gust_drift_intensity_at_1_m[0] / height**1.5
+    gust.memory.gust_rotation_intensity_per_airspeed[0] = max(
+        gust.config.gust_rotation_intensity_per_airspeed_aloft[0],
+        gust.config.gust_rotation_intensity_per_airspeed_at_1_m[0] / height**1.5,
     )
     for g in range(1, 3):
-        gust.memory.gust_drift_intensity[g] = max(
-            gust.config.gust_drift_intensity_aloft[g], gust.config.gust_drift_intensity_at_1_m[g] / height
+        gust.memory.gust_rotation_intensity_per_airspeed[g] = max(
+            gust.config.gust_rotation_intensity_per_airspeed_aloft[g],
+            gust.config.gust_rotation_intensity_per_airspeed_at_1_m[g] / height,
         )
 
 
@@ -456,15 +468,15 @@ def stop_accelerometers(gust):
             for j in range(3):
                 gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                     half_pitch_length_m
-                    * gust.memory.gust_drift_intensity[1]
+                    * gust.memory.gust_rotation_intensity_per_airspeed[1]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 1)
                 )
                 gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                     half_yaw_length_m
-                    * gust.memory.gust_drift_intensity[2]
+                    * gust.memory.gust_rotation_intensity_per_airspeed[2]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 2)
                 )
-        gust.memory.n_frames_with_axes_turn_variance = 3
+        gust.memory.n_frames_left_with_axes_turn_variance = 3
 
 
 @kernel
@@ -476,7 +488,7 @@ def unmeasured_gust_intensity_share(gust, g):
         gust.config.unmeasured_share_per_speed_variance
         * (
             gust.config.speed_error_variance
-            + gust.memory.initial_gust_variance_share * gust.config.gust_velocity_variance
+            + gust.memory.remaining_initial_gust_variance_share * gust.config.gust_velocity_variance
         )
         / max(gust.output.speed_relative_to_mean_air, 1.0) ** 2
         if gust.output.is_gust_measured
@@ -486,9 +498,9 @@ def unmeasured_gust_intensity_share(gust, g):
         gust.memory.unmeasured_intensity_share[g]
         + speed_error_share
         + (
-            gust.memory.unmeasured_share_by_start
+            gust.memory.unmeasured_pitching_share_by_start
             if g == 1
-            else gust.memory.unmeasured_share_by_past_heading_turns
+            else gust.memory.unmeasured_yawing_share_by_past_turns
         ),
         1.0,
     )
@@ -535,7 +547,7 @@ def unmeasured_gust_drift_intensity(gust, V, i, j, with_rolling_correlation_leng
         total += (
             gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, g)
             * unmeasured_gust_intensity_share(gust, g)
-            * gust.memory.gust_drift_intensity[g]
+            * gust.memory.gust_rotation_intensity_per_airspeed[g]
             * power_ratio
         )
     return total * max(V, gust.output.speed_relative_to_mean_air)
@@ -547,12 +559,12 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
     m/s."""
     if not gust.memory.has_fast_axes_turn:
         return
-    rolling_variance = 0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_drift_intensity[0]
+    rolling_variance = 0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
     yawing_variance = (
         0.5
         * gust_lag_s(gust, 2, V) ** 2
-        * gust.memory.gust_drift_intensity[2]
-        * gust.memory.unmeasured_share_by_past_heading_turns
+        * gust.memory.gust_rotation_intensity_per_airspeed[2]
+        * gust.memory.unmeasured_yawing_share_by_past_turns
     )
     for i in range(3):
         for j in range(3):
@@ -561,7 +573,7 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
             gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                 dt * V * (rolling_variance * roll_product + yawing_variance * yaw_product)
             )
-    gust.memory.n_frames_with_axes_turn_variance = 3
+    gust.memory.n_frames_left_with_axes_turn_variance = 3
 
 
 @kernel
@@ -573,8 +585,8 @@ def fill_frame_mean_gust(gust, frame_share):
     """
     for i in range(3):
         gust.output.mean_gust_acceleration[i] = frame_share * gust.memory.gust_angular_acceleration_sum[i]
-    if gust.memory.n_frames_with_axes_turn_variance > 0:
-        gust.memory.n_frames_with_axes_turn_variance -= 1
+    if gust.memory.n_frames_left_with_axes_turn_variance > 0:
+        gust.memory.n_frames_left_with_axes_turn_variance -= 1
         for i in range(3):
             for j in range(3):
                 gust.output.acceleration_variance_by_axes_turn[i, j] = (
@@ -599,13 +611,13 @@ def full_gust_drift_intensity(gust, V, rate_sensitivity, force_gust_sensitivity)
         total_sensitivity = abs(
             project_on_gust_axis(rate_sensitivity, gust.output.gust_axes_in_body, g)
         ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
-        total += total_sensitivity**2 * gust.memory.gust_drift_intensity[g]
+        total += total_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[g]
         if gust.memory.has_fast_axes_turn:
             total += (
                 0.5
                 * rolling_lag_s
                 * rolling_lag_s
-                * gust.memory.gust_drift_intensity[g]
+                * gust.memory.gust_rotation_intensity_per_airspeed[g]
                 * project_on_gust_axis(rate_sensitivity, gust.memory.gust_axes_rate, g) ** 2
             )
     return total * max(V, gust.output.speed_relative_to_mean_air)
@@ -626,7 +638,7 @@ def remaining_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_se
         total += (
             unmeasured_sensitivity
             + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
-        ) ** 2 * gust.memory.gust_drift_intensity[g]
+        ) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[g]
     return total * max(V, gust.output.speed_relative_to_mean_air)
 
 
@@ -665,10 +677,10 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
     gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
     gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     gust["config"]["wing_span"] = span_m
-    gust["config"]["gust_drift_intensity_aloft"] = turbulence.rotation_walk(span_m)
-    gust["config"]["gust_drift_intensity_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
-    gust["memory"]["gust_drift_intensity"], gust["memory"]["unmeasured_intensity_share"] = (
-        gust["config"]["gust_drift_intensity_aloft"],
+    gust["config"]["gust_rotation_intensity_per_airspeed_aloft"] = turbulence.rotation_walk(span_m)
+    gust["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
+    gust["memory"]["gust_rotation_intensity_per_airspeed"], gust["memory"]["unmeasured_intensity_share"] = (
+        gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
         MIN_UNMEASURED_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
     gust["config"]["altitude_error_bound"] = errors["altitude"].worst
@@ -694,12 +706,12 @@ def add_gust_estimate_noise(
     if statistical["forces"]["in_use"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
         flow_angle_noise_by_forces = np.sqrt(forces["accelerometer_innovation_variance"]) / np.abs(
-            forces["vane_error_effect_per_rad"][:, 1]
+            forces["acceleration_and_force_per_vane_error"][:, 1]
         )
-        statistical["forces"]["gust_estimate_noise_std"] = gust_acceleration_noise_std(
+        statistical["forces"]["gust_acceleration_noise_std"] = gust_acceleration_noise_std(
             flow_angle_noise_by_forces, design, y, u, span_m
         )
-    for name in ("input_noise_variance_without_air_data", "input_noise_variance"):
+    for name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
         statistical["noise"][name] += (
             gust_acceleration_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )

@@ -37,7 +37,7 @@ from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_INTENSITY_SHARES
 
 UNEXPLAINED_ACCELERATION_MEMORY_S = 0.1
 MIN_GYRO_NOISE_STD_RAD_S = 1e-5  # what perfect instruments are taken for
-_SETTLING_FRAMES = 400
+_KALMAN_SETTLING_FRAMES = 400
 
 
 FlightColumns = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
@@ -59,7 +59,7 @@ class WhiteningFilter:
         model_error_variance = (dt * declared.model_rad_s2) ** 2
         Q = np.diag(np.concatenate((model_error_variance, (1.0 - decay_factor**2) * process_std**2)))
         P = np.diag(np.concatenate((np.diagonal(self.R), process_std**2)))
-        for _ in range(_SETTLING_FRAMES):
+        for _ in range(_KALMAN_SETTLING_FRAMES):
             P = self._updated_covariance(P)
             P = self.F @ P @ self.F.T + Q
         self.S = P[:3, :3] + self.R

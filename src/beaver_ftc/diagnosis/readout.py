@@ -172,18 +172,18 @@ class SensorTest(NamedTuple):
 class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; alarmed: an alarm of its own stands.
 
-    worst_test_index: of the test with the largest ratio of residual to bound; worst_test_ratio: that ratio;
-    worst_test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced (sensors,): whether
-    a reading is not used any more. sample_time_s: between two samples. gust_change_bound_mps (poles,): bound
-    on the changes of a gust through the filters. predicted_reading, reading_error_bound (sensors,): SI.
-    commanded_engine_readings (2,): engine speed rpm, manifold pressure inHg, which the engine's sensors
-    should read.
+    worst_test_index: of the test with the largest ratio of residual to bound; worst_residual_bound_ratio:
+    that ratio; worst_test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced
+    (sensors,): whether a reading is not used any more. sample_time_s: between two samples.
+    gust_change_bound_mps (poles,): bound on the changes of a gust through the filters. predicted_reading,
+    reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm, manifold pressure
+    inHg, which the engine's sensors should read.
     """
 
     enabled: bool
     alarmed: bool
     worst_test_index: int
-    worst_test_ratio: float
+    worst_residual_bound_ratio: float
     worst_test: SensorTest
     isolated_sensor: int
     is_replaced: np.ndarray
@@ -300,9 +300,9 @@ class DiagnosisReadout:
         return MappedModelError(not error["is_outside_all_boxes"], error["error_now"].copy())
 
     @cached_property
-    def input_noise_variance(self) -> np.ndarray:
+    def acceleration_variance_by_input_noise(self) -> np.ndarray:
         """Variance of the noise of the model's own inputs, (3,) (rad/s2)^2."""
-        return np.array(self._fdi["statistical"]["noise"]["input_noise_variance"])
+        return np.array(self._fdi["statistical"]["noise"]["acceleration_variance_by_input_noise"])
 
     @cached_property
     def statistical_alarm_level(self) -> float:
@@ -366,9 +366,9 @@ def certificate_arrays_of_every_frame(
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
 RECORDED_BLOCK_FIELDS = (
-    "drift_decay_factor", "uncertainty_change_per_frame", "state", "P_xx", "P_xd", "P_dd", "drift_intensity",
-    "model_noise_variance", "gyro_noise_variance", "calm_air_prediction", "coarse_gust_response",
-    "regressor_filter_state", "regressor_response",
+    "drift_decay_factor", "uncertainty_change_over_bound_per_frame", "state", "P_xx", "P_xd", "P_dd",
+    "drift_intensity", "model_noise_variance", "gyro_noise_variance", "calm_air_prediction",
+    "coarse_gust_response", "regressor_filter_state", "regressor_response",
 )  # fmt: skip
 
 
@@ -452,7 +452,7 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
     output, redundancy = monitor["output"], monitor["redundancy"]
     config, memory = redundancy["config"], redundancy["memory"]
-    worst_test_index = int(output["worst_test"])
+    worst_test_index = int(output["worst_test_index"])
     test = redundancy["test"][worst_test_index]
     worst_sensor_test = SensorTest(
         float(test["residual"]), float(test["bound_per_s"]), float(test["bound_per_sample"]),
@@ -461,7 +461,7 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     )  # fmt: skip
     return SensorMonitor(
         bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,
-        float(output["worst_test_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
+        float(output["worst_residual_bound_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
         output["is_replaced"].astype(bool), float(config["sample_time_s"]),
         config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
         memory["reading_error_bound"].copy(), memory["commanded_engine_readings"].copy(),

@@ -309,7 +309,10 @@ def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
     if monitor.config.enabled and monitor.memory.start_stage:
-        row[column], row[column + 1] = monitor.output.worst_test_ratio, monitor.output.worst_test
+        row[column], row[column + 1] = (
+            monitor.output.worst_residual_bound_ratio,
+            monitor.output.worst_test_index,
+        )
     if columns > 2:
         for i in range(missing.size - 1, -1, -1):
             if missing[i]:

@@ -352,7 +352,7 @@ def _statistical(fdi: np.void) -> dict[str, float | None] | None:
     return {
         "time_s": _instant(alarm["detected_at_s"]),
         "alarm_level": float(tests["alarm_level"]),
-        "closest_approach": float(alarm["max_score_over_alarm_level"]),
+        "closest_approach": float(alarm["max_score_over_alarm_level_so_far"]),
     }
 
 
@@ -482,7 +482,9 @@ def landing_of(
         end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
-        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["max_score_over_alarm_level"])),
+        worst_residual_ratio=max(
+            *closest, float(fdi["statistical"]["alarm"]["max_score_over_alarm_level_so_far"])
+        ),
         statistical=_statistical(fdi),
         closest_approach=closest,
         authority=_authority(frame),

@@ -18,7 +18,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import declared_errors_for_plugin
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CASE_VARIANT
+from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_WORST_CASE_VARIANT_INDEX
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop import stepping as stages
@@ -270,7 +270,7 @@ def plugged(
         fdi["statistical"]["test_config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
         fdi["config"]["scheme_number"], fdi["config"]["isolation_variant"] = (
             PLUGIN_SCHEME_NUMBER,
-            PUBLISHED_WORST_CASE_VARIANT,
+            PUBLISHED_WORST_CASE_VARIANT_INDEX,
         )
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size

@@ -193,7 +193,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         "signature": now["signature"][:, h][:, felt],
         "jitter": dt * dt * then["model_noise_variance"][:, felt],
         "drift": drift, "bounded": tape.filters["bounded"][here][:-1][:, axes],
-        "pace": then["uncertainty_change_per_frame"],
+        "pace": then["uncertainty_change_over_bound_per_frame"],
     }  # fmt: skip
     if block.drift_correlation_length_m > 0.0:
         its["keep"] = then["drift_decay_factor"]

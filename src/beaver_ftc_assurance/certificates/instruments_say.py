@@ -26,7 +26,7 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
 
     monitor: at the alarm.
     """
-    number, failed = monitor.worst_test_index, monitor.worst_test_ratio > 1.0
+    number, failed = monitor.worst_test_index, monitor.worst_residual_bound_ratio > 1.0
     if failed and number >= N_COMPUTED_TESTS:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:

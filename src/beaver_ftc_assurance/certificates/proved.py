@@ -64,7 +64,10 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
             shares = chance.likelihood_shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
-            shares |= {"watch_share": monitor.worst_test_ratio, "watch_test": monitor.worst_test_index}
+            shares |= {
+                "watch_share": monitor.worst_residual_bound_ratio,
+                "watch_test": monitor.worst_test_index,
+            }
         values = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]  # as in a log of ours
         rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
     log.open([*columns, *shares])

@@ -47,7 +47,10 @@ def fdi(rng):
         0.9,
         2.0,
     )
-    statistical["noise"]["input_noise_variance"], statistical["noise"]["uncertainty_bound"] = (
+    (
+        statistical["noise"]["acceleration_variance_by_input_noise"],
+        statistical["noise"]["uncertainty_bound"],
+    ) = (
         (1e-6, 4e-6, 9e-6),
         (0.02, 0.03, 0.05),
     )
@@ -62,7 +65,7 @@ def fdi(rng):
     (
         air["output"]["accounts_for_gusts"],
         air["config"]["rolling_gust_correlation_length"],
-        air["memory"]["gust_drift_intensity"],
+        air["memory"]["gust_rotation_intensity_per_airspeed"],
     ) = (
         1,
         34.0,
@@ -114,15 +117,21 @@ def declared_along(statistical, m):
     )
     bound = np.abs(m) @ statistical["noise"]["uncertainty_bound"]
     gusts = air["output"]["rate_damping"] @ air["output"]["gust_axes_in_body"]
-    walk = gusts @ np.diag(air["memory"]["gust_drift_intensity"]) @ gusts.T
+    walk = gusts @ np.diag(air["memory"]["gust_rotation_intensity_per_airspeed"]) @ gusts.T
     if air["memory"]["has_fast_axes_turn"]:
         turned = air["output"]["rate_damping"] @ air["memory"]["gust_axes_rate"]
         longest_s = air["config"]["rolling_gust_correlation_length"] / V
-        walk += 0.5 * longest_s**2 * turned @ np.diag(air["memory"]["gust_drift_intensity"]) @ turned.T
+        walk += (
+            0.5
+            * longest_s**2
+            * turned
+            @ np.diag(air["memory"]["gust_rotation_intensity_per_airspeed"])
+            @ turned.T
+        )
     moves = float(air["output"]["accounts_for_gusts"])
     size = max(bound, MIN_UNCERTAINTY_BOUND_RAD_S2)
     drift = statistical["noise"]["drift_intensity_over_squared_bound"] * size**2 + moves * V * m @ walk @ m
-    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["input_noise_variance"])) ** 2
+    jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"])) ** 2
     return (
         m**2 @ noise,
         jitter,
@@ -334,7 +343,11 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
         0  # else no view of pitch tries what answers the gusts
     )
     for b, block in enumerate((pitch, lateral)):
-        block["alarm_level"], block["noise_share_of_alarm_level"], block["uncertainty_change_per_frame"] = (
+        (
+            block["alarm_level"],
+            block["noise_share_of_alarm_level"],
+            block["uncertainty_change_over_bound_per_frame"],
+        ) = (
             5.0 + b,
             0.5 + b,
             0.01 + b,
@@ -343,7 +356,7 @@ def test_a_view_has_levels_and_tolerances_of_the_axes_it_looks_at(fdi):
     for v, view in enumerate(statistical["views"][:5]):
         axes, column = pitch if v == PITCH_AXIS else lateral, v in (PAST_AILERON, PAST_RUDDER)
         block, n = view["block"], int(axes["n_regressors"])
-        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_per_frame"):
+        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_over_bound_per_frame"):
             assert block[name] == axes[name]
         assert (block["n_axes"], block["drift_decay_factor"]) == (1, 1.0)
         assert block["n_regressors"] == n + column

@@ -133,7 +133,7 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta[k], noise[k]
         fdi["bound"]["gyro_error_change_bound"], record["output"]["residual"] = noise[k + 1], 99.0
-        on(detection_filters.predict_fdae, fdi, x[k], believed[k], False)
+        on(detection_filters.advance_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
     assert record["memory"]["xhat"] == pytest.approx(shares.sum(axis=0))

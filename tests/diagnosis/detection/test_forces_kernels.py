@@ -79,7 +79,7 @@ def per_coefficient(y=Y):
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates"] = rate, 1
+    record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates_up_to_minimum"] = rate, 1
     update_all_force_innovations(record, fdi["statistical"]["gust"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
@@ -109,8 +109,8 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
         slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
-        assert force["surface_effect_per_rad"][s] == pytest.approx(slope, abs=1e-9)
-        assert force["surface_effect_at_command"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        assert force["scaled_force_per_surface_rad"][s] == pytest.approx(slope, abs=1e-9)
+        assert force["scaled_force_of_surface_at_command"][s] == pytest.approx(slope * U[s], abs=1e-9)
         own = [
             t
             for t in AIRCRAFT.measurable_forces
@@ -119,7 +119,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
         size = sum(
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
-        assert force["surface_effect_per_rad_error_bound"][s] == pytest.approx(
+        assert force["scaled_force_per_surface_rad_error_bound"][s] == pytest.approx(
             0.05 * per_coefficient() * size
         )
 
@@ -172,7 +172,7 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
             Y[place] + 10 * DT * record["flow_angle_rate"][f]
         )
         assert force["innovation_per_flow_angle_drift"] == pytest.approx(
-            11 * DT * force["vane_error_effect_per_rad"][1]
+            11 * DT * force["acceleration_and_force_per_vane_error"][1]
         )
 
 
@@ -196,7 +196,7 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
         np.std(drawn, axis=0), rel=0.06
     )
     without = record["component"]["noise_variance"][:, 0] - record["component"]["noise_variance"][:, 1]
-    slopes = record["component"]["vane_error_effect_per_rad"][:, 1] * np.radians([0.02, 0.03])
+    slopes = record["component"]["acceleration_and_force_per_vane_error"][:, 1] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
@@ -230,12 +230,12 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
             jitter = record["component"]["noise_variance"][:, inertial]
             assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     more = (
-        record["component"]["innovation_drift_intensity"]
-        - felt()["statistical"]["forces"]["component"]["innovation_drift_intensity"]
+        record["component"]["inertial_innovation_drift_intensity"]
+        - felt()["statistical"]["forces"]["component"]["inertial_innovation_drift_intensity"]
     )
     walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_COMPONENT, NORMAL_COMPONENT)]
     assert np.sqrt(more) == pytest.approx(
-        np.abs(record["component"]["vane_error_effect_per_rad"][:, 1]) * walked
+        np.abs(record["component"]["acceleration_and_force_per_vane_error"][:, 1]) * walked
     )
 
 
@@ -318,7 +318,7 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
         np.eye(3),
         0,
     )
-    air["memory"]["gust_drift_intensity"], air["memory"]["unmeasured_intensity_share"] = (
+    air["memory"]["gust_rotation_intensity_per_airspeed"], air["memory"]["unmeasured_intensity_share"] = (
         (1e-5, 2e-5, 3e-5),
         0.0,
     )
@@ -329,7 +329,7 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
         m[3:] @ component["innovation_per_air_rotation"]
     )
     still = float(view["block"]["drift_intensity"][0, 0])
-    air["memory"]["gust_drift_intensity"] = 0.0
+    air["memory"]["gust_rotation_intensity_per_airspeed"] = 0.0
     Across.blur(view, statistical, 45.0)
     gusts = still - float(view["block"]["drift_intensity"][0, 0])
     assert gusts == pytest.approx(45.0 * np.sum(by_both**2 * np.array([1e-5, 2e-5, 3e-5])))
@@ -337,14 +337,14 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
 
 def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
     statistical = viewed["statistical"]
-    statistical["forces"]["gust_estimate_noise_std"] = 0.1, 0.2, 0.3
-    for v, gust_estimate_noise_std in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
+    statistical["forces"]["gust_acceleration_noise_std"] = 0.1, 0.2, 0.3
+    for v, gust_acceleration_noise_std in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
         view = statistical["views"][v]
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
         own = 0.8 * np.sqrt(statistical["forces"]["component"][NORMAL_COMPONENT]["noise_variance"][0])
         assert view["block"]["model_noise_variance"][0] == pytest.approx(
-            (own + 0.6 * 0.2 * gust_estimate_noise_std) ** 2
+            (own + 0.6 * 0.2 * gust_acceleration_noise_std) ** 2
         )
 
 
@@ -353,7 +353,7 @@ def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     for f, name, place, axis in ((SIDE_COMPONENT, "CY", 1, 2), (NORMAL_COMPONENT, "CZ", 0, 1)):
         off = Y + 1e-5 * np.eye(5)[place]
         slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
-        assert record["component"][f]["vane_error_effect_per_rad"] == pytest.approx(
+        assert record["component"][f]["acceleration_and_force_per_vane_error"] == pytest.approx(
             [-ALONG_Y[axis, place], -slope], rel=1e-4
         )
 
@@ -364,7 +364,7 @@ def test_constant_errors_are_tolerated_term_by_term():
     terms = forces.force_terms(AIRCRAFT, NORMAL_COMPONENT)
     shares = force["regressor_tolerance"][: len(terms)] / np.abs([t.value for t in terms])
     assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
-    slope = abs(force["vane_error_effect_per_rad"][1]) / per_coefficient()
+    slope = abs(force["acceleration_and_force_per_vane_error"][1]) / per_coefficient()
     of_constant = 0.07 * abs(terms[0].value) + np.radians(0.5) * slope
     assert terms[0].is_constant
     assert force["regressor_tolerance"][0] == pytest.approx(of_constant)
@@ -396,9 +396,9 @@ def test_in_turbulence_gusts_turn_the_flow():
     still, moving = (
         felt(Bounds(turbulence=air))["statistical"]["forces"]["component"] for air in ("none", "moderate")
     )
-    gained = moving["innovation_drift_intensity"] - still["innovation_drift_intensity"]
+    gained = moving["inertial_innovation_drift_intensity"] - still["inertial_innovation_drift_intensity"]
     sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)
-    more = np.sqrt(gained) / np.abs(moving["vane_error_effect_per_rad"][:, 1])
+    more = np.sqrt(gained) / np.abs(moving["acceleration_and_force_per_vane_error"][:, 1])
     tau, n = L / V, 40_000  # (1 + sqrt(3) tau s) / (1 + tau s)^2, of white noise of intensity sigma^2 tau
     noise, one, two, gust = rng.normal(0.0, sigma * np.sqrt(tau / dt), n), 0.0, 0.0, np.empty(n)
     for k in range(n):
@@ -483,9 +483,9 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     force = viewed["statistical"]["forces"]["component"][second - SIDE_FORCE]
     s = int(view["orthogonal_to_surface"])
     of_it = (
-        force["vane_error_effect_per_rad"]
+        force["acceleration_and_force_per_vane_error"]
         if s == VANE_VIEW
-        else (G[first, s], force["surface_effect_per_rad"][s])
+        else (G[first, s], force["scaled_force_per_surface_rad"][s])
     )
     assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
@@ -510,7 +510,9 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
         np.linalg.qr(rng.normal(size=(3, 3)))[0],
     )
     force = statistical["forces"]["component"][SIDE_COMPONENT]
-    column = np.array([force["vane_error_roll_acceleration_per_rad"], *force["vane_error_effect_per_rad"]])
+    column = np.array(
+        [force["roll_acceleration_per_vane_error"], *force["acceleration_and_force_per_vane_error"]]
+    )
     share = Across.turn(viewed, view, np.zeros((3, 4)))
     mix = view["direction"][[ROLL, YAW, SIDE_FORCE]]
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
@@ -618,7 +620,7 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     swinging["force"][1] += 20.0
     for looks in (1, 2):
         update_all_force_innovations(statistical["forces"], statistical["gust"], swinging, U, DT)
-        assert statistical["forces"]["n_updates"] == looks
+        assert statistical["forces"]["n_updates_up_to_minimum"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         active = [
             v for v in statistical["views"] if parity.uses_force(v) and parity.max_test_score_of_view(v) > 0.0
@@ -633,7 +635,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
         block["gyro_noise_variance"] = 1e-8
     Across.observe(viewed, np.zeros(3), G, 0.0 * G, Y, 1, False)
     assert statistical["views"]["decaying_peak_score"][UP_VIEW] == pytest.approx(
-        8.0 * (1.0 - 0.01 / parity.PEAK_SCORE_MEMORY_RATIO)
+        8.0 * (1.0 - 0.01 / parity.PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
     )
 
 
@@ -659,9 +661,9 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
     view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][NORMAL_COMPONENT]["surface_effect_at_command"][
-        ELEVATOR
-    ]
+    moment = viewed["statistical"]["forces"]["component"][NORMAL_COMPONENT][
+        "scaled_force_of_surface_at_command"
+    ][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
     )
@@ -671,7 +673,7 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
 def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v):
     statistical, rng = viewed["statistical"], np.random.default_rng(6)
     (
-        statistical["noise"]["input_noise_variance"],
+        statistical["noise"]["acceleration_variance_by_input_noise"],
         statistical["noise"]["uncertainty_bound"],
         statistical["noise"]["drift_intensity_over_squared_bound"],
     ) = (
@@ -685,16 +687,21 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         rng.normal(size=(3, 3)),
         np.eye(3),
     )
-    air["memory"]["gust_drift_intensity"] = 1e-5, 2e-5, 3e-5
+    air["memory"]["gust_rotation_intensity_per_airspeed"] = 1e-5, 2e-5, 3e-5
     component["noise_variance"], component["deflection_error_effect_bound"] = (
         ((2e-6, 1e-7), (3e-5, 2e-5)),
         (0.001, 0.002),
     )
-    component["innovation_drift_intensity"], statistical["forces"]["dynamic_pressure_over_trim"] = (
+    component["inertial_innovation_drift_intensity"], statistical["forces"]["dynamic_pressure_over_trim"] = (
         (1e-4, 2e-4),
         1.2,
     )
-    for name in ("accounts_for_gusts", "rate_damping", "gust_axes_in_body", "gust_drift_intensity"):
+    for name in (
+        "accounts_for_gusts",
+        "rate_damping",
+        "gust_axes_in_body",
+        "gust_rotation_intensity_per_airspeed",
+    ):
         holder(statistical["inertial_gust"], name)[name] = holder(air, name)[name]
     (
         air["memory"]["unmeasured_intensity_share"],
@@ -715,18 +722,18 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     )
     gusts = 45.0 * np.sum(
         (np.sqrt(seen) * rate_gust_sensitivity + force_gust_sensitivity) ** 2
-        * air["memory"]["gust_drift_intensity"]
+        * air["memory"]["gust_rotation_intensity_per_airspeed"]
     )
     sizes = np.sqrt(
         [
-            *statistical["noise"]["input_noise_variance"],
+            *statistical["noise"]["acceleration_variance_by_input_noise"],
             *component["noise_variance"][:, int(view["uses_inertial_flow_angle"])],
         ]
     )
     assert block["model_noise_variance"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
     bound = np.abs(m) @ [0.02, 0.02, 0.02, 0.0012, 0.0024]
     assert view["uncertainty_bound"][0] == pytest.approx(bound)
-    of_forces = m[3:] ** 2 @ component["innovation_drift_intensity"]
+    of_forces = m[3:] ** 2 @ component["inertial_innovation_drift_intensity"]
     drift_intensity = 1.2**2 * view["uses_inertial_flow_angle"] * of_forces
     assert block["drift_intensity"][0, 0] == pytest.approx(
         gusts + drift_intensity + 2.0 * max(bound, 1e-3) ** 2
@@ -740,7 +747,7 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(dynamic_pressure_over_t
     fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
     record = fdi["statistical"]["forces"]
     update_all_force_innovations(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
-    slopes = dynamic_pressure_over_trim * record["component"]["vane_error_effect_per_rad"][:, 1]
+    slopes = dynamic_pressure_over_trim * record["component"]["acceleration_and_force_per_vane_error"][:, 1]
     noise = np.radians([0.02, 0.03])
     assert record["dynamic_pressure_over_trim"] == pytest.approx(dynamic_pressure_over_trim)
     assert record["component"]["noise_variance"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
@@ -769,7 +776,7 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     damped = (
         record["component"]["innovation_per_air_rotation"]
         @ turning
-        / record["component"]["vane_error_effect_per_rad"][:, 1]
+        / record["component"]["acceleration_and_force_per_vane_error"][:, 1]
     )
     assert still - record["y_without_vanes"][:2] == pytest.approx(damped[::-1])
 
@@ -861,7 +868,7 @@ def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
     apart(noise=sizes)
     told = {"has_engine_errors": engine, "engine_power_error_kw": 7.0, "density_power_error_kw": 31.0}
     found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f][
-        "noise_variance_in_trim"
+        "trim_noise_variance_with_without_vane"
     ]
     sd = dict(zip(NOISY, sizes, strict=True))
     sd |= {axis: np.radians(sd[axis]) for axis in ("alpha", "beta", "p", "q", "r")}

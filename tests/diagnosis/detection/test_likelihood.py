@@ -160,7 +160,7 @@ def test_a_bounded_uncertainty_adds_no_more_than_is_allowed_for(case, seed, cour
     rng, settled, frames, eta_bar = np.random.default_rng(seed), 600, 90, 0.02
     block = _block(case, STEP_FAULT)
     n = int(block["n_axes"])
-    block["alarm_level"], block["uncertainty_change_per_frame"] = 6.6, np.inf
+    block["alarm_level"], block["uncertainty_change_over_bound_per_frame"] = 6.6, np.inf
     signature = np.zeros((settled + frames, 1, n))
     signature[settled:] = np.cumsum(rng.normal(size=(frames, 1, n)), axis=0)
     size = {"bang-bang": np.sign(rng.normal(size=(settled + frames, n))), "constant": np.ones(n)}.get(
@@ -190,7 +190,7 @@ def _allowed(block):
 def test_the_allowance_is_not_absurdly_wide():
     """A step against a step at its onset: the difference of two bounds, and what the ringing is given."""
     block = _block("one axis", STEP_FAULT)
-    block["alarm_level"], block["uncertainty_change_per_frame"] = 6.6, np.inf
+    block["alarm_level"], block["uncertainty_change_over_bound_per_frame"] = 6.6, np.inf
     signature = np.zeros((800, 1, 1))
     signature[640:] = 1.0
     d = 0.02 * np.ones((800, 1))

@@ -56,7 +56,7 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
         "correlation_bound_by_varying_uncertainty",
         "correlation_bound_by_rate_limited_uncertainty",
         "correlation_by_calm_air",
-        "remaining_growth",
+        "remaining_growth_share",
         "signature_filter_state",
         "correlation_weight",
         "regressor_correlation",
@@ -69,7 +69,7 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
         kept = by_onset(block, name)
         assert (np.delete(kept, 4, axis=-2) == 3.0).all(), name
         cleared = kept[:2, 4] if name == "regressor_correlation" else kept[..., 4, :]
-        assert (cleared == (1.0 if name == "remaining_growth" else 0.0)).all(), name
+        assert (cleared == (1.0 if name == "remaining_growth_share" else 0.0)).all(), name
 
 
 def test_of_a_constant_the_filter_leaves_what_stay_says():
@@ -90,7 +90,7 @@ def test_a_steps_transient_sums_to_the_inverse_gain(axes):
     block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
     likelihood.fill_uncertainty_response(block, bounded, DT)
     sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
-    expected = likelihood.RINGING_FACTOR * np.abs(sums) @ bounded[:axes]
+    expected = likelihood.TRANSIENT_RINGING_SUM_FACTOR * np.abs(sums) @ bounded[:axes]
     assert block["transient_uncertainty_response"][:axes] == pytest.approx(expected, rel=1e-6)
     assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
 
@@ -101,7 +101,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     (
         block["constant_uncertainty_response"],
         block["transient_uncertainty_response"],
-        block["uncertainty_change_per_frame"],
+        block["uncertainty_change_over_bound_per_frame"],
     ) = (
         (0.1, 0.2),
         (0.3, 0.4),
@@ -303,7 +303,10 @@ def test_a_lane_without_information_comes_to_nothing():
 
 def shapes(kind, frames=5):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
-    block["hypothesis"]["remaining_growth_decay_factor"], block["onset_tests"]["remaining_growth"] = 0.8, 1.0
+    block["hypothesis"]["remaining_growth_decay_factor"], block["onset_tests"]["remaining_growth_share"] = (
+        0.8,
+        1.0,
+    )
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
@@ -475,7 +478,7 @@ def with_scores(*scores, alarms=1):
     _, record = detector(detected_at_s=-1.0)
     for block, values in zip(record["block"], scores, strict=True):
         block["hypothesis"]["score"][:3], block["hypothesis"]["raises_alarm"][:3] = values, alarms
-        block["hypothesis"]["axis"][:3], block["hypothesis"]["log_column_index"][:3] = (0, 1, 2), (0, 1, 2)
+        block["hypothesis"]["axis"][:3], block["hypothesis"]["score_column_index"][:3] = (0, 1, 2), (0, 1, 2)
     return record
 
 

@@ -141,7 +141,7 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
         for h in block["hypothesis"][: block["n_hypotheses"]]:
             if h["raises_alarm"]:
                 place = column[LOSS][int(h["surface"])] if h["kind"] == LOSS else 3 + h["axis"]
-                assert h["log_column_index"] == place
+                assert h["score_column_index"] == place
     assert alone.detector["test_config"]["n_score_columns"] == 6
     assert alone.detector["block"]["n_hypotheses"].all()
 
@@ -173,7 +173,7 @@ def test_the_times_and_levels_of_a_detector(alone):
     for block in blocks:
         assert block["alarm_level"] == record["test_config"]["alarm_level"]
         assert block["noise_share_of_alarm_level"] == 0.5
-        assert block["uncertainty_change_per_frame"] == pytest.approx(15.0 / 50.0)
+        assert block["uncertainty_change_over_bound_per_frame"] == pytest.approx(15.0 / 50.0)
         assert block["hypothesis"]["remaining_growth_decay_factor"] == pytest.approx(exp(-1.5 / 50.0))
     for bounds, chance in (({}, 0.0), ({"turbulence": "light"}, 0.5), ({"sensors": "tactical-grade"}, 0.5)):
         assert [block["noise_share_of_alarm_level"] for block in Detector(50.0, bounds=bounds).blocks] == [
@@ -313,9 +313,9 @@ def test_the_noise_of_what_the_model_is_made_of_is_white():
         noise, _, quantum = getattr(given.sensors, name).noise_bias_quantum
         jitter += slope**2 * (noise**2 + quantum**2 / 12.0)
     still, gusty = as_set_up(UNEVEN), as_set_up({**UNEVEN, "turbulence": "light"})
-    assert still["noise"]["input_noise_variance"] == pytest.approx(jitter)
+    assert still["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(jitter)
     seen = gust_jitter(given.sensors, design_record()[0], SPAN_M)
-    assert gusty["noise"]["input_noise_variance"] == pytest.approx(jitter + seen**2)
+    assert gusty["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(jitter + seen**2)
     assert still["noise"]["deflection_error_effect_bound"] == pytest.approx(
         radians(0.5) * np.abs(G).sum(axis=1)
     )
@@ -393,22 +393,24 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     forces = statistical["forces"]
     statistical["gust"]["config"]["wing_span"] = SPAN_M
     forces["in_use"], forces["component"]["accelerometer_innovation_variance"] = known, (0.3**2, 0.2**2)
-    forces["component"]["vane_error_effect_per_rad"][:, 1] = -6.0, 50.0
+    forces["component"]["acceleration_and_force_per_vane_error"][:, 1] = -6.0, 50.0
     gusts.add_gust_estimate_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
     added = bound_kernels.gust_acceleration_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert np.sqrt(statistical["noise"]["input_noise_variance"]) == pytest.approx(added, rel=0.02)
+    assert np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"]) == pytest.approx(
+        added, rel=0.02
+    )
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
     expected = bound_kernels.gust_acceleration_noise_std(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert forces["gust_estimate_noise_std"] == pytest.approx(expected)
+    assert forces["gust_acceleration_noise_std"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])
 def test_what_an_aircrafts_terms_are_off_may_change_sides_within_a_frame(error, pace):
     """A square wave of the frame rate, -1 and 1 by turns: its largest change is twice its bound."""
     aircraft = SimpleNamespace(model_error_rad_s2=error)
-    assert statistical.uncertainty_change_per_frame(
+    assert statistical.uncertainty_change_over_bound_per_frame(
         Statistical(uncertainty_rad_s=15.0), aircraft, 0.02
     ) == pytest.approx(pace)
 
@@ -433,22 +435,22 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
-    record.noise.base_uncertainty_change_per_frame = 0.02
+    record.noise.base_change_over_bound_per_frame = 0.02
     rng = np.random.default_rng(1)
     steps = rng.dirichlet(np.ones(20)) * 0.25
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
         u = error_map.surface_positions_before.copy()
         u[way] += step * (error_map.travel_high - error_map.travel_low)[way]
         statistical.update_uncertainty_change(record.noise, record.block, error_map, u)
-        assert [block.uncertainty_change_per_frame for block in record.block] == pytest.approx(
+        assert [block.uncertainty_change_over_bound_per_frame for block in record.block] == pytest.approx(
             [0.02 + 2.0 * step / 0.25] * 3
         )
     statistical.update_uncertainty_change(
         record.noise, record.block, error_map, error_map.surface_positions_before.copy()
     )
-    assert record.block[0].uncertainty_change_per_frame == pytest.approx(0.02)
+    assert record.block[0].uncertainty_change_over_bound_per_frame == pytest.approx(0.02)
     statistical.update_uncertainty_change(record.noise, record.block, error_map, error_map.travel_low.copy())
-    assert record.block[0].uncertainty_change_per_frame == 2.0
+    assert record.block[0].uncertainty_change_over_bound_per_frame == 2.0
 
 
 def test_a_surface_that_stands_still_again_moves_no_error():
@@ -456,9 +458,9 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
-    record.noise.base_uncertainty_change_per_frame, paces = 0.02, []
+    record.noise.base_change_over_bound_per_frame, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
         statistical.update_uncertainty_change(record.noise, record.block, error_map, np.array(u))
-        paces.append(float(record.block[1].uncertainty_change_per_frame))
+        paces.append(float(record.block[1].uncertainty_change_over_bound_per_frame))
     shares = [0.0, 0.02 / 0.45, 0.0, 0.02, 0.02]  # of the travel of the surface that moves farthest
     assert paces == pytest.approx([0.02 + 8.0 * share for share in shares])

@@ -68,12 +68,12 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
     thin, detector = float(alone.fdi["bound"]["declared_errors"]["density_power_error_kw"]), alone.detector
-    expected = detector["noise"]["input_noise_variance_without_air_data"].copy()
+    expected = detector["noise"]["acceleration_variance_without_air_data"].copy()
     for which in range(N_INPUT_READINGS):
         expected += (
             moved(design, *flown_there, which, thin) * detector["noise"]["reading_noise_std"][which]
         ) ** 2
-    assert detector["noise"]["input_noise_variance"] == pytest.approx(expected, rel=1e-5)
+    assert detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
         axes = block["axis"][: block["n_axes"]]
         assert block["model_noise_variance"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)

@@ -132,7 +132,7 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)
-    mean = parity.max_bounded_uncertainty_gain(TONE_FREQUENCIES_RAD_S, PACE)
+    mean = parity.derive_max_tone_mean_of_uncertainty(TONE_FREQUENCIES_RAD_S, PACE)
     assert view["tone_tests"]["correlation_bound_by_uncertainty"] == pytest.approx(
         2.0 * passed * mean * (faded.sum() + beat)
     )
@@ -158,7 +158,7 @@ def test_of_a_bounded_uncertainty_no_more_is_heard_than_of_the_steepest_wave(x, 
     triangle = np.arcsin(np.cos(phase))  # of slope one
     wave = np.clip(triangle / x, -1.0, 1.0) if steep else triangle / x
     assert np.mean(np.cos(phase) * wave) == pytest.approx(
-        parity.max_bounded_uncertainty_gain(np.array([x]), 1.0)[0], rel=1e-6
+        parity.derive_max_tone_mean_of_uncertainty(np.array([x]), 1.0)[0], rel=1e-6
     )
 
 
@@ -172,7 +172,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = parity.max_bounded_uncertainty_gain(np.array([x]), 1.0)[0]
+    most = parity.derive_max_tone_mean_of_uncertainty(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 

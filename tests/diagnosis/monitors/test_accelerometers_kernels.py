@@ -39,7 +39,7 @@ def new_watch(lead=ALPHA_FLOW_TEST, bound=1e-3):
     monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
     (
         monitor["output"]["isolated_sensor"],
-        monitor["output"]["alarm_test"],
+        monitor["output"]["alarm_test_index"],
         monitor["output"]["alarmed"],
         monitor["config"]["min_frozen_samples"],
     ) = NO_SENSOR, lead, 1, 3
@@ -53,7 +53,7 @@ def new_watch(lead=ALPHA_FLOW_TEST, bound=1e-3):
 def looks(monitor, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
-        monitor["redundancy"]["test"]["residual"][monitor["output"]["alarm_test"]] = residual
+        monitor["redundancy"]["test"]["residual"][monitor["output"]["alarm_test_index"]] = residual
         sensor_monitor.count_identical_samples(monitor, signal)
         sensor_monitor.update_cleared_sensors(monitor, signal)
         monitor["memory"]["reading_two_samples_ago"] = monitor["redundancy"]["memory"]["previous_reading"]
@@ -131,12 +131,17 @@ def test_where_an_accelerometer_has_leapt_the_reading_s_own_says_nothing(sensor)
 def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate():
     for h in (0.002, 0.01, 0.02):
         monitor = new_watch()
-        monitor["redundancy"]["config"]["sample_time_s"], monitor["memory"]["max_accelerometer_jump"] = h, 3.0
+        (
+            monitor["redundancy"]["config"]["sample_time_s"],
+            monitor["memory"]["fading_max_accelerometer_jump"],
+        ) = h, 3.0
         for _ in range(round(2.0 / h)):
             sensor_monitor.count_identical_samples(
                 monitor, monitor["redundancy"]["memory"]["previous_reading"].copy()
             )
-        assert monitor["memory"]["max_accelerometer_jump"] == pytest.approx(3.0 * np.exp(-1.0), rel=0.02)
+        assert monitor["memory"]["fading_max_accelerometer_jump"] == pytest.approx(
+            3.0 * np.exp(-1.0), rel=0.02
+        )
 
 
 def test_long_after_the_alarm_a_leap_says_nothing():
@@ -145,8 +150,14 @@ def test_long_after_the_alarm_a_leap_says_nothing():
         (0.01, 99, set(FORCES)), (0.01, 100, set()), (0.002, 499, set(FORCES)), (0.002, 500, set()),
     ):  # fmt: skip
         monitor = new_watch()
-        monitor["redundancy"]["config"]["sample_time_s"], monitor["memory"]["n_summed_samples"] = h, n_summed
-        monitor["memory"]["min_flow_reading"], monitor["memory"]["max_flow_reading"] = -1.0, 99.0
+        monitor["redundancy"]["config"]["sample_time_s"], monitor["memory"]["n_samples_since_alarm"] = (
+            h,
+            n_summed,
+        )
+        (
+            monitor["memory"]["min_flow_reading_since_alarm"],
+            monitor["memory"]["max_flow_reading_since_alarm"],
+        ) = -1.0, 99.0
         monitor["redundancy"]["test"]["filtered_bound"][CLIMB_TEST] = 99.0
         looks(monitor, course(ALPHA, [0.05]), [0.05])
         assert cleared(monitor) == clear
@@ -188,7 +199,7 @@ def test_the_look_of_the_alarm_counts_for_a_jump_only():
     monitor = new_watch()
     looks(monitor, course(ALPHA, jump + 1e-7 * np.sin(np.arange(300.0))), [jump, *np.zeros(299)])
     assert cleared(monitor) == set()
-    assert monitor["memory"]["residual_sum"][1] == 0.0
+    assert monitor["memory"]["flow_residual_sum_since_alarm"][1] == 0.0
 
 
 def test_scatter_of_a_vane_does_not_go_on():
@@ -212,7 +223,7 @@ def test_who_stands_still_is_frozen(lead):
 
 def test_an_airspeed_s_error_is_in_the_density_too():
     seen = new_watch(SPEED_TEST, bound=1.0)
-    seen["memory"]["exceeded_tests"][DENSITY_TEST] = 1
+    seen["memory"]["tests_exceeded_since_alarm"][DENSITY_TEST] = 1
     looks(seen, course(AIRSPEED, [1e-5]), [0.5])
     assert cleared(seen) == set(FORCES)
     for size, clear in ((0.99, set()), (1.01, {AIRSPEED})):
@@ -250,7 +261,7 @@ def test_a_climb_that_shows_clears_nobody():
     monitor = new_watch(bound=1.0)
     (
         monitor["redundancy"]["test"]["filtered_bound"][CLIMB_TEST],
-        monitor["memory"]["exceeded_tests"][CLIMB_TEST],
+        monitor["memory"]["tests_exceeded_since_alarm"][CLIMB_TEST],
         monitor["memory"]["filtered_climb_error_m"],
     ) = (
         1e-9,
@@ -258,9 +269,9 @@ def test_a_climb_that_shows_clears_nobody():
         1.0,
     )
     assert not sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
-    monitor["memory"]["exceeded_tests"][CLIMB_TEST] = 0
+    monitor["memory"]["tests_exceeded_since_alarm"][CLIMB_TEST] = 0
     assert sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
-    monitor["output"]["alarm_test"] = BETA_FLOW_TEST
+    monitor["output"]["alarm_test_index"] = BETA_FLOW_TEST
     assert not sensor_monitor.flow_sensor_error_would_exceed_other_test(monitor, level())
 
 
@@ -270,7 +281,7 @@ def test_other_alarms_are_none_of_theirs():
         monitor["memory"]["n_identical_samples"] = 9
         looks(monitor, course(ALPHA, [0.1]), [0.1])
         assert cleared(monitor) == set()
-        assert not monitor["memory"]["n_summed_samples"]
+        assert not monitor["memory"]["n_samples_since_alarm"]
 
 
 @pytest.mark.parametrize("i", range(3))
@@ -283,14 +294,14 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     moved = v + 1e-4 * np.eye(3)[i]
     speed = np.linalg.norm(moved)
-    monitor["memory"]["residual_sum"] = (
+    monitor["memory"]["flow_residual_sum_since_alarm"] = (
         speed - V, np.arctan2(moved[2], moved[0]) - alpha, np.arcsin(moved[1] / speed) - beta
     )  # fmt: skip
     sensor_monitor.suspect_accelerometers(monitor, False)
     assert monitor["memory"]["spurious_velocity"] == pytest.approx(1e-4 * np.eye(3)[i], abs=1e-8)
     assert np.flatnonzero(monitor["output"]["is_suspect"]).tolist() == [AX + i]
     for doubt, all_of_them in ((0.49e-4, False), (0.51e-4, True)):
-        monitor["memory"]["bound_sum"] = doubt, 0.0, 0.0
+        monitor["memory"]["flow_bound_sum_since_alarm"] = doubt, 0.0, 0.0
         sensor_monitor.suspect_accelerometers(monitor, False)
         assert bool(monitor["output"]["is_suspect"][AX:].all()) == all_of_them
     sensor_monitor.suspect_accelerometers(monitor, True)

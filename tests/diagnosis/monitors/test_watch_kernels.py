@@ -98,15 +98,18 @@ def with_shares(shares, **fields):
      ({12: 2.0}, 1, (12, 2.0)), ({3: 0.4}, 1, (5, 0.7)), ({3: 0.4}, 0, (3, 0.4))],
 )  # fmt: skip
 def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, substep, furthest):
-    monitor = with_shares(shares, worst_test=5, worst_test_ratio=0.7, substep=substep)
+    monitor = with_shares(shares, worst_test_index=5, worst_residual_bound_ratio=0.7, substep=substep)
     watching.find_worst_test(monitor)
-    assert (monitor["output"]["worst_test"], monitor["output"]["worst_test_ratio"]) == furthest
+    assert (
+        monitor["output"]["worst_test_index"],
+        monitor["output"]["worst_residual_bound_ratio"],
+    ) == furthest
 
 
 def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     monitor = with_shares(shares, **fields)
-    monitor["output"]["alarm_test"] = max(shares, key=shares.get) if lead is None else lead
+    monitor["output"]["alarm_test_index"] = max(shares, key=shares.get) if lead is None else lead
     watching.record_exceeded_tests(monitor)
     watching.find_suspects(monitor)
     return set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist())
@@ -166,7 +169,7 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
     """0.5 V ln(density ratio) against twice the bound of the airspeed's test, 2."""
     monitor = with_shares({DENSITY_TEST: 0.2})
     monitor["redundancy"]["test"]["residual_bound_ratio"][DENSITY_TEST] = 2.0
-    monitor["redundancy"]["memory"]["previous_reading"][AIRSPEED], monitor["output"]["alarm_test"] = (
+    monitor["redundancy"]["memory"]["previous_reading"][AIRSPEED], monitor["output"]["alarm_test_index"] = (
         airspeed,
         DENSITY_TEST,
     )
@@ -286,7 +289,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
-    assert monitor["output"]["surface_was_isolated"] == (isolated >= 0)
+    assert monitor["output"]["surface_was_isolated_at_alarm"] == (isolated >= 0)
     assert not monitor["output"]["keeps_isolated_surface"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
@@ -320,7 +323,7 @@ def test_with_nothing_found_before_the_alarm_is_of_now():
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed_at_s"] == 10.0
     assert not monitor["output"]["keeps_isolated_surface"]
-    assert not monitor["output"]["surface_was_isolated"]
+    assert not monitor["output"]["surface_was_isolated_at_alarm"]
 
 
 def test_an_instrument_without_a_reading_is_named_at_once():
@@ -336,7 +339,7 @@ def test_an_instrument_without_a_reading_is_named_at_once():
 
 def alarm_and_sensor(monitor):
     """(whether there is an alarm, the test that raised it, the sensor that is named)."""
-    return tuple(monitor["output"][name] for name in ("alarmed", "alarm_test", "isolated_sensor"))
+    return tuple(monitor["output"][name] for name in ("alarmed", "alarm_test_index", "isolated_sensor"))
 
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
@@ -348,7 +351,7 @@ def test_the_one_suspect_left_is_named_and_two_are_not():
     assert alarm_and_sensor(monitor) == (1, ALPHA_FLOW_TEST, NO_SENSOR)
     monitor["redundancy"]["test"]["residual_bound_ratio"][SPEED_TEST] = 9.0
     on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 6.0)
-    assert monitor["output"]["alarm_test"] == ALPHA_FLOW_TEST  # the first alarm leads
+    assert monitor["output"]["alarm_test_index"] == ALPHA_FLOW_TEST  # the first alarm leads
     quiet = new_watch()
     on(watching.isolate_broken_sensor, new_fdi(), quiet, seen(), 5.0)
     assert not quiet["output"]["alarmed"]
@@ -536,7 +539,7 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test = monitor["redundancy"]["test"]
     test["filtered_bound"][:] = 9.0
     test["filtered_bound"][TURN_TEST + 1, 0] = 0.02
-    limit = 0.02 + H * (0.3 + watching.DAMPING_TOLERANCE * 0.5)
+    limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
     test["residual"][TURN_TEST + 1] = size * limit + H * 0.5
     watching.exclude_gyros_if_attitude_disagrees(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
@@ -693,7 +696,7 @@ def test_the_rates_are_asked_once_a_frame(substep, asked):
             {TURN_TEST: 2.0, ANGLE_TEST: 1.5},
             substep=substep,
             apparent_gyro_error=(0, 0.3, 0),
-            start_stage=watching.START_STAGE_WITH_COMPARABLE_RATES,
+            start_stage=watching.START_STAGE_SHOWING_GYRO_ERROR_CHANGE,
         ),
         new_fdi(),
     )
@@ -751,7 +754,7 @@ def test_at_its_bound_a_test_is_within_it():
 
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
     """The others have less of it, or more of what was before."""
-    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test=TURN_TEST + 1)
+    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test_index=TURN_TEST + 1)
     monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST : TURN_TEST + 3, 1:] = 1e3
     monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 50.0
     assert watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
@@ -782,7 +785,7 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 
 
 def test_suspicions_of_the_frame_before_are_gone():
-    monitor = with_shares({CLIMB_TEST: 2.0}, alarm_test=CLIMB_TEST)
+    monitor = with_shares({CLIMB_TEST: 2.0}, alarm_test_index=CLIMB_TEST)
     monitor["output"]["is_suspect"] = 1
     watching.record_exceeded_tests(monitor)
     watching.find_suspects(monitor)

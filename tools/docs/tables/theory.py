@@ -35,7 +35,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
         7,
         "room (largest effect of bounded model error): factor for overshoot",
         likelihood,
-        "RINGING_FACTOR",
+        "TRANSIENT_RINGING_SUM_FACTOR",
         "",
     ),
     (

@@ -141,7 +141,7 @@ def start_bank(bank, gyro_error_change_bound):
 
 
 @kernel
-def set_published_filter_threshold(bank, threshold):
+def set_constant_published_filter_threshold(bank, threshold):
     """Replace the threshold of the published filter by a constant, rad/s."""
     bank.output.threshold[0] = threshold
 
@@ -337,7 +337,7 @@ FDAE_RECORD = record(
     network=FDAE_NETWORK_RECORD,
 )
 
-_CHANGE_OF_GAUSSIAN_RATIO = np.exp(-1.0)
+_RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS = np.exp(-1.0)
 _N_ALPHA_CENTRES, _N_BETA_CENTRES = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
 _FIRST_ALPHA_CENTRE, _ALPHA_CENTRE_SPACING = ALPHA_CENTRES_RAD[0], ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
 _FIRST_BETA_CENTRE, _BETA_CENTRE_SPACING = BETA_CENTRES_RAD[0], BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
@@ -354,7 +354,7 @@ def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
 
 
 @kernel
-def fill_gaussians(grid_position, n_gaussians, first_index, out):
+def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out):
     """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; return the squares' sum.
 
     From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
@@ -365,7 +365,7 @@ def fill_gaussians(grid_position, n_gaussians, first_index, out):
         out[first_index + j] = value
         sum_of_squares += value * value
         value *= ratio
-        ratio *= _CHANGE_OF_GAUSSIAN_RATIO
+        ratio *= _RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS
     return sum_of_squares
 
 
@@ -382,8 +382,8 @@ def fill_basis_functions(alpha, beta, out):
         max((beta - _FIRST_BETA_CENTRE) / _BETA_CENTRE_SPACING, 0.0), _N_BETA_CENTRES - 1.0
     )
     norm = np.sqrt(
-        fill_gaussians(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
-        + fill_gaussians(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
+        fill_gaussians_and_sum_squares(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
+        + fill_gaussians_and_sum_squares(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
     )
     for j in range(N_BASIS_FUNCTIONS):
         out[j] /= norm
@@ -474,7 +474,7 @@ def alarm_axis(bank, authority, statistical_alarm):
 
 
 @kernel
-def predict_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
+def advance_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
     """Advance the FDAE and its threshold by one frame; once `is_fault_detected`, the network learns what
     exceeds the threshold.
 

@@ -36,7 +36,7 @@ MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run 
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
 MAX_FORCE_FLOW_LAG_S = 0.002
 FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
-SIDESLIP_RATE_TERM_TOLERANCE = {
+SIDESLIP_RATE_TOLERANCE_BY_AIR_MOVES = {
     False: 0.05,
     True: 0.2,
 }  # of the term in the rate of sideslip: gusts have a part in it
@@ -50,14 +50,14 @@ FORCE_RECORD = record(
     # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; integral of the
     # force's slope, e per rad/s of drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
     innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
-    innovation_per_flow_angle_drift=float, innovation_drift_intensity=float,
+    innovation_per_flow_angle_drift=float, inertial_innovation_drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    surface_effect_per_rad=MAX_SURFACES, previous_surface_effect_per_rad=MAX_SURFACES,
-    surface_effect_at_command=MAX_SURFACES, surface_effect_per_rad_error_bound=MAX_SURFACES,
+    scaled_force_per_surface_rad=MAX_SURFACES, previous_scaled_force_per_surface_rad=MAX_SURFACES,
+    scaled_force_of_surface_at_command=MAX_SURFACES, scaled_force_per_surface_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
-    vane_error_effect_per_rad=2, vane_error_roll_acceleration_per_rad=float,
+    acceleration_and_force_per_vane_error=2, roll_acceleration_per_vane_error=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
-    noise_variance_in_trim=2, noise_variance=2,
+    trim_noise_variance_with_without_vane=2, noise_variance=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
     innovation_per_air_rotation=3, deflection_error_effect_bound=float,
     predicted_scaled_force=float,  # e of the model, rad/s2
@@ -73,8 +73,8 @@ MEASURED_FORCES_RECORD = record(
     dynamic_pressure_over_trim=float,  # forces scale with it
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     sideslip_rate_coefficient=float, flow_angle_rate=2,
-    n_updates=int,  # updates so far, up to MIN_FORCE_UPDATES
-    gust_estimate_noise_std=3,  # noise of the gust estimate from forces, rad/s2
+    n_updates_up_to_minimum=int,  # updates so far, up to MIN_FORCE_UPDATES
+    gust_acceleration_noise_std=3,  # noise of the gust estimate from forces, rad/s2
     y_without_vanes=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
 
@@ -85,17 +85,19 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
-    if forces.n_updates == 0:
+    if forces.n_updates_up_to_minimum == 0:
         fill_flow_angle_rates(forces, measured)
     evaluate(gust.memory.force_table, measured.x, measured.y)
     forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
     for f in range(2):
         scaled_force_before = forces.component[f].predicted_scaled_force
         update_force_innovation(forces, gust, f, measured, u)
-        fill_force_flow_lag_error_bound(forces.component[f], scaled_force_before, forces.n_updates, dt)
+        fill_force_flow_lag_error_bound(
+            forces.component[f], scaled_force_before, forces.n_updates_up_to_minimum, dt
+        )
         integrate_inertial_flow_angle(forces, forces.component[f], f, measured.y, dt)
     fill_flow_angle_rates(forces, measured)
-    forces.n_updates = min(forces.n_updates + 1, MIN_FORCE_UPDATES)
+    forces.n_updates_up_to_minimum = min(forces.n_updates_up_to_minimum + 1, MIN_FORCE_UPDATES)
 
 
 @kernel
@@ -122,7 +124,7 @@ def fill_readings_without_vanes(forces, air_rotation, y):
             rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
             force.innovation / forces.dynamic_pressure_over_trim + rotation_effect
-        ) / force.vane_error_effect_per_rad[1]
+        ) / force.acceleration_and_force_per_vane_error[1]
 
 
 @kernel
@@ -137,9 +139,11 @@ def stop_using_forces(forces, gust, inertial_gust):
 def integrate_inertial_flow_angle(forces, force, f, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     vane_angle = y[BETA if f == SIDE_COMPONENT else ALPHA]
-    innovation_per_rad = force.vane_error_effect_per_rad[1] * forces.dynamic_pressure_over_trim
+    innovation_per_rad = force.acceleration_and_force_per_vane_error[1] * forces.dynamic_pressure_over_trim
     force.inertial_flow_angle = (
-        force.inertial_flow_angle + dt * forces.flow_angle_rate[f] if forces.n_updates else vane_angle
+        force.inertial_flow_angle + dt * forces.flow_angle_rate[f]
+        if forces.n_updates_up_to_minimum
+        else vane_angle
     )
     force.innovation_per_flow_angle_drift += dt * innovation_per_rad
     force.innovation_at_inertial_flow_angle = force.innovation - innovation_per_rad * (
@@ -157,15 +161,15 @@ def update_force_innovation(forces, gust, f, measured, u):
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
     scaled_force = 0.0
-    force.previous_surface_effect_per_rad[:] = force.surface_effect_per_rad
-    force.surface_effect_per_rad[:], force.surface_effect_per_rad_error_bound[:] = 0.0, 0.0
+    force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
+    force.scaled_force_per_surface_rad[:], force.scaled_force_per_surface_rad_error_bound[:] = 0.0, 0.0
     for k in range(first_term, end_term):
         s, unit_effect = table.surface[k], acceleration_per_coefficient * table.power[table.monomial[k]]
         if s >= 0:
-            force.surface_effect_per_rad[s] += table.value[k] * unit_effect
-            force.surface_effect_per_rad_error_bound[s] += force.regressor_tolerance[k - first_term] * abs(
-                unit_effect
-            )
+            force.scaled_force_per_surface_rad[s] += table.value[k] * unit_effect
+            force.scaled_force_per_surface_rad_error_bound[s] += force.regressor_tolerance[
+                k - first_term
+            ] * abs(unit_effect)
             unit_effect *= u[s]
         force.regressor[k - first_term] = unit_effect
         scaled_force += table.value[k] * unit_effect
@@ -180,15 +184,15 @@ def update_force_innovation(forces, gust, f, measured, u):
         force.regressor[end_term - first_term] = sideslip_rate_effect
         scaled_force += sideslip_rate_effect
     force.regressor[force.n_regressors - 1], force.predicted_scaled_force = scaled_force, scaled_force
-    if forces.n_updates == 0:
-        force.previous_surface_effect_per_rad[:] = force.surface_effect_per_rad
+    if forces.n_updates_up_to_minimum == 0:
+        force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
     for s in range(u.size):
-        force.surface_effect_at_command[s] = force.previous_surface_effect_per_rad[s] * u[s]
+        force.scaled_force_of_surface_at_command[s] = force.previous_scaled_force_per_surface_rad[s] * u[s]
     force.innovation = measured.force[1 + f] * forces.inverse_chord_per_m - scaled_force
     pressure_noise_effect = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     for k in range(2):
         force.noise_variance[k] = (
-            force.noise_variance_in_trim[k] * forces.dynamic_pressure_over_trim**2
+            force.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
             + pressure_noise_effect * pressure_noise_effect
             + force.accelerometer_innovation_variance
         )
@@ -256,14 +260,17 @@ def configure_forces(
             aircraft, FORCE_COEFFICIENT_NAMES[f], trim
         )
         slopes, slipstream_slope = slopes_with_slipstream[:-1], slopes_with_slipstream[-1]
-        force["vane_error_effect_per_rad"] = (-acceleration_slopes_by_y[axis, vane], -slopes[vane])
-        force["vane_error_roll_acceleration_per_rad"] = -acceleration_slopes_by_y[0, vane]
+        force["acceleration_and_force_per_vane_error"] = (
+            -acceleration_slopes_by_y[axis, vane],
+            -slopes[vane],
+        )
+        force["roll_acceleration_per_vane_error"] = -acceleration_slopes_by_y[0, vane]
         force["innovation_per_air_rotation"] = slopes[3:]
         total_slopes = slopes.copy()
         total_slopes[AIRSPEED] += slipstream_slope * slipstream_per_airspeed
         variance_parts = (total_slopes * reading_noise_std) ** 2
         variance = variance_parts.sum() + slipstream_slope**2 * other_slipstream_variance
-        force["noise_variance_in_trim"] = variance, variance - variance_parts[vane]
+        force["trim_noise_variance_with_without_vane"] = variance, variance - variance_parts[vane]
         accelerometer_noise_std = sensors[ACCELEROMETERS[1 + f]].random
         force["accelerometer_innovation_variance"] = (
             forces["inverse_chord_per_m"] * accelerometer_noise_std
@@ -287,7 +294,7 @@ def configure_forces(
         drift_intensity = (
             FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force["innovation_drift_intensity"] = slopes[vane] ** 2 * (
+        force["inertial_innovation_drift_intensity"] = slopes[vane] ** 2 * (
             drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 
@@ -351,7 +358,7 @@ def _configure_force_tolerances(
     n_regressors = len(terms)
     if f == SIDE_COMPONENT:
         force["regressor_tolerance"][n_regressors] = (
-            coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE[declared.air.moves]
+            coefficient_tolerance + SIDESLIP_RATE_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
         )
         n_regressors = n_regressors + 1
     if accelerometer.steady:

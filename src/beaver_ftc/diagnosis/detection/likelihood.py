@@ -87,7 +87,7 @@ SUPPORTING_CORRELATION_SIGN_BY_KIND = {
 PRIOR_DRIFT_STD_RAD_S2 = 1.0  # standard deviation of the drift at the start of a flight; soon irrelevant
 PRIOR_LOSS_INFORMATION = 12.0  # one over the variance of a loss that is uniform on [0, 1]
 # The magnitudes of a second-order transient of damping 0.7 sum to 1.09 times its sum; on two axes to more.
-RINGING_FACTOR = 1.2
+TRANSIENT_RINGING_SUM_FACTOR = 1.2
 
 # Time constant, s, of the estimate of lambda: long compared with a filter's memory, short compared with
 # changes of the weather.
@@ -96,7 +96,7 @@ CALM_AIR_SHARE_PRIOR_INFORMATION = 4.0  # prior information for lambda = 1 (calm
 CALM_AIR_SHARE_MARGIN_STD = 2.0  # standard deviations by which lambda is taken larger than estimated
 
 HYPOTHESIS_RECORD = record(
-    kind=int, surface=int, axis=int, raises_alarm=int, log_column_index=int,
+    kind=int, surface=int, axis=int, raises_alarm=int, score_column_index=int,
     signature=2,  # s of this frame, rad/s2 per unit of theta
     remaining_growth_decay_factor=float,  # exp(-kappa dt) of a growing loss
     score=float,  # largest normalised evidence over the onsets, standard deviations
@@ -125,7 +125,8 @@ ONSET_TESTS_RECORD = record(
     correlation_weight=(2, N_ONSET_TESTS_PER_GROUP),  # w = S^-1 g_s of the frame
     correlation=N_ONSET_TESTS_PER_GROUP, information=N_ONSET_TESTS_PER_GROUP,  # N; D
     correlation_bound_by_coefficient_errors=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
-    remaining_growth=N_ONSET_TESTS_PER_GROUP,  # exp(-kappa t) of a growing loss; 1 until a loss has ended
+    # exp(-kappa t) of a growing loss; 1 until a loss has ended
+    remaining_growth_share=N_ONSET_TESTS_PER_GROUP,
     signature_at_loss_end=(2, N_ONSET_TESTS_PER_GROUP),  # rad/s2
     # shares of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its rate of
     # change
@@ -178,7 +179,7 @@ def block_dtype(capacity: BlockCapacity) -> np.dtype:
         has_coarse_gust_estimate=int, coarse_gust_response=2, coarse_gust_filter_state=4,
         # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty;
         # omega dt of that uncertainty; its responses: see `fill_uncertainty_response`
-        alarm_level=float, noise_share_of_alarm_level=float, uncertainty_change_per_frame=float,
+        alarm_level=float, noise_share_of_alarm_level=float, uncertainty_change_over_bound_per_frame=float,
         constant_uncertainty_response=2, transient_uncertainty_response=2,
         n_regressors=int, regressor_tolerance=capacity.max_regressors, regressor=(capacity.max_regressors, 2),
         regressor_filter_state=(capacity.max_regressors, 4), regressor_response=(capacity.max_regressors, 2),
@@ -376,7 +377,7 @@ def reset_onset_slot(block, slot):
             ] = onset_tests.correlation_bound_by_varying_uncertainty[k] = 0.0
             onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = 0.0
             onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_by_coarse_gust[k] = 0.0
-            onset_tests.remaining_growth[k] = 1.0
+            onset_tests.remaining_growth_share[k] = 1.0
             for i in range(4):
                 onset_tests.signature_filter_state[i, k] = 0.0
             for j in range(block.n_regressors):
@@ -397,7 +398,7 @@ def fill_uncertainty_response(block, uncertainty_bound, dt):
         for j in range(block.n_axes):
             cofactor = 1.0 if block.n_axes == 1 else (K[1 - i, 1 - i] if i == j else K[i, j])
             block.transient_uncertainty_response[i] += (
-                RINGING_FACTOR * abs(cofactor / determinant) * uncertainty_bound[block.axis[j]]
+                TRANSIENT_RINGING_SUM_FACTOR * abs(cofactor / determinant) * uncertainty_bound[block.axis[j]]
             )
         if drift_loss_per_frame > 0.0:
             settled_response = (
@@ -416,15 +417,15 @@ def fill_signatures_for_onsets(hypothesis, onset_tests, first_test):
     s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
     for k in range(first_test, first_test + N_ONSET_SLOTS):
         if hypothesis.kind == LOSS_END:
-            if onset_tests.remaining_growth[k] > 0.0:
-                onset_tests.remaining_growth[k] = 0.0
+            if onset_tests.remaining_growth_share[k] > 0.0:
+                onset_tests.remaining_growth_share[k] = 0.0
                 onset_tests.signature_at_loss_end[0, k] = s0
                 onset_tests.signature_at_loss_end[1, k] = s1
             onset_tests.signature_for_onset[0, k] = onset_tests.signature_at_loss_end[0, k]
             onset_tests.signature_for_onset[1, k] = onset_tests.signature_at_loss_end[1, k]
         elif hypothesis.kind == GROWING_LOSS:
-            onset_tests.remaining_growth[k] *= hypothesis.remaining_growth_decay_factor
-            grown_share = 1.0 - onset_tests.remaining_growth[k]
+            onset_tests.remaining_growth_share[k] *= hypothesis.remaining_growth_decay_factor
+            grown_share = 1.0 - onset_tests.remaining_growth_share[k]
             onset_tests.signature_for_onset[0, k] = grown_share * s0
             onset_tests.signature_for_onset[1, k] = grown_share * s1
         else:
@@ -449,7 +450,7 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay):
     state = onset_tests.signature_filter_state
     signature = onset_tests.signature_for_onset
     weight = onset_tests.correlation_weight
-    uncertainty_change = block.uncertainty_change_per_frame
+    uncertainty_change = block.uncertainty_change_over_bound_per_frame
     for k in range(n_tests):
         r0 = state[0, k] + dt * (signature[0, k] - state[2, k])
         r1 = state[1, k] + dt * (signature[1, k] - state[3, k])
@@ -701,7 +702,7 @@ def estimate_theta(kind, N, D):
 
 
 @kernel
-def set_coarse_gust_response(block, acceleration):
+def set_block_coarse_gust_acceleration(block, acceleration):
     """Fill the response of the block's axes to the gust that the vanes measure coarsely; acceleration (3,)
     rad/s2."""
     for i, axis in enumerate(block.axis[: block.n_axes]):

@@ -46,7 +46,7 @@ N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with
 * Errors of coefficients add at most sum_j tol_j |R_j|, where R_j is the same sum over regressor j.
 * A bounded uncertainty |d| <= eta_bar adds at most |W(w)| sum eta_bar exp(-t / T) |cos|, where W is the gain
   of the whitening filter at w. The limited rate of change of d reduces this a little
-  (`max_bounded_uncertainty_gain`).
+  (`derive_max_tone_mean_of_uncertainty`).
 
 The sums are updated once per TONE_UPDATE_INTERVAL_S: no frequency of the grid changes its phase much in that
 time.
@@ -109,7 +109,7 @@ TONE_CONFIG_RECORD = record(
     phase_rotation_per_frame=(2, N_TONE_FREQUENCIES), decayed_rotation_per_update=(2, N_TONE_FREQUENCIES),
     decayed_double_rotation_per_update=(2, N_TONE_FREQUENCIES),
     # largest mean of cos(w t) d(t) for a bounded uncertainty |d| <= 1
-    bounded_uncertainty_gain=N_TONE_FREQUENCIES,
+    max_tone_mean_of_unit_uncertainty=N_TONE_FREQUENCIES,
     # larger variance of real and imaginary part of N; the sum of both is 1
     larger_complex_part_variance_share=N_TONE_FREQUENCIES,
 )  # fmt: skip
@@ -226,7 +226,7 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
         tone_tests.uncertainty_bound_mean[f] = (
             sum_decay * tone_tests.uncertainty_bound_mean[f] + bounded_input
         )
-        tone_tests.correlation_bound_by_uncertainty[f] = tone_config.bounded_uncertainty_gain[f] * (
+        tone_tests.correlation_bound_by_uncertainty[f] = tone_config.max_tone_mean_of_unit_uncertainty[f] * (
             tone_tests.uncertainty_bound_mean[f]
             + np.hypot(
                 tone_tests.uncertainty_bound_harmonic[0, f], tone_tests.uncertainty_bound_harmonic[1, f]
@@ -274,7 +274,7 @@ def fill_tone_score(tone_tests, tone_config, alarm_level):
     tone_tests.score = max_score * alarm_level / tone_config.alarm_level
 
 
-def max_bounded_uncertainty_gain(frequency_rad_s: np.ndarray, change_rate_per_s: float) -> np.ndarray:
+def derive_max_tone_mean_of_uncertainty(frequency_rad_s: np.ndarray, change_rate_per_s: float) -> np.ndarray:
     """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
 
     The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
@@ -301,7 +301,7 @@ def configure_tone_tests(
     false_alarm_probability: probability of a false alarm granted to one test in one frame. airspeed_mps: in
     trim. change_rate_per_s: largest rate of change of a bounded uncertainty, in bounds per second.
     """
-    tone_config["bounded_uncertainty_gain"] = max_bounded_uncertainty_gain(
+    tone_config["max_tone_mean_of_unit_uncertainty"] = derive_max_tone_mean_of_uncertainty(
         TONE_FREQUENCIES_RAD_S, change_rate_per_s
     )
     tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_OVER_TRIM
@@ -328,8 +328,10 @@ def configure_tone_tests(
     tone_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + variance_difference)
 
 
-VANE_EFFECT_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
-PEAK_SCORE_MEMORY_RATIO = (
+VANE_EFFECT_RELATIVE_TOLERANCE = (
+    0.1  # relative error of the effect of a vane's error: its column is that of the trim
+)
+PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO = (
     5.0  # time constant of `decaying_peak_score` over the one with which evidence is forgotten
 )
 MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
@@ -399,22 +401,24 @@ def column_entry_and_error(view, forces, bound, G, j):
     """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane_axes[j], view.orthogonal_to_surface
     if s == VANE_VIEW:
-        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].vane_error_effect_per_rad[j]
-        return entry, VANE_EFFECT_TOLERANCE * abs(entry)
+        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].acceleration_and_force_per_vane_error[j]
+        return entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(entry)
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
-        return force.previous_surface_effect_per_rad[s], force.surface_effect_per_rad_error_bound[s]
+        return force.previous_scaled_force_per_surface_rad[s], force.scaled_force_per_surface_rad_error_bound[
+            s
+        ]
     return G[i, s], bound.surface_error_per_rad[i, s] if bound.has_declared_surface_errors else 0.0
 
 
 @kernel
-def set_view_direction(view, forces, gust, bound, G):
+def set_view_direction_and_return_leak(view, forces, gust, bound, G):
     """Fill `direction` and `unit_column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
 
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
     if view.is_orthogonal_to_rolling_gust:
-        return set_view_direction_across_gust(view, forces, gust)
+        return set_direction_across_vane_and_rolling_gust(view, forces, gust)
     first, second = view.plane_axes[0], view.plane_axes[1]
     first_entry, first_error = column_entry_and_error(view, forces, bound, G, 0)
     second_entry, second_error = column_entry_and_error(view, forces, bound, G, 1)
@@ -430,15 +434,15 @@ def set_view_direction(view, forces, gust, bound, G):
 
 
 @kernel
-def set_view_direction_across_gust(view, forces, gust):
+def set_direction_across_vane_and_rolling_gust(view, forces, gust):
     """The same for the direction across two vectors: their vector product in (roll, yaw, side force).
 
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
     """
     force = forces.component[0]
-    roll = force.vane_error_roll_acceleration_per_rad
-    yaw = force.vane_error_effect_per_rad[0]
-    side_force = force.vane_error_effect_per_rad[1]
+    roll = force.roll_acceleration_per_vane_error
+    yaw = force.acceleration_and_force_per_vane_error[0]
+    side_force = force.acceleration_and_force_per_vane_error[1]
     roll_gust = project_on_gust_axis(gust.output.rate_damping[ROLL], gust.output.gust_axes_in_body, 0)
     yaw_gust = project_on_gust_axis(gust.output.rate_damping[YAW], gust.output.gust_axes_in_body, 0)
     roll_component = -side_force * yaw_gust
@@ -456,8 +460,8 @@ def set_view_direction_across_gust(view, forces, gust):
         (SIDE_FORCE, side_force, side_component),
     ):
         view.direction[i], view.unit_column[i] = direction_entry / length, vane_entry / vane_column_length
-        leaking_error += VANE_EFFECT_TOLERANCE * abs(view.direction[i] * vane_entry)
-    return leaking_error / ((1.0 - VANE_EFFECT_TOLERANCE) * vane_column_length)
+        leaking_error += VANE_EFFECT_RELATIVE_TOLERANCE * abs(view.direction[i] * vane_entry)
+    return leaking_error / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_length)
 
 
 @kernel
@@ -501,7 +505,7 @@ def fill_gust_sensitivity(view, forces, rate_damping):
 
 
 @kernel
-def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
+def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, inertial_gust, V):
     """Fill measurement noise, model noise, drift intensity and bound of a view from the declared ones; V
     m/s."""
     block, m = view.block, view.direction
@@ -510,9 +514,9 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
         gyro_noise_variance += (
             m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].gyro_noise_variance[i // 2]
         )
-        model_noise_std += abs(m[i]) * np.sqrt(noise_model.input_noise_variance[i])
+        model_noise_std += abs(m[i]) * np.sqrt(noise_model.acceleration_variance_by_input_noise[i])
         if view.is_immune_to_vane_error:
-            model_noise_std += abs(m[i]) * forces.gust_estimate_noise_std[i]
+            model_noise_std += abs(m[i]) * forces.gust_acceleration_noise_std[i]
         uncertainty_bound += abs(m[i]) * (
             noise_model.uncertainty_bound[i] + noise_model.additional_bound_for_surface_anywhere[i]
         )
@@ -523,7 +527,7 @@ def set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V):
         if view.uses_inertial_flow_angle:
             drift_intensity += (
                 m[SIDE_FORCE + f] * forces.dynamic_pressure_over_trim
-            ) ** 2 * force.innovation_drift_intensity
+            ) ** 2 * force.inertial_innovation_drift_intensity
         uncertainty_bound += abs(m[SIDE_FORCE + f]) * (
             force.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
             + force.force_flow_lag_error_bound
@@ -586,16 +590,18 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
 
 
 @kernel
-def update_view_directions(views, forces, gust, bound, G, Gu):
+def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
     """Bring the direction and the signatures of each view to this frame.
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
     """
     for view in views:
-        view.is_used = not uses_force(view) or (forces.in_use and forces.n_updates == MIN_FORCE_UPDATES)
+        view.is_used = not uses_force(view) or (
+            forces.in_use and forces.n_updates_up_to_minimum == MIN_FORCE_UPDATES
+        )
         if view.is_used:
             view.column_leak = (
-                set_view_direction(view, forces, gust, bound, G)
+                set_view_direction_and_return_leak(view, forces, gust, bound, G)
                 if view.orthogonal_to_surface != AXIS_VIEW
                 else 0.0
             )
@@ -613,7 +619,7 @@ def project_innovation(
     for view in views:
         if not view.is_used:
             continue
-        set_view_noise(view, noise_model, blocks, forces, gust, inertial_gust, V)
+        set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, inertial_gust, V)
         m, projected = view.direction, view.block.frame_innovation
         projected[0] = 0.0
         for i in range(m.size):
@@ -642,7 +648,7 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame, is_alarm_la
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
             update_tone_tests(view, tone_config, test_config.alarm_level, within_envelope, has_regressors, dt)
         view.decaying_peak_score = max(
-            (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_MEMORY_RATIO)
+            (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
             * view.decaying_peak_score,
             max_test_score_of_view(view),
         )
@@ -658,7 +664,7 @@ def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
     for i in range(3):
         sensitivity += m[i] * effectiveness_column[i]
     for f in range(2):
-        sensitivity += m[SIDE_FORCE + f] * forces.component[f].surface_effect_per_rad[s]
+        sensitivity += m[SIDE_FORCE + f] * forces.component[f].scaled_force_per_surface_rad[s]
     return sensitivity != 0.0
 
 
@@ -712,7 +718,7 @@ def view_alarm_score(view, views, test_config, forces, gust):
 
 
 @kernel
-def excludes_surface(views, test_config, forces, gust, s, effectiveness_column):
+def views_exclude_surface(views, test_config, forces, gust, s, effectiveness_column):
     """True if a view detects a signal that no fault of surface s, with this effectiveness_column (3,) of G,
     can cause."""
     for view in views:
@@ -872,7 +878,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(kinds), 1.0
         block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
         block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
-        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_per_frame"):
+        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_over_bound_per_frame"):
             block[name] = rate_block[name]
         block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
         if may_use_vane_gust_estimate and subtracts_gust:
@@ -937,5 +943,7 @@ def fill_view_signatures(view, forces, Gu):
         if hypothesis.kind != STEP_FAULT:
             loss_signature = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for f in range(2):
-                loss_signature += m[SIDE_FORCE + f] * forces.component[f].surface_effect_at_command[s]
+                loss_signature += (
+                    m[SIDE_FORCE + f] * forces.component[f].scaled_force_of_surface_at_command[s]
+                )
             hypothesis.signature[0] = loss_signature

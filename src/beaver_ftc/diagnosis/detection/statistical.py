@@ -110,7 +110,9 @@ MIN_GYRO_NOISE_STD_RAD_S = (
 HypothesisEntry = tuple[int, int, int, int]
 
 
-def block_hypotheses(aircraft: Aircraft) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
+def axes_and_hypotheses_by_block(
+    aircraft: Aircraft,
+) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
     are held against. Roll and yaw are there twice, see above."""
     pitch = (
@@ -142,7 +144,12 @@ def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
 
 def n_tests_per_frame(aircraft: Aircraft, *views: ParityDirection) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included."""
-    kinds = [kind for _, members in block_hypotheses(aircraft) for kind, _, _, alarms in members if alarms]
+    kinds = [
+        kind
+        for _, members in axes_and_hypotheses_by_block(aircraft)
+        for kind, _, _, alarms in members
+        if alarms
+    ]
     n_tone_tests = 0
     for view in views:
         if view.orthogonal_to_surface >= 0 and any(view.direction[SIDE_FORCE:]):
@@ -187,7 +194,7 @@ def configure_statistical_detector(
     test_config, gust, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
     errors, dt_s, n_instants = declared.sensors, 1.0 / rate_hz, int(fdi["config"]["n_substeps"])
     airspeed_mps = float(trim[1][AIRSPEED])
-    uncertainty_change = uncertainty_change_per_frame(settings, aircraft, dt_s)
+    uncertainty_change = uncertainty_change_over_bound_per_frame(settings, aircraft, dt_s)
     test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants, 1)
     test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     statistical["forces"]["in_use"] = forces = declared.uses_accelerometers
@@ -203,12 +210,12 @@ def configure_statistical_detector(
     test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _configure_blocks(statistical, errors, aircraft)
     _configure_bounded_uncertainty(statistical, config, declared, uncertainty_change, dt_s)
-    statistical["noise"]["base_uncertainty_change_per_frame"] = settings.uncertainty_rad_s * dt_s
+    statistical["noise"]["base_change_over_bound_per_frame"] = settings.uncertainty_rad_s * dt_s
     _configure_drift_and_model_noise(
-        statistical, drift_frequency(settings, aircraft), declared, design, trim, dt_s
+        statistical, drift_uncertainty_frequency_rad_s(settings, aircraft), declared, design, trim, dt_s
     )
     tolerance = moment_term_tolerances(declared, design, mass, *trim[1:])
-    _configure_tolerances(statistical, aircraft, tolerance)
+    _configure_regressor_tolerances(statistical, aircraft, tolerance)
     configure_reading_regressors(statistical, errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
         false_alarm_probability = settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
@@ -266,7 +273,7 @@ def configure_statistical_detector(
 
 
 def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
-    blocks = block_hypotheses(aircraft)
+    blocks = axes_and_hypotheses_by_block(aircraft)
     losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
     statistical["test_config"]["n_score_columns"] = len(losses) + len(AXES)
     for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
@@ -282,10 +289,10 @@ def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Airc
         for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
             hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
-            hypothesis["log_column_index"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+            hypothesis["score_column_index"] = losses.index(surface) if kind == LOSS else len(losses) + axis
 
 
-def uncertainty_change_per_frame(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
+def uncertainty_change_over_bound_per_frame(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     """Largest change of a bounded uncertainty within a frame, over its bound.
 
     The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
@@ -295,7 +302,7 @@ def uncertainty_change_per_frame(settings: Statistical, aircraft: Aircraft, dt_s
     return 2.0 if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
 
 
-def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
+def drift_uncertainty_frequency_rad_s(settings: Statistical, aircraft: Aircraft) -> float:
     """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
     The evidence that the uncertainty explains is bounded by its declared rate of change in any case
@@ -319,7 +326,7 @@ def _configure_bounded_uncertainty(
     for block in statistical["block"]:
         block["alarm_level"] = statistical["test_config"]["alarm_level"]
         block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
-        block["uncertainty_change_per_frame"] = uncertainty_change
+        block["uncertainty_change_over_bound_per_frame"] = uncertainty_change
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
@@ -344,12 +351,12 @@ def _configure_drift_and_model_noise(
         max_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
     _, G, f_x, f_y = jacobian(design, *trim)
-    statistical["noise"]["input_noise_variance_without_air_data"] = f_x**2 @ errors[:3] ** 2
+    statistical["noise"]["acceleration_variance_without_air_data"] = f_x**2 @ errors[:3] ** 2
     air_data_variance = (
         f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2
     )  # later as `add_reading_regressors` says
-    statistical["noise"]["input_noise_variance"] = (
-        statistical["noise"]["input_noise_variance_without_air_data"] + air_data_variance
+    statistical["noise"]["acceleration_variance_by_input_noise"] = (
+        statistical["noise"]["acceleration_variance_without_air_data"] + air_data_variance
     )
     statistical["noise"]["deflection_error_effect_bound"] = (
         np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
@@ -395,7 +402,7 @@ def drift_correlation_length(
     return min(airspeed_mps * lag_s, gust_correlation_length_m or np.inf)
 
 
-def _configure_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
+def _configure_regressor_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
     """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
     axis = np.array([moment_axis_of_term(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
@@ -465,7 +472,7 @@ def add_reading_regressors(frame_share, noise_model, blocks, declared_errors, de
     """Add this instant, a `frame_share` of the frame, to the readings' regressors, rad/s2 per unit, and fill
     the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
     table, out = design.moments, noise_model.acceleration_change_per_reading
-    noise_model.input_noise_variance[:] = noise_model.input_noise_variance_without_air_data
+    noise_model.acceleration_variance_by_input_noise[:] = noise_model.acceleration_variance_without_air_data
     for reading_index in range(N_INPUT_READINGS):
         fill_signal_change_per_reading(
             table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
@@ -481,7 +488,7 @@ def add_reading_regressors(frame_share, noise_model, blocks, declared_errors, de
             design, y, u, reading_index, noise_model.monomial_change_per_reading, out
         )
         for i in range(3):
-            noise_model.input_noise_variance[i] += (
+            noise_model.acceleration_variance_by_input_noise[i] += (
                 out[i] * noise_model.reading_noise_std[reading_index]
             ) ** 2
         pitch = blocks[likelihood.PITCH_BLOCK]
@@ -498,7 +505,7 @@ MIN_LLR_SHARE_OF_CONSTANT_LOSS = 0.25
 # The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
 # moves by this share of its travel.
 TRAVEL_SHARE_REVERSING_ERROR = 0.25
-UNCERTAINTY_CHANGE_PER_TRAVEL = 2.0 / TRAVEL_SHARE_REVERSING_ERROR
+UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL = 2.0 / TRAVEL_SHARE_REVERSING_ERROR
 MIN_TRAVEL_RAD = 1e-6
 
 # Configuration of the tests.
@@ -517,12 +524,12 @@ NOISE_RECORD = record(
     # of the drift that represents a bounded uncertainty, over bound squared, 1/s
     drift_intensity_over_squared_bound=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
-    base_uncertainty_change_per_frame=float,
+    base_change_over_bound_per_frame=float,
     uncertainty_bound=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
     additional_bound_for_surface_anywhere=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
     # variance by noise of all inputs of the model; without the air data; (rad/s2)2
-    input_noise_variance=3, input_noise_variance_without_air_data=3,
+    acceleration_variance_by_input_noise=3, acceleration_variance_without_air_data=3,
     # whether errors of the air data count; their noise, units of the readings
     has_reading_errors=int, reading_noise_std=N_INPUT_READINGS,
     # scratch
@@ -533,7 +540,7 @@ NOISE_RECORD = record(
 # Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
 # flight; time of the first alarm, s, or -1.
 ALARM_RECORD = record(
-    score_over_alarm_level=float, axis=int, max_score_over_alarm_level=float, detected_at_s=float
+    score_over_alarm_level=float, axis=int, max_score_over_alarm_level_so_far=float, detected_at_s=float
 )
 
 
@@ -565,7 +572,7 @@ def update_blocks(
             block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
         block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
         if gust.config.only_coarse_estimate:
-            likelihood.set_coarse_gust_response(block, gust.output.coarse_gust_acceleration)
+            likelihood.set_block_coarse_gust_acceleration(block, gust.output.coarse_gust_acceleration)
         if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)
             if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
@@ -646,7 +653,9 @@ def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_er
 @kernel
 def update_max_alarm_score(alarm):
     """Keep the largest score over the alarm level so far."""
-    alarm.max_score_over_alarm_level = max(alarm.max_score_over_alarm_level, alarm.score_over_alarm_level)
+    alarm.max_score_over_alarm_level_so_far = max(
+        alarm.max_score_over_alarm_level_so_far, alarm.score_over_alarm_level
+    )
 
 
 @kernel
@@ -668,7 +677,7 @@ def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.raises_alarm:
-                column = first_column + hypothesis.log_column_index
+                column = first_column + hypothesis.score_column_index
                 row[column] = max(row[column], hypothesis.score / test_config.alarm_level)
     for view in views:
         column = row.size - 3 + view.alarm_axis
@@ -685,7 +694,7 @@ def is_loss_not_excluded(estimators, loss_estimator, surface):
 
 
 @kernel
-def best_alternative_llr_bound(block, estimators, loss_estimator, surface, includes_excluded=False):
+def best_alternative_llr_lower_bound(block, estimators, loss_estimator, surface, includes_excluded=False):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
     Excluded losses are no alternatives, unless `includes_excluded`: as evidence decays, an uncertainty that
@@ -735,7 +744,7 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
                 loss_lower_bound = max(loss_lower_bound, hypothesis.llr_lower_bound)
         if (
             loss_lower_bound
-            - best_alternative_llr_bound(block, estimators, loss_estimator, surface, includes_excluded)
+            - best_alternative_llr_lower_bound(block, estimators, loss_estimator, surface, includes_excluded)
             > test_config.isolation_llr_margin
         ):
             return True
@@ -757,9 +766,9 @@ def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_
     loss_share = 1.0 if is_abrupt and single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
     loss_end_share = 1.0 if single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
     for lateral in blocks[LATERAL_BLOCK:]:
-        alternative_llr = best_alternative_llr_bound(pitch, estimators, loss_estimator, surface)
+        alternative_llr = best_alternative_llr_lower_bound(pitch, estimators, loss_estimator, surface)
         alternative_llr = max(
-            alternative_llr, best_alternative_llr_bound(lateral, estimators, loss_estimator, surface)
+            alternative_llr, best_alternative_llr_lower_bound(lateral, estimators, loss_estimator, surface)
         )
         loss_llr = max(
             loss_llr_upper_bound(pitch, surface, False), loss_llr_upper_bound(lateral, surface, False)
@@ -833,10 +842,10 @@ def update_uncertainty_change(noise_model, blocks, error_map, u):
         )
         error_map.surface_positions_before[s] = u[s]
     for block in blocks:
-        block.uncertainty_change_per_frame = min(
-            noise_model.base_uncertainty_change_per_frame
-            + UNCERTAINTY_CHANGE_PER_TRAVEL * travel_share_moved,
-            UNCERTAINTY_CHANGE_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
+        block.uncertainty_change_over_bound_per_frame = min(
+            noise_model.base_change_over_bound_per_frame
+            + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * travel_share_moved,
+            UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
         )
 
 
@@ -904,7 +913,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
             block.drift_intensity[i, i] += walk_intensity
             block.no_gust_filter.drift_intensity[i, i] = walk_intensity
             block.model_noise_variance[i] = block.no_gust_filter.model_noise_variance[i] = (
-                noise_model.input_noise_variance[axis]
+                noise_model.acceleration_variance_by_input_noise[axis]
             )
         block.drift_decay_factor = (
             np.exp(-dt * V / block.drift_correlation_length_m)

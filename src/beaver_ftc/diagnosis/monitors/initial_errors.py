@@ -88,7 +88,9 @@ from beaver_ftc.plant.instruments import ALTITUDE, PHI
 MAX_FLOW_ANGLE_RAD = 0.7  # an aircraft whose attitude and flow are tested flies at less, to either side
 MAX_AIRSPEED_READING_RATIO = 10.0  # largest reading / truth of an airspeed, and largest truth / reading
 MAX_CHORD_OF_ATTITUDE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off by half a turn
-MAX_DENSITY_DEVIATION = 0.25  # of the density from the standard atmosphere at a height, as a share of it
+MAX_DENSITY_DEVIATION_SHARE = (
+    0.25  # of the density from the standard atmosphere at a height, as a share of it
+)
 MIN_DENSITY_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
 MIN_REMAINING_SIGNED_EFFECT_SHARE = 0.8
@@ -145,8 +147,8 @@ def set_error_bounds_at_start(initial_errors, signal):
         2.0 * max(signal[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(signal[ALTITUDE])
     )
     max_ratio, min_ratio = (  # of reading and truth, in the thickest and in the thinnest air
-        V / expected_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION),
-        V / expected_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION),
+        V / expected_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
+        V / expected_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
     )
     at_start[AIRSPEED_HYPOTHESIS] = min(
         max(max_ratio - 1.0, 1.0 - min_ratio), MAX_AIRSPEED_READING_RATIO - 1.0
@@ -156,7 +158,7 @@ def set_error_bounds_at_start(initial_errors, signal):
 
 
 @kernel
-def test_showing_error_change(hypothesis):
+def index_of_test_showing_error_change(hypothesis):
     """The test whose residual is, at once, the change of the error of a hypothesis."""
     return (ALPHA_FLOW_TEST, BETA_FLOW_TEST, SPEED_TEST, ANGLE_TEST, ANGLE_TEST + 1)[hypothesis]
 
@@ -167,9 +169,9 @@ def update_error_change_bounds(redundancy, initial_errors):
     part of it that this filter forgets in a sample."""
     forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        test_index, at_start = test_showing_error_change(i), initial_errors.error_bound_at_start[i]
+        test_index, at_start = index_of_test_showing_error_change(i), initial_errors.error_bound_at_start[i]
         change = (
-            max_error_effect(redundancy, test_index, SLOWEST_POLE_INDEX)
+            max_effect_of_any_error(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
             * initial_errors.filtered_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
         )
@@ -183,7 +185,7 @@ def update_error_change_bounds(redundancy, initial_errors):
 
 
 @kernel
-def fill_effects_and_signed_effects(redundancy, initial_errors, signal):
+def fill_effects_per_unit_error(redundancy, initial_errors, signal):
     """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and `signed_effect_per_unit_error`
     (N_COUPLINGS,).
 
@@ -225,7 +227,7 @@ def fill_effects_and_signed_effects(redundancy, initial_errors, signal):
         h * r,
         h * (q * np.sin(phi) + r * np.cos(phi)),
     )
-    fill_flow_effects_and_signed_effects(redundancy, initial_errors, V, p, q, r)
+    fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
     log_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
@@ -234,7 +236,7 @@ def fill_effects_and_signed_effects(redundancy, initial_errors, signal):
 
 
 @kernel
-def fill_flow_effects_and_signed_effects(redundancy, initial_errors, V, p, q, r):
+def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     """Fill `effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and climb,
     and by gravity.
 
@@ -340,7 +342,7 @@ def fill_flow_effects_and_signed_effects(redundancy, initial_errors, V, p, q, r)
 
 
 @kernel
-def filter_effects_and_signed_effects(redundancy, initial_errors):
+def filter_effects_per_unit_error(redundancy, initial_errors):
     """Pass effects per unit error and couplings through the filters of the tests."""
     decay = redundancy.config.filter_decay
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
@@ -359,7 +361,7 @@ def filter_effects_and_signed_effects(redundancy, initial_errors):
 
 
 @kernel
-def max_error_effect(redundancy, test_index, pole_index):
+def max_effect_of_any_error(redundancy, test_index, pole_index):
     """Bound the effect of any error on a test through a filter: r + B, in the unit of the residual."""
     test = redundancy.test[test_index]
     return abs(test.filtered_residual[pole_index]) + test.filtered_bound[pole_index]
@@ -370,7 +372,7 @@ def max_current_error_effect(redundancy, initial_errors, hypothesis, test_index,
     """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
     through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
     return (
-        max_error_effect(redundancy, test_index, pole_index)
+        max_effect_of_any_error(redundancy, test_index, pole_index)
         + 2.0
         * initial_errors.error_change_bound[hypothesis]
         * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
@@ -510,7 +512,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     change_effect = (
         2.0
         * max_ratio
-        * max_error_effect(redundancy, SPEED_TEST, pole_index)
+        * max_effect_of_any_error(redundancy, SPEED_TEST, pole_index)
         / max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     )
     tighten_error_bound(
@@ -529,8 +531,8 @@ def update_initial_error_bounds(redundancy, initial_errors, signal):
         initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
     update_error_change_bounds(redundancy, initial_errors)
-    fill_effects_and_signed_effects(redundancy, initial_errors, signal)
-    filter_effects_and_signed_effects(redundancy, initial_errors)
+    fill_effects_per_unit_error(redundancy, initial_errors, signal)
+    filter_effects_per_unit_error(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)
 
 
@@ -555,7 +557,7 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis, tes
 @kernel
 def store_error_bounds_at_alarm(initial_errors):
     """Keep the bounds of the moment of the alarm: later residuals may be the effect of another error."""
-    initial_errors.sensor_error_bound_at_alarm[:] = initial_errors.error_bound
+    initial_errors.error_bound_at_alarm[:] = initial_errors.error_bound
 
 
 @kernel
@@ -563,19 +565,19 @@ def max_error_effect_at_alarm(initial_errors, hypothesis, test_index, pole_index
     """Bound the effect on a test, through a filter, of an error as large as that of a hypothesis could be at
     the alarm: b W_tm, in the unit of the residual."""
     return (
-        initial_errors.sensor_error_bound_at_alarm[hypothesis]
+        initial_errors.error_bound_at_alarm[hypothesis]
         * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
     )
 
 
 @kernel
-def record_refuted_hypotheses(redundancy, initial_errors, exceeded_tests):
-    """Record by which of the exceeded_tests (N_TESTS,), since the alarm, each hypothesis is refuted."""
+def record_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
+    """Record by which of `tests_exceeded_since_alarm` (N_TESTS,) each hypothesis is refuted."""
     refuted = initial_errors.is_refuted_by_test
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        for t in range(exceeded_tests.size):
+        for t in range(tests_exceeded_since_alarm.size):
             if (
-                exceeded_tests[t]
+                tests_exceeded_since_alarm[t]
                 and not refuted[i, t]
                 and exceeds_bound_with_initial_error(redundancy, initial_errors, i, t)
             ):
@@ -586,14 +588,14 @@ def record_refuted_hypotheses(redundancy, initial_errors, exceeded_tests):
 def test_reacts_to_error_change(hypothesis, test_index):
     """Whether a test reacts at once to a change of the error of a hypothesis."""
     if hypothesis in (PHI_HYPOTHESIS, THETA_HYPOTHESIS):
-        return test_index < ANGLE_TEST or test_index == test_showing_error_change(hypothesis)
-    return test_index == test_showing_error_change(hypothesis) or (
+        return test_index < ANGLE_TEST or test_index == index_of_test_showing_error_change(hypothesis)
+    return test_index == index_of_test_showing_error_change(hypothesis) or (
         hypothesis == AIRSPEED_HYPOTHESIS and test_index == DENSITY_TEST
     )
 
 
 @kernel
-def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test):
+def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test_index):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
@@ -602,7 +604,7 @@ def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test):
     """
     for t in range(initial_errors.is_refuted_by_test.shape[1]):
         if initial_errors.is_refuted_by_test[hypothesis, t] and (
-            test_reacts_to_error_change(hypothesis, alarm_test)
+            test_reacts_to_error_change(hypothesis, alarm_test_index)
             or not test_reacts_to_error_change(hypothesis, t)
         ):
             return False

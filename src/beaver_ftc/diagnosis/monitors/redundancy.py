@@ -92,7 +92,7 @@ MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that
 REPLACED_RATE_CORRECTION_PER_S = 3.0
 FROZEN_SAMPLES_WITHOUT_ROUNDING = 3  # samples of the sensor: so many are never identical without resolution
 FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
-NEVER_FROZEN_SAMPLES = (
+UNREACHABLE_FROZEN_SAMPLES = (
     1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 )
 ISOLATION_TIME_LIMIT_S = 1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
@@ -148,7 +148,7 @@ INITIAL_ERRORS_RECORD = record(
     # of each hypothesis, bounds on the sensor's error: at the first sample, now, at the alarm; and on the
     # change of the error since. Units: see initial_errors.py
     error_bound_at_start=N_INITIAL_ERROR_HYPOTHESES, error_bound=N_INITIAL_ERROR_HYPOTHESES,
-    sensor_error_bound_at_alarm=N_INITIAL_ERROR_HYPOTHESES, error_change_bound=N_INITIAL_ERROR_HYPOTHESES,
+    error_bound_at_alarm=N_INITIAL_ERROR_HYPOTHESES, error_change_bound=N_INITIAL_ERROR_HYPOTHESES,
     # bound on the effect of a unit of the error on a residual: in one sample, and through the filters
     effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
     filtered_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
@@ -166,7 +166,7 @@ MONITOR_CONFIG_RECORD = record(
 )  # fmt: skip
 
 MONITOR_MEMORY_RECORD = record(
-    start_stage=int, started_at_s=float, substep=int, exceeded_tests=(int, N_TESTS),
+    start_stage=int, started_at_s=float, substep=int, tests_exceeded_since_alarm=(int, N_TESTS),
     # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
     # largest size in the other samples of this frame, of the one before, of the one before that
     apparent_gyro_error=3, previous_apparent_gyro_error=3,
@@ -181,11 +181,12 @@ MONITOR_MEMORY_RECORD = record(
     gyros_excluded=int, filtered_turn_difference=(3, N_POLES), filtered_turn_difference_bound=(3, N_POLES),
     gyro_error_verdict=(int, 3), is_rate_replaced=(int, 3),
     n_identical_samples=(int, N_SENSORS), reading_two_samples_ago=N_SENSORS, is_cleared=(int, N_SENSORS),
-    max_accelerometer_jump=float,  # m/s2, which fades
+    fading_max_accelerometer_jump=float,  # m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings
-    n_summed_samples=int, residual_sum=3, bound_sum=3, initial_error_effect_sum=3, min_flow_reading=3,
-    max_flow_reading=3,
+    n_samples_since_alarm=int, flow_residual_sum_since_alarm=3, flow_bound_sum_since_alarm=3,
+    initial_error_effect_sum_since_alarm=3, min_flow_reading_since_alarm=3,
+    max_flow_reading_since_alarm=3,
     filtered_climb_error_m=N_POLES,  # of an incidence with the error that its residuals show
     spurious_velocity=3,  # m/s, body axes: what the residuals add up to
 )  # fmt: skip
@@ -193,9 +194,10 @@ MONITOR_MEMORY_RECORD = record(
 MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
     keeps_isolated_surface=int,  # a surface was found long before, with sound sensors: it stays found
-    surface_was_isolated=int,  # a surface had been isolated just before the alarm
-    alarm_test=int,  # index of the test that has raised the alarm
-    worst_test=int, worst_test_ratio=float,  # test with the largest residual_bound_ratio of this frame
+    surface_was_isolated_at_alarm=int,  # a surface had been isolated just before the alarm
+    alarm_test_index=int,  # index of the test that has raised the alarm
+    # test with the largest residual_bound_ratio of this frame, and that ratio
+    worst_test_index=int, worst_residual_bound_ratio=float,
     is_suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_replaced=(int, N_SENSORS),
 )  # fmt: skip
 
@@ -243,7 +245,7 @@ def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Sc
     config["sample_time_s"] = sample_time_s
     config["filter_decay"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
     config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_bounds(
+    config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_speed_and_change_bounds(
         declared.air, initial.airspeed_mps, sample_time_s
     )
     config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
@@ -279,10 +281,12 @@ def min_frozen_samples(noise_std: float, resolution: float) -> int:
     """Number of identical samples that a sound sensor of this noise and resolution does not give."""
     if resolution == 0.0:
         return FROZEN_SAMPLES_WITHOUT_ROUNDING
-    return FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else NEVER_FROZEN_SAMPLES
+    return FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else UNREACHABLE_FROZEN_SAMPLES
 
 
-def gust_bounds(air: Dryden, airspeed_mps: float, sample_time_s: float) -> tuple[float, np.ndarray]:
+def gust_speed_and_change_bounds(
+    air: Dryden, airspeed_mps: float, sample_time_s: float
+) -> tuple[float, np.ndarray]:
     """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
 
     The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s

@@ -86,7 +86,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     N_COMPUTED_TESTS,
     N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
-    NEVER_FROZEN_SAMPLES,
     NO_SENSOR,
     PHI_HYPOTHESIS,
     QDYN,
@@ -94,6 +93,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     TURN_TEST,
+    UNREACHABLE_FROZEN_SAMPLES,
     body_turn_per_euler_angle,
     compare_duplicate_sensors,
     run_redundancy_tests,
@@ -153,13 +153,15 @@ def count_identical_samples(monitor, signal):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within ACCELEROMETER_JUMP_MEMORY_S."""
     memory, previous = monitor.memory, monitor.redundancy.memory.previous_reading
-    memory.max_accelerometer_jump *= (
+    memory.fading_max_accelerometer_jump *= (
         1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_MEMORY_S
     )
     for i in range(N_SENSORS):
         memory.n_identical_samples[i] = memory.n_identical_samples[i] + 1 if signal[i] == previous[i] else 0
         if AX <= i < N_IN_EQUATIONS:
-            memory.max_accelerometer_jump = max(memory.max_accelerometer_jump, abs(signal[i] - previous[i]))
+            memory.fading_max_accelerometer_jump = max(
+                memory.fading_max_accelerometer_jump, abs(signal[i] - previous[i])
+            )
 
 
 @kernel
@@ -171,16 +173,18 @@ def is_frozen(monitor, sensor):
 @kernel
 def update_cleared_sensors(monitor, signal):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
-    memory, alarm_test = monitor.memory, monitor.output.alarm_test
-    if not is_flow_test(alarm_test):
+    memory, alarm_test_index = monitor.memory, monitor.output.alarm_test_index
+    if not is_flow_test(alarm_test_index):
         return
-    since_alarm_s = memory.n_summed_samples * monitor.redundancy.config.sample_time_s
+    since_alarm_s = memory.n_samples_since_alarm * monitor.redundancy.config.sample_time_s
     is_soon_enough = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
     if is_soon_enough and flow_reading_jumped(monitor, signal):
         clear_accelerometers(monitor)
     sum_flow_residuals(monitor, signal)
-    flow_sensor = flow_sensor_of_test(alarm_test)
-    if is_frozen(monitor, flow_sensor) or (alarm_test == SPEED_TEST and memory.exceeded_tests[DENSITY_TEST]):
+    flow_sensor = flow_sensor_of_test(alarm_test_index)
+    if is_frozen(monitor, flow_sensor) or (
+        alarm_test_index == SPEED_TEST and memory.tests_exceeded_since_alarm[DENSITY_TEST]
+    ):
         clear_accelerometers(monitor)
     accelerometer_is_frozen = False
     for i in range(AX, N_IN_EQUATIONS):
@@ -203,18 +207,20 @@ def clear_accelerometers(monitor):
 def flow_reading_jumped(monitor, signal):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
-    alarm_test, redundancy, memory = monitor.output.alarm_test, monitor.redundancy, monitor.memory
+    alarm_test_index, redundancy, memory = monitor.output.alarm_test_index, monitor.redundancy, monitor.memory
     sensor, previous, test = (
-        flow_sensor_of_test(alarm_test),
+        flow_sensor_of_test(alarm_test_index),
         redundancy.memory.previous_reading,
-        redundancy.test[alarm_test],
+        redundancy.test[alarm_test_index],
     )
     # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
-    residual_per_m_s = 1.0 if alarm_test == SPEED_TEST else 1.0 / max(previous[AIRSPEED], MIN_AIRSPEED_MPS)
+    residual_per_m_s = (
+        1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous[AIRSPEED], MIN_AIRSPEED_MPS)
+    )
     residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
     second_difference = signal[sensor] - 2.0 * previous[sensor] + memory.reading_two_samples_ago[sensor]
     min_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(test.residual)
-    accelerometer_effect = INTEGRATION_WEIGHT * memory.max_accelerometer_jump * residual_per_m_s2
+    accelerometer_effect = INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_m_s2
     return (
         abs(test.residual) > test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
         and abs(second_difference) >= min_jump > accelerometer_effect
@@ -229,25 +235,27 @@ def sum_flow_residuals(monitor, signal):
     config = redundancy.config
     for j in range(3):
         reading, test = signal[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
-        if memory.n_summed_samples == 0:
-            memory.min_flow_reading[j] = memory.max_flow_reading[j] = reading
-            memory.bound_sum[j] = (  # noise of the first and of the last sample
+        if memory.n_samples_since_alarm == 0:
+            memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = reading
+            memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample
                 2.0 * test.bound_per_sample + test.residual_per_gust_speed * config.max_gust_speed_mps
             )
             continue
-        memory.residual_sum[j] += test.residual
+        memory.flow_residual_sum_since_alarm[j] += test.residual
         hypothesis = initial_error_hypothesis_of_test(SPEED_TEST + j)
-        memory.bound_sum[j] += config.sample_time_s * test.bound_per_s
-        memory.initial_error_effect_sum[j] += (
-            initial_errors.sensor_error_bound_at_alarm[hypothesis]
+        memory.flow_bound_sum_since_alarm[j] += config.sample_time_s * test.bound_per_s
+        memory.initial_error_effect_sum_since_alarm[j] += (
+            initial_errors.error_bound_at_alarm[hypothesis]
             * initial_errors.effect_per_unit_error[hypothesis, SPEED_TEST + j]
         )
-        memory.min_flow_reading[j], memory.max_flow_reading[j] = (
-            min(memory.min_flow_reading[j], reading),
-            max(memory.max_flow_reading[j], reading),
+        memory.min_flow_reading_since_alarm[j], memory.max_flow_reading_since_alarm[j] = (
+            min(memory.min_flow_reading_since_alarm[j], reading),
+            max(memory.max_flow_reading_since_alarm[j], reading),
         )
-    alpha_error = np.sign(memory.residual_sum[1]) * max(
-        abs(memory.residual_sum[1]) - memory.bound_sum[1] - memory.initial_error_effect_sum[1],
+    alpha_error = np.sign(memory.flow_residual_sum_since_alarm[1]) * max(
+        abs(memory.flow_residual_sum_since_alarm[1])
+        - memory.flow_bound_sum_since_alarm[1]
+        - memory.initial_error_effect_sum_since_alarm[1],
         0.0,
     )
     climb_error = (
@@ -257,18 +265,18 @@ def sum_flow_residuals(monitor, signal):
         memory.filtered_climb_error_m[m] = (
             config.filter_decay[m] * memory.filtered_climb_error_m[m] + climb_error
         )
-    memory.n_summed_samples += 1
+    memory.n_samples_since_alarm += 1
 
 
 @kernel
 def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
-    memory, j = monitor.memory, monitor.output.alarm_test - SPEED_TEST
-    reading_range = memory.max_flow_reading[j] - memory.min_flow_reading[j]
-    explained = memory.bound_sum[j] + memory.initial_error_effect_sum[j]
+    memory, j = monitor.memory, monitor.output.alarm_test_index - SPEED_TEST
+    reading_range = memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
+    explained = memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
     return (
         reading_range > 0.0
-        and abs(memory.residual_sum[j])
+        and abs(memory.flow_residual_sum_since_alarm[j])
         > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range + MIN_CLEARING_BOUND_RATIO * explained
     )
 
@@ -278,20 +286,22 @@ def flow_sensor_error_would_exceed_other_test(monitor, signal):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
     redundancy, initial_errors = monitor.redundancy, monitor.initial_errors
-    alarm_test = monitor.output.alarm_test
-    other_test = DENSITY_TEST if alarm_test == SPEED_TEST else CLIMB_TEST
-    if alarm_test == BETA_FLOW_TEST or monitor.memory.exceeded_tests[other_test]:
+    alarm_test_index = monitor.output.alarm_test_index
+    other_test = DENSITY_TEST if alarm_test_index == SPEED_TEST else CLIMB_TEST
+    if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test]:
         return False
-    hypothesis = initial_error_hypothesis_of_test(alarm_test)
+    hypothesis = initial_error_hypothesis_of_test(alarm_test_index)
     for m in range(redundancy.config.filter_decay.size):
         expected, speed = abs(monitor.memory.filtered_climb_error_m[m]), redundancy.test[SPEED_TEST]
-        if alarm_test == SPEED_TEST:  # log(density) changes by twice the relative change of the airspeed
+        if (
+            alarm_test_index == SPEED_TEST
+        ):  # log(density) changes by twice the relative change of the airspeed
             expected = (
                 2.0
                 * (abs(speed.filtered_residual[m]) - speed.filtered_bound[m])
                 / max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
             )
-            expected *= 1.0 - min(initial_errors.sensor_error_bound_at_alarm[hypothesis], 1.0)
+            expected *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
         if expected > MIN_CLEARING_BOUND_RATIO * (
             redundancy.test[other_test].filtered_bound[m]
             + max_error_effect_at_alarm(initial_errors, hypothesis, other_test, m)
@@ -305,18 +315,18 @@ def suspect_accelerometers(monitor, gyro_explains_it):
     """Suspect the accelerometers along whose axis most of the spurious velocity is, unless a gyro explains
     it."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    reading, residual_sum, bound_sum = (
+    reading, flow_residual_sum_since_alarm, flow_bound_sum_since_alarm = (
         monitor.redundancy.memory.previous_reading,
-        memory.residual_sum,
-        memory.bound_sum,
+        memory.flow_residual_sum_since_alarm,
+        memory.flow_bound_sum_since_alarm,
     )
     alpha, beta, V = reading[ALPHA], reading[BETA], max(reading[AIRSPEED], MIN_AIRSPEED_MPS)
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
     along_flow, down, side = (
-        residual_sum[0],
-        V * np.cos(beta) * residual_sum[1],
-        V * residual_sum[2],
+        flow_residual_sum_since_alarm[0],
+        V * np.cos(beta) * flow_residual_sum_since_alarm[1],
+        V * flow_residual_sum_since_alarm[2],
     )
     velocity, largest, ahead = (
         memory.spurious_velocity,
@@ -326,7 +336,9 @@ def suspect_accelerometers(monitor, gyro_explains_it):
     velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
     velocity[1] = np.sin(beta) * along_flow + np.cos(beta) * side
     velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
-    velocity_bound = bound_sum[0] + V * (bound_sum[1] + bound_sum[2])  # m/s, of sound sensors
+    velocity_bound = flow_bound_sum_since_alarm[0] + V * (
+        flow_bound_sum_since_alarm[1] + flow_bound_sum_since_alarm[2]
+    )  # m/s, of sound sensors
     frozen_sensor = NO_SENSOR
     for i in range(3):
         largest = max(largest, abs(velocity[i]))
@@ -351,7 +363,7 @@ def mark_accelerometers_unusable(monitor, measured):
 MIN_SHARE_OF_LARGEST_RESIDUAL = 0.03
 # start_stage: 1 after the first sample, 2 with the first whole frame, 3 from the next frame on: only then the
 # innovation contains the change of a gyro's error between two frames
-START_STAGE_WITH_COMPARABLE_RATES = 3
+START_STAGE_SHOWING_GYRO_ERROR_CHANGE = 3
 MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
@@ -359,12 +371,12 @@ VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane
 FAST_POLE_INDEX = 1
 
 # Gyro or attitude (judge_gyro_errors)
-DAMPING_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
+RATE_DAMPING_RELATIVE_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 MAX_INNOVATION_PER_GYRO_ERROR_PER_S = 10.0
 GYRO_JUMP_TOLERANCE_SHARE = 0.1  # share of a gyro's jump by which the innovation may differ from it
 MIN_FOLLOWED_GYRO_ERROR_SHARE = 0.7  # of a gyro's error, which W shows
-NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
+N_NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
 MIN_TRANSIENT_NOISE_RATIO = (
     2.0  # of the size of a transient to the bound on noise: else noise may be all of it
 )
@@ -410,7 +422,7 @@ def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, 
             memory.apparent_gyro_error[i] = gyro_error
         else:
             memory.substep_gyro_error_peak[i] = max(memory.substep_gyro_error_peak[i], abs(gyro_error))
-    if memory.start_stage < START_STAGE_WITH_COMPARABLE_RATES:
+    if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
         widen_bound_by_initial_gyro_error(monitor)
     if monitor.config.attitude_is_noisy:
         exclude_gyros_if_attitude_disagrees(monitor)
@@ -447,7 +459,7 @@ def widen_bound_by_initial_gyro_error(monitor):
     memory = monitor.memory
     if memory.substep == 0:
         memory.start_stage += 1
-    if memory.start_stage == START_STAGE_WITH_COMPARABLE_RATES - 1 and memory.substep == 0:
+    if memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE - 1 and memory.substep == 0:
         for i in range(3):
             memory.gyro_error_estimate_bound[i] += abs(memory.apparent_gyro_error[i])
 
@@ -482,7 +494,7 @@ def exclude_gyros_if_attitude_disagrees(monitor):
     memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
         test = monitor.redundancy.test[TURN_TEST + i]
-        W_error_bound = memory.gyro_error_estimate_bound[i] + DAMPING_TOLERANCE * abs(
+        W_error_bound = memory.gyro_error_estimate_bound[i] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(
             memory.gyro_error_estimate[i]
         )
         for m, decay in enumerate(config.filter_decay):
@@ -514,12 +526,12 @@ def isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t):
             isolate_sensor(monitor, i, t)
     if output.isolated_sensor != NO_SENSOR:
         return
-    if output.worst_test_ratio > 1.0 and not output.alarmed:
+    if output.worst_residual_bound_ratio > 1.0 and not output.alarmed:
         raise_alarm(monitor, conclusion, t)
-        output.alarm_test = output.worst_test
+        output.alarm_test_index = output.worst_test_index
         store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
-        if memory.substep == 0 and memory.start_stage == START_STAGE_WITH_COMPARABLE_RATES:
+        if memory.substep == 0 and memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
             judge_gyro_errors(monitor, bank, bound, dt)
         record_exceeded_tests(monitor)
         update_cleared_sensors(monitor, measured.signal)
@@ -537,10 +549,13 @@ def find_worst_test(monitor):
     """Find the test with the largest ratio of residual to bound, of the samples of this frame."""
     output = monitor.output
     if monitor.memory.substep == 0:
-        output.worst_test, output.worst_test_ratio = 0, 0.0
+        output.worst_test_index, output.worst_residual_bound_ratio = 0, 0.0
     for c in range(N_TESTS):
-        if monitor.redundancy.test[c].residual_bound_ratio > output.worst_test_ratio:
-            output.worst_test, output.worst_test_ratio = c, monitor.redundancy.test[c].residual_bound_ratio
+        if monitor.redundancy.test[c].residual_bound_ratio > output.worst_residual_bound_ratio:
+            output.worst_test_index, output.worst_residual_bound_ratio = (
+                c,
+                monitor.redundancy.test[c].residual_bound_ratio,
+            )
 
 
 @kernel
@@ -556,7 +571,7 @@ def raise_alarm(monitor, conclusion, t):
         return
     if conclusion.detected:
         output.alarmed_at_s = conclusion.detected_at_s  # the same fault, which the rates have shown first
-    output.surface_was_isolated = conclusion.isolated_estimator >= 0
+    output.surface_was_isolated_at_alarm = conclusion.isolated_estimator >= 0
 
 
 @kernel
@@ -593,7 +608,7 @@ def judge_gyro_errors(monitor, bank, bound, dt):
             abs(gyro_error), abs(previous_gyro_error)
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump)
         noise_bound = (  # of gyro_error, rad/s, by the attitude's noise
-            NOISY_SAMPLES_IN_JUMP
+            N_NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
         )
@@ -639,7 +654,7 @@ def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_of_three
 @kernel
 def record_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
-    redundancy, exceeded_tests = monitor.redundancy, monitor.memory.exceeded_tests
+    redundancy, tests_exceeded_since_alarm = monitor.redundancy, monitor.memory.tests_exceeded_since_alarm
     for c in range(N_TESTS):
         first_test_of_three = TURN_TEST if c < ANGLE_TEST else ANGLE_TEST
         exceeded = (
@@ -648,42 +663,44 @@ def record_exceeded_tests(monitor):
             else redundancy.test[c].residual_bound_ratio > 1.0
         )
         if exceeded:
-            exceeded_tests[c] = 1
-    record_refuted_hypotheses(redundancy, monitor.initial_errors, exceeded_tests)
+            tests_exceeded_since_alarm[c] = 1
+    record_refuted_hypotheses(redundancy, monitor.initial_errors, tests_exceeded_since_alarm)
 
 
 @kernel
 def find_suspects(monitor):
     """Fill is_suspect (N_SENSORS,): the sensors whose error explains all tests."""
-    is_suspect, alarm_test = monitor.output.is_suspect, monitor.output.alarm_test
-    exceeded_tests = monitor.memory.exceeded_tests
+    is_suspect, alarm_test_index = monitor.output.is_suspect, monitor.output.alarm_test_index
+    tests_exceeded_since_alarm = monitor.memory.tests_exceeded_since_alarm
     is_suspect[:] = 0
-    if alarm_test >= N_COMPUTED_TESTS:
-        suspect_disagreeing_sensors(monitor, alarm_test - N_COMPUTED_TESTS)
+    if alarm_test_index >= N_COMPUTED_TESTS:
+        suspect_disagreeing_sensors(monitor, alarm_test_index - N_COMPUTED_TESTS)
         return
-    if alarm_test < SPEED_TEST:
+    if alarm_test_index < SPEED_TEST:
         suspect_gyros_and_attitude(monitor)
-    if alarm_test == SPEED_TEST:
+    if alarm_test_index == SPEED_TEST:
         suspect_accelerometers(monitor, False)
         is_suspect[AIRSPEED] = not monitor.memory.is_cleared[AIRSPEED]
-    elif alarm_test == DENSITY_TEST:
+    elif alarm_test_index == DENSITY_TEST:
         may_be_frozen = (
             monitor.memory.n_identical_samples[AIRSPEED] > 0
         )  # its test need not show an error then
         is_suspect[AIRSPEED] = (
-            exceeded_tests[SPEED_TEST] == 1
+            tests_exceeded_since_alarm[SPEED_TEST] == 1
             or not airspeed_error_would_exceed_own_test(monitor)
             or may_be_frozen
         )
-    is_suspect[QDYN] = alarm_test == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
+    is_suspect[QDYN] = alarm_test_index == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
     find_suspects_of_flow_test(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
     find_suspects_of_flow_test(monitor, BETA, BETA_FLOW_TEST, 2)
-    is_suspect[ALTITUDE] = alarm_test == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
-    is_suspect[ENGINE_SPEED] = alarm_test == RPM_TEST
-    is_suspect[MANIFOLD] = alarm_test == MANIFOLD_PRESSURE_TEST
+    is_suspect[ALTITUDE] = alarm_test_index == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
+    is_suspect[ENGINE_SPEED] = alarm_test_index == RPM_TEST
+    is_suspect[MANIFOLD] = alarm_test_index == MANIFOLD_PRESSURE_TEST
     suspect_is_frozen = any_suspect_frozen(monitor)
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        if not suspect_is_frozen and initial_error_explains_alarm(monitor.initial_errors, i, alarm_test):
+        if not suspect_is_frozen and initial_error_explains_alarm(
+            monitor.initial_errors, i, alarm_test_index
+        ):
             is_suspect[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
 
 
@@ -716,11 +733,11 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
         own_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading]
     )
     reading_is_frozen = is_frozen(monitor, reading)
-    monitor.output.is_suspect[DUPLICATE_SENSOR_INDEX[duplicate_index]] = not memory.exceeded_tests[
-        test_of_reading
-    ]
+    monitor.output.is_suspect[
+        DUPLICATE_SENSOR_INDEX[duplicate_index]
+    ] = not memory.tests_exceeded_since_alarm[test_of_reading]
     monitor.output.is_suspect[reading] = (
-        memory.exceeded_tests[test_of_reading] == 1
+        memory.tests_exceeded_since_alarm[test_of_reading] == 1
         or may_be_hidden
         or reading_is_frozen
         or not memory.has_duplicate_agreed[duplicate_index]
@@ -731,7 +748,7 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
 def is_only_exceeded_test(monitor, test_index):
     """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
     for c in range(RPM_TEST):
-        if c != test_index and monitor.memory.exceeded_tests[c]:
+        if c != test_index and monitor.memory.tests_exceeded_since_alarm[c]:
             return False
     return True
 
@@ -754,9 +771,9 @@ def any_suspect_frozen(monitor):
 def find_suspects_of_flow_test(monitor, vane, flow_test, fully_acting_gyro):
     """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude; all
     of fully_acting_gyro's error turns the flow. No flow sensor moves the attitude's tests."""
-    if monitor.output.alarm_test != flow_test:
+    if monitor.output.alarm_test_index != flow_test:
         return
-    exceeded, is_suspect = monitor.memory.exceeded_tests, monitor.output.is_suspect
+    exceeded, is_suspect = monitor.memory.tests_exceeded_since_alarm, monitor.output.is_suspect
     n_turn_tests = exceeded[TURN_TEST] + exceeded[TURN_TEST + 1] + exceeded[TURN_TEST + 2]
     suspect_accelerometers(monitor, n_turn_tests > 0)
     is_suspect[vane] = not (n_turn_tests > 0 or monitor.memory.is_cleared[vane])
@@ -795,9 +812,7 @@ def gyro_error_may_be_hidden(monitor, flow_test, gyro, acts_fully_on_flow):
 def airspeed_error_would_exceed_own_test(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
     density, speed = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
-    max_ratio = (
-        1.0 + monitor.initial_errors.sensor_error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
-    )  # of reading and truth
+    max_ratio = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]  # of reading and truth
     for m in range(density.filtered_residual.size):
         unexplained = abs(density.filtered_residual[m]) - max_error_effect_at_alarm(
             monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m
@@ -814,7 +829,7 @@ def suspect_gyros_and_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    exceeded, verdict = memory.exceeded_tests, memory.gyro_error_verdict
+    exceeded, verdict = memory.tests_exceeded_since_alarm, memory.gyro_error_verdict
     n_turn_tests, angle_is_frozen = 0, False
     for i in range(3):
         n_turn_tests += exceeded[TURN_TEST + i]
@@ -831,7 +846,7 @@ def suspect_gyros_and_attitude(monitor):
             memory.n_identical_samples[PHI + i],
             monitor.config.min_frozen_samples[PHI + i],
         )
-        may_be_frozen = 0 < n_identical < min_frozen < NEVER_FROZEN_SAMPLES  # too early to say
+        may_be_frozen = 0 < n_identical < min_frozen < UNREACHABLE_FROZEN_SAMPLES  # too early to say
         is_suspect[PHI + i] = is_wrong or (explains_turning and may_be_frozen)
 
 
@@ -841,7 +856,7 @@ def no_other_angle_test_exceeded(monitor, angle_index):
     the start does not explain."""
     for j in range(3):
         exceeded = (
-            monitor.memory.exceeded_tests[ANGLE_TEST + j]
+            monitor.memory.tests_exceeded_since_alarm[ANGLE_TEST + j]
             if angle_index == 2
             else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, ANGLE_TEST + j]
         )
@@ -870,7 +885,7 @@ def angle_error_explains_turn_tests(monitor, angle_index):
                 else 0.0
             )
             if (
-                monitor.memory.exceeded_tests[TURN_TEST + j]
+                monitor.memory.tests_exceeded_since_alarm[TURN_TEST + j]
                 and abs(turn.filtered_residual[m])
                 > turn_per_angle * max_angle_error + turn.filtered_bound[m] + initial_error_effect
             ):

@@ -51,7 +51,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
     estimator_entries = isolation.list_isolation_estimators(config.fault_class, aircraft)
     state.configure_shared_config(fdi["config"], scenario)
-    fdi["config"]["isolation_variant"] = adaptive_estimators.isolation_variant_number(config)
+    fdi["config"]["isolation_variant"] = adaptive_estimators.isolation_variant_index(config)
     state.configure_layout(fdi["layout"], estimator_entries, aircraft)
     isolation.configure_isolation(fdi["isolation"], scenario, estimator_entries, travel)
     if config.pairs:
@@ -75,8 +75,8 @@ def carry_over_to_restarted_diagnosis(fdi: np.void, previous_fdi: np.void, in_fl
     in_flight: whether the air moves by then. The sensor monitor's first JSBSim frame begins a frame of the
     loop.
     """
-    fdi["statistical"]["alarm"]["max_score_over_alarm_level"] = previous_fdi["statistical"]["alarm"][
-        "max_score_over_alarm_level"
+    fdi["statistical"]["alarm"]["max_score_over_alarm_level_so_far"] = previous_fdi["statistical"]["alarm"][
+        "max_score_over_alarm_level_so_far"
     ]
     if fdi["bank"]["config"]["n_filters"] == previous_fdi["bank"]["config"]["n_filters"]:
         fdi["bank"]["output"]["max_residual_over_threshold_so_far"] = previous_fdi["bank"]["output"][
@@ -108,7 +108,7 @@ def record_isolated_surfaces(fdi, t):
 
 
 @kernel
-def built_in_statistic(bank, alarm, authority, uses_statistical_estimates):
+def built_in_detection_statistic(bank, alarm, authority, uses_statistical_estimates):
     """The largest share of its threshold that the built-in detection reaches at this frame; alarm: `ALARM` of
     the statistical detector; likely: whether its estimates count.
 

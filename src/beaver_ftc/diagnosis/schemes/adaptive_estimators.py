@@ -12,7 +12,7 @@ each:
     published    worst case, statistics, or either   the estimator that is left: a loss of one surface
     all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
 
-`isolation_variant_number` chooses the row when a flight is assembled.
+`isolation_variant_index` chooses the row when a flight is assembled.
 """
 
 from collections.abc import Callable
@@ -195,7 +195,7 @@ def parity_excludes(fdi, fie):
         detector.views[: detector.n_views],
         fdi.isolation.estimator[position_estimator].frame_mean_effect.regressor,
     )
-    return parity.excludes_surface(
+    return parity.views_exclude_surface(
         views, detector.test_config, detector.forces, detector.gust, fie.surface, effect_column
     )
 
@@ -291,41 +291,41 @@ def begin_fault_type_isolation(fdi):
 
 
 @apart
-def observe_nothing_for_losses(fdi, prediction):
+def record_no_commands_for_losses(fdi, prediction):
     """The estimators have observed all that a loss needs (IsolationVariant)."""
 
 
 @apart
-def observe_surface_commands(fdi, prediction):
+def record_surface_commands(fdi, prediction):
     """Record the orders to each surface (IsolationVariant)."""
     registry.record_commands(fdi.types, prediction.commanded, prediction.frame_means)
 
 
 ISOLATION_VARIANTS = {
     ("published", "worst-case"): IsolationVariant(
-        begin_loss_isolation, observe_nothing_for_losses, isolate_loss
+        begin_loss_isolation, record_no_commands_for_losses, isolate_loss
     ),
     ("published", "either"): IsolationVariant(
-        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_either_detector
+        begin_loss_isolation, record_no_commands_for_losses, isolate_loss_by_either_detector
     ),
     ("published", "statistical"): IsolationVariant(
-        begin_loss_isolation, observe_nothing_for_losses, isolate_loss_by_statistics
+        begin_loss_isolation, record_no_commands_for_losses, isolate_loss_by_statistics
     ),
     ("all", "worst-case"): IsolationVariant(
-        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type
+        begin_fault_type_isolation, record_surface_commands, isolate_fault_type
     ),
     ("all", "either"): IsolationVariant(
-        begin_fault_type_isolation, observe_surface_commands, isolate_fault_type_by_either_detector
+        begin_fault_type_isolation, record_surface_commands, isolate_fault_type_by_either_detector
     ),
 }
-PUBLISHED_WORST_CASE_VARIANT = 0  # the place of the published class without statistics
+PUBLISHED_WORST_CASE_VARIANT_INDEX = 0  # the place of the published class without statistics
 
 begin_isolation_variant = one_of([row.begin for row in ISOLATION_VARIANTS.values()])
-observe_in_isolation_variant = one_of([row.observe for row in ISOLATION_VARIANTS.values()])
+record_commands_in_variant = one_of([row.observe for row in ISOLATION_VARIANTS.values()])
 isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()])
 
 
-def isolation_variant_number(config: FdiConfig) -> int:
+def isolation_variant_index(config: FdiConfig) -> int:
     """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
     authority = config.authority if config.weighs_chance else "worst-case"
     if config.fault_class == "all" and authority == "statistical":
@@ -353,7 +353,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     statistical.update_blocks(
         tests, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
     )
-    parity.update_view_directions(
+    parity.update_view_directions_and_signatures(
         parity_views, force_record, gust, fdi.bound, mean.previous_G, mean.Gu_with_previous_G
     )
     parity.project_innovation(
@@ -383,7 +383,7 @@ def prepare_statistical_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     detector, dt = fdi.statistical, fdi.config.dt
     tests, noise, gust = detector.test_config, detector.noise, detector.gust
-    update_gusts(gust, detector.inertial_gust, detector.forces, prediction, measured, k, dt)
+    update_gusts_and_forces(gust, detector.inertial_gust, detector.forces, prediction, measured, k, dt)
     statistical.prepare_tests(
         tests, noise, detector.block, gust, fdi.bound, prediction.design, measured, prediction.u, dt
     )
@@ -400,10 +400,10 @@ def add_instant_to_statistical_tests(fdi, prediction, measured):
 
 
 @kernel
-def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
+def update_gusts_and_forces(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.accounts_for_gusts:
-        gusts.set_gust_drift_intensity(gust, measured.altitude)
+        gusts.set_gust_rotation_intensity(gust, measured.altitude)
         gusts.update_gust_estimate(
             gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
         )
@@ -412,11 +412,11 @@ def update_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt)
     if force_record.in_use or gust.output.uses_accelerometers:
         gusts.store_accelerometer_reading(gust, measured.force)
     if force_record.in_use:
-        update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt)
+        update_forces_and_inertial_gust(gust, inertial_gust, force_record, prediction, measured, k, dt)
 
 
 @kernel
-def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measured, k, dt):
+def update_forces_and_inertial_gust(gust, inertial_gust, force_record, prediction, measured, k, dt):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_all_force_innovations(force_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.accounts_for_gusts:
@@ -424,7 +424,7 @@ def update_inertial_gusts(gust, inertial_gust, force_record, prediction, measure
             force_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
         )
         gusts.store_accelerometer_reading(inertial_gust, measured.force)
-        gusts.set_gust_drift_intensity(inertial_gust, measured.altitude)
+        gusts.set_gust_rotation_intensity(inertial_gust, measured.altitude)
         gusts.update_gust_estimate(inertial_gust, force_record.y_without_vanes, measured.attitude, dt, k)
         gusts.fill_gust_effect(
             inertial_gust, prediction.design, measured.x, force_record.y_without_vanes, prediction.u
@@ -449,9 +449,9 @@ def advance_to_frame(fdi, prediction, measured, k, t):
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
     update_isolation_estimators(fdi, prediction)
-    observe_in_isolation_variant(fdi.config.isolation_variant, fdi, prediction)
+    record_commands_in_variant(fdi.config.isolation_variant, fdi, prediction)
     network_leaks = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
-    filters.predict_fdae(
+    filters.advance_fdae(
         fdi.fdae,
         bound,
         prediction.x_before,

@@ -22,7 +22,7 @@ from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.design.model import ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, isolation
 from beaver_ftc.diagnosis.detection import filters
-from beaver_ftc.diagnosis.detection.filters import fill_gaussians, replace_network_output
+from beaver_ftc.diagnosis.detection.filters import fill_gaussians_and_sum_squares, replace_network_output
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin_scheme
@@ -116,7 +116,9 @@ def fill_input_basis(network, i, input_index, n_centres, value):
         ),
         n_centres - 1.0,
     )
-    norm = np.sqrt(fill_gaussians(centre_position, n_centres, 0, network.memory.input_basis[input_index]))
+    norm = np.sqrt(
+        fill_gaussians_and_sum_squares(centre_position, n_centres, 0, network.memory.input_basis[input_index])
+    )
     for k in range(n_centres):
         network.memory.input_basis[input_index, k] /= norm
 
@@ -199,7 +201,7 @@ def advance_to_frame(fdi, prediction, measured, k, t):
     )
     adaptive_estimators.update_isolation_estimators(fdi, prediction)
     train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
-    filters.predict_fdae(
+    filters.advance_fdae(
         fdi.fdae, bound, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
     )
     if published.config.constant_threshold > 0.0:
@@ -210,7 +212,7 @@ def advance_to_frame(fdi, prediction, measured, k, t):
 def set_all_constant_thresholds(fdi, constant_threshold):
     """Replace all adaptive thresholds by a constant, rad/s."""
     filters.set_constant_fdae_threshold(fdi.fdae, constant_threshold)
-    filters.set_published_filter_threshold(fdi.bank, constant_threshold)
+    filters.set_constant_published_filter_threshold(fdi.bank, constant_threshold)
     isolation.set_constant_isolation_thresholds(fdi.isolation, constant_threshold)
 
 

@@ -17,7 +17,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Detector, Measured, Verdict, informed_test
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout, switch_statistical_tests
-from beaver_ftc.loop.stepping import built_in_statistic
+from beaver_ftc.loop.stepping import built_in_detection_statistic
 from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
@@ -113,7 +113,7 @@ def record(scenario: Scenario) -> Recording:
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         air.append(FrameReadout(frames[0]).diagnosis.gust.gust_acceleration_rad_s2)
         status = fly_frame(frames, references, log)
-        built_in.append(built_in_statistic(frames))
+        built_in.append(built_in_detection_statistic(frames))
         mapped = FrameReadout(frames[0]).diagnosis.mapped_error
         known.append(mapped.is_inside_map)
         error.append(mapped.error_bound_rad_s2)
@@ -126,7 +126,10 @@ def record(scenario: Scenario) -> Recording:
     recording = Recording(recorder.context, recorder.seen, *by_frame)
     diagnosis = FrameReadout(loop.frames[0]).diagnosis
     if scenario.fdi.statistical is not None and diagnosis.gust.is_gust_measured:
-        recording.air, recording.air_noise = np.array(air), np.sqrt(diagnosis.input_noise_variance)
+        recording.air, recording.air_noise = (
+            np.array(air),
+            np.sqrt(diagnosis.acceleration_variance_by_input_noise),
+        )
     return recording
 
 

@@ -640,7 +640,10 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     """Of a watch every number of which is another, gusts among them: the last look by its own limit, and what
     the filter nearest to its bound keeps of those before."""
     watch = fill(np.zeros(1, SENSOR_MONITOR_RECORD)[0], seed=2, size=0.3)
-    watch["output"]["worst_test"], watch["output"]["worst_test_ratio"] = TESTS.index("alpha"), 1.2
+    watch["output"]["worst_test_index"], watch["output"]["worst_residual_bound_ratio"] = (
+        TESTS.index("alpha"),
+        1.2,
+    )
     redundancy, config = watch["redundancy"], watch["redundancy"]["config"]
     test = redundancy["test"][TESTS.index("alpha")]
     test["filtered_residual"], test["filtered_bound"] = turned * np.array([3.0, 8.0, 5.5]), (2.9, 4.7, 5.1)

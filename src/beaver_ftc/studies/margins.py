@@ -97,52 +97,59 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
     return commands
 
 
-def law_response(loop: OpenLoop, law: LawGains, z: complex) -> np.ndarray:
-    """Where the surfaces go for what is measured, (n, m), at z."""
-    n, dt, one = len(loop.effectiveness), loop.dt_s, np.eye(3)
-    back = 1.0 / z
+def law_response(loop: OpenLoop, law: LawGains, z: Any) -> np.ndarray:
+    """Where the surfaces go for what is measured, (..., n, m), at each z (...)."""
+    n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
+    z = np.asarray(z, complex)
+    back = (1.0 / z)[..., None, None]
     mean = law.share * back + 1.0 - law.share  # of what acts over the elapsed frame
-    keep, L_disturbance, Kp = np.diag(1.0 - law.L_rate), np.diag(law.L_disturbance), np.diag(law.Kp)
-    actuator = np.diag(loop.approach / (z - 1.0 + loop.approach))
+    one, keep = np.eye(3), np.diag(1.0 - law.L_rate)
+    L_disturbance, Kp = np.diag(law.L_disturbance), np.diag(law.Kp)
+    demand = np.diag(law.lead) @ law.demand
     ahead = one + law.share * dt * Kp
-    lead, none = np.diag(law.lead), np.zeros
-    of_position = lead @ law.demand @ Kp @ loop.G * law.share * dt + lead - np.eye(n)
     # unknowns: rate, disturbance, position, command; driven by what is measured
-    M = np.block([
-        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, none((3, n))],
-        [L_disturbance * back, one - one * back + L_disturbance * dt * back, L_disturbance @ loop.G * dt *
-        mean,
-         none((3, n))],
-        [none((n, 3)), none((n, 3)), np.eye(n), -actuator],
-        [lead @ law.demand @ Kp, lead @ law.demand @ ahead, of_position, np.eye(n)],
-    ])  # fmt: skip
-    rates = np.eye(3, loop.C.shape[0])
-    driven = np.vstack([
-        np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean,
-        L_disturbance @ (rates - loop.f * dt * mean),
-        none((n, len(loop.C))),
-        -lead @ law.demand @ ahead @ loop.f,
-    ])  # fmt: skip
-    return np.linalg.solve(M, driven)[6 : 6 + n]
+    rate, disturbance, position, command = (
+        slice(0, 3), slice(3, 6), slice(6, 6 + n), slice(6 + n, 6 + 2 * n),
+    )  # fmt: skip
+    M = np.zeros((*z.shape, 6 + 2 * n, 6 + 2 * n), complex)
+    M[..., rate, rate] = one - keep * back
+    M[..., rate, disturbance] = -keep * dt * back
+    M[..., rate, position] = -keep @ loop.G * dt * mean
+    M[..., disturbance, rate] = L_disturbance * back
+    M[..., disturbance, disturbance] = one - one * back + L_disturbance * dt * back
+    M[..., disturbance, position] = L_disturbance @ loop.G * dt * mean
+    M[..., position, position] = np.eye(n)
+    M[..., position, command] = -np.eye(n) * (loop.approach / (z[..., None] - 1.0 + loop.approach))[..., None]
+    M[..., command, rate] = demand @ Kp
+    M[..., command, disturbance] = demand @ ahead
+    M[..., command, position] = demand @ Kp @ loop.G * law.share * dt + np.diag(law.lead) - np.eye(n)
+    M[..., command, command] = np.eye(n)
+    rates = np.eye(3, m)
+    driven = np.zeros((*z.shape, 6 + 2 * n, m), complex)
+    driven[..., rate, :] = np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean
+    driven[..., disturbance, :] = L_disturbance @ (rates - loop.f * dt * mean)
+    driven[..., command, :] = -demand @ ahead @ loop.f
+    return np.linalg.solve(M, driven)[..., position, :]
 
 
 def loops(loop: OpenLoop, law: LawGains, omega: np.ndarray) -> np.ndarray:
     """L_s (omega, n) of every surface, the others' loops closed."""
     Ad, Bd = held_over_frame(loop.A, loop.B * loop.effectiveness, loop.dt_s)
-    n, states = len(loop.effectiveness), np.eye(len(Ad))
-    found = np.empty((len(omega), n), complex)
-    for k, z in enumerate(np.exp(1j * omega * loop.dt_s)):
-        sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
-        aircraft = loop.C @ np.linalg.solve(z * states - Ad, Bd) * (law.share + (1.0 - law.share) * z)
-        around = law_response(loop, law, z) @ (sensors[:, None] * aircraft)
-        found[k] = [-_others_closed(around, s) for s in range(n)]
-    return found
+    z = np.exp(1j * omega * loop.dt_s)[:, None]
+    sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
+    z = z[..., None]
+    whole = np.linalg.solve(z * np.eye(len(Ad)) - Ad, np.broadcast_to(Bd, (len(omega), *Bd.shape)))
+    aircraft = loop.C @ whole * (law.share + (1.0 - law.share) * z)
+    around = law_response(loop, law, z[:, 0, 0]) @ (sensors[..., None] * aircraft)
+    return np.stack([-_others_closed(around, s) for s in range(len(loop.effectiveness))], axis=1)
 
 
-def _others_closed(around: np.ndarray, s: int) -> complex:
-    rest = np.delete(np.arange(len(around)), s)
-    inner = np.eye(len(rest)) - around[np.ix_(rest, rest)]
-    return around[s, s] + around[s, rest] @ np.linalg.solve(inner, around[rest, s])
+def _others_closed(around: np.ndarray, s: int) -> Any:
+    """What comes back to surface s, (...), of what goes around all of them, (..., n, n)."""
+    rest = np.delete(np.arange(around.shape[-1]), s)
+    inner = np.eye(len(rest)) - around[..., rest[:, None], rest]
+    answered = np.linalg.solve(inner, around[..., rest, s][..., None])
+    return around[..., s, s] + (around[..., [s], rest][..., None, :] @ answered)[..., 0, 0]
 
 
 def frequencies(dt_s: float) -> np.ndarray:

@@ -4,8 +4,9 @@ One process imports the package and flies once; each command is forked from it, 
 environment, files and signals of its caller. `Served(python, bin)` starts it, with another
 installation's interpreter if need be; `scripts(folder)` puts a `beaver-ftc` and a `python` there that ask it,
 for shells: the latter for modules (`python -m tools.docs`), with any other arguments it is the interpreter.
-It needs Linux. Where the environment says of kernels what it did not say to the one process (where they are
-kept, whether they are compiled), the script starts the command as it is.
+With `ONE_CORE` in its environment a command sees one core: it starts no workers of its own, which would
+import the package again. It needs Linux. Where the environment says of kernels what it did not say to the
+one process (where they are kept, whether they are compiled), the script starts the command as it is.
 """
 
 import array
@@ -26,6 +27,7 @@ from typing import Any, NoReturn
 
 POSSIBLE = hasattr(os, "pidfd_open")
 SECONDS = "BEAVER_FTC_SERVED_SECONDS"  # a file to which the script adds the processor time of each command
+ONE_CORE = "BEAVER_FTC_SERVED_ONE_CORE"
 FIRST = ("run", "elevator-partial-loss", "--certificate")  # what the one process does before it serves
 DECIDES = ("XDG_CACHE_HOME", "NUMBA_DISABLE_JIT", "BEAVER_FTC_COMPILER")  # read when kernels are imported
 _PATIENCE_S = 600.0
@@ -185,6 +187,8 @@ def _become(asked: dict[str, Any], files: array.array, bin: str) -> NoReturn:
         replacement = open(number, mode, encoding="utf-8", buffering=1 if number == 2 else -1, closefd=False)  # noqa: SIM115
         setattr(sys, stream, replacement)
         setattr(sys, f"__{stream}__", replacement)
+    if ONE_CORE in os.environ:
+        setattr(os, "sched_getaffinity", lambda _: {0})  # noqa: B010
     from beaver_ftc.cli.begin import main
     from beaver_ftc.documents.errors import say_once
 

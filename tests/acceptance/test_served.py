@@ -5,7 +5,7 @@ import subprocess
 import time
 
 import pytest
-from tools.served import POSSIBLE
+from tools.served import ONE_CORE, POSSIBLE
 
 pytestmark = pytest.mark.skipif(not POSSIBLE, reason="commands are forked on Linux alone")
 LONG = "name: long\nduration_s: 20000\n"
@@ -26,6 +26,12 @@ def test_it_says_and_ends_as_if_it_were_started(line, installation, started, tmp
     forked, alone = (made.run("bash", "-c", line, cwd=tmp_path, SAID="x") for made in (installation, started))
     assert installation.before is not None
     assert _said(forked) == _said(alone)
+
+
+def test_a_command_sees_one_core_where_it_is_told_so(installation, tmp_path):
+    (tmp_path / "cores.py").write_text("import os; print(len(os.sched_getaffinity(0)))\n")
+    done = installation.run("bash", "-c", "python -m cores", cwd=tmp_path, **{ONE_CORE: "1"})
+    assert done.stdout == "1\n"
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

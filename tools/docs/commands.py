@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tools.docs.pages import ROOT
-from tools.served import POSSIBLE, SECONDS, Served
+from tools.served import ONE_CORE, POSSIBLE, SECONDS, Served
 
 LONGEST_S = 120.0  # of processor, for a command that is not dear
 PATIENCE = 5.0  # so many times longer by the clock, on a busy machine
@@ -48,6 +48,7 @@ class Checkout:
             "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'src'}",
             "COLUMNS": "80",
             "NO_COLOR": "1",
+            ONE_CORE: "1",
             SHARED: str(shared),
         }
 

@@ -51,7 +51,7 @@ def benchmark() -> str:
 
 def benchmark_probe() -> str:
     """One flight of each sweep of a set of each grade: a change of any number of theirs shows here first."""
-    return _tables(_compared(PROBED, most=1))
+    return _tables(_compared(PROBED, most=1, workers=1))
 
 
 GAIN_COLUMNS = (
@@ -89,11 +89,11 @@ def _gain(row: Document, again: Document) -> tuple[str, ...]:
     return *flown, *costs, *shares, adopted
 
 
-def _compared(names: Iterable[str], most: int | None = None) -> Document:
+def _compared(names: Iterable[str], most: int | None = None, workers: int = 2) -> Document:
     """Everybody on these sets, as tuned.json has them."""
     cases: list[SetFlight] = [case for name in names for case in of_set(name, most)]
     entries = everybody()
-    trials = fly_all(partial(fly_case, entries=entries, trade_off=False), cases, 2)
+    trials = fly_all(partial(fly_case, entries=entries, trade_off=False), cases, workers)
     return document_of(trials, entries)
 
 

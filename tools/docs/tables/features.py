@@ -54,7 +54,7 @@ FEATURES = (
     Feature("`compare --sweep`", "compare --sweep W.yaml --schemes observer-constant --laws nominal"),
     Feature("`detectability`", "detectability S.yaml --surface elevator --airspeed {speed:.0f}"),
     Feature("`power`", "power --aircraft {plane} --surface elevator --sensors tactical-grade "
-            "--turbulence none --schemes observer-constant --workers 2"),
+            "--turbulence none --schemes observer-constant"),
     Feature("`separate`", "separate S.yaml", keys=(
         ("faults", [{"actuator": "elevator", "type": "float", "at_s": 3}]), ("fdi", {"fault_class": "all"}),
     )),

@@ -41,10 +41,10 @@ def _losses(count: int) -> str:
     return _losses_of({condition: _flown(f"robust-elevator-{condition}", count) for condition in CONDITIONS})
 
 
-def _flown(name: str, count: int) -> Rows:
+def _flown(name: str, count: int, workers: int = 2) -> Rows:
     """The first flights of a built-in sweep, a row each."""
     sweep = load_sweep(name)
-    return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), 2)
+    return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), workers)
 
 
 LOSSES_HEAD = (
@@ -72,7 +72,7 @@ def _of_losses(rows: Rows) -> Iterator[str]:
 
 def _closely(name: str, count: int) -> str:
     """Of a few flights of a sweep the delay, and how near the residual came to its threshold."""
-    rows = _flown(name, count)
+    rows = _flown(name, count, workers=1)
     return f"{name}: " + ", ".join(
         f"{row['detection.delay_s']} {row['worst_residual_ratio']:.6g}" for row in rows
     )
@@ -93,7 +93,7 @@ def robustness_power_probe() -> str:
     scheme where shares of a few flights do not. That of multiple-models is 0 if no odds favour a fault."""
     grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
     with TemporaryDirectory() as name:
-        document = run_power(Path(name), grid, contenders(None), 2)
+        document = run_power(Path(name), grid, contenders(None))
     levels = (f"{each['turbulence']}, {each['scheme']}: {each['level']:.6g}" for each in document["levels"])
     return "\n".join((_power_of(document), *levels))
 
@@ -183,7 +183,7 @@ def robustness_decay() -> str:
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
     with TemporaryDirectory() as name:
-        return _decay_of(run_decay(Path(name), load_scenario(DECAYS[0]), 2, workers=2))
+        return _decay_of(run_decay(Path(name), load_scenario(DECAYS[0]), 2))
 
 
 def _decay_of(document: Document) -> str:

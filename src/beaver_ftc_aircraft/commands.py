@@ -31,6 +31,9 @@ def derive(
     terms to them. It validates the terms in states that the fit did not use. The largest error there becomes
     the declared bound. Afterwards a scenario can contain `aircraft: jsbsim:NAME`.
 
+    Examples:
+      beaver-ftc derive jsbsim:c172p
+
     aircraft: jsbsim:NAME for an aircraft of the installed jsbsim package, the path of a JSBSim model, or the
     folder of an aircraft.
     envelope: YAML file with the ranges of the states: airspeed_mps, alpha_deg, altitude_m and sideslip_deg.
@@ -63,6 +66,9 @@ def gtm(
 
     The database is not part of this package. It is the file gtm_design/config/T2_polynomial_aerodatabase.mat
     of github.com/nasa/GTM_DesignSim, under the NASA Open Source Agreement.
+
+    Examples:
+      beaver-ftc import gtm T2_polynomial_aerodatabase.mat
 
     database: Path of your copy of the database.
     out: Folder in which the aircraft folder is written. Default: the cache.

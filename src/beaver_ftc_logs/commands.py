@@ -39,6 +39,9 @@ def identify(
     parts whose labels state the effectiveness. The model is validated on data that the fit did not use. The
     result of the validation is in the model file, and on a page beside it (MODEL with .html).
 
+    Examples:
+      beaver-ftc identify my-logs/healthy.csv --vehicle my-logs/vehicle.yaml --out wing.json
+
     vehicle: Path of a vehicle file, or the built-in name `alfa`. `beaver-ftc new NAME --log` writes an
     example with every key.
     out: Path of the model file; required without --check. With --check: path of the proposed vehicle file.
@@ -150,6 +153,9 @@ def diagnose(options: DiagnoseOptions) -> None:
     own. The table diagnosis.parquet has one row for each sample. A row uses only samples up to its own time.
     A log.parquet that `run` wrote needs no model, because it is diagnosed with the design model of its
     scenario.
+
+    Examples:
+      beaver-ftc diagnose my-logs/suspect.csv --model wing.json
 
     model: Model file that `identify` wrote. A log of `run` needs no model file.
     aircraft: Diagnose with the design model of this aircraft instead of an identified model.

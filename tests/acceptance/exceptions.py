@@ -128,6 +128,21 @@ TABLE = (
         "beaver-ftc compare --benchmark --set published --flights 1 --leaderboard board.md",
     ),
     Exempt(
+        r"beaver-ftc reproduce --out runs",
+        "minutes: every figure of the study",
+        "beaver-ftc reproduce --help",
+    ),
+    Exempt(
+        r"(beaver-ftc compare --sweep elevator-effectiveness --flights) 20",
+        "minutes: one flight with one scheme",
+        r"\1 1 --schemes zhang2005",
+    ),
+    Exempt(
+        r"(beaver-ftc sweep elevator-effectiveness) --search delay",
+        "hundreds of flights: one of them",
+        r"\1 --replay 0 --no-report",
+    ),
+    Exempt(
         r"beaver-ftc power.*",
         "minutes: one condition, one rival",
         "beaver-ftc power --sensors tactical-grade --turbulence none --schemes rls-monitor",

@@ -463,8 +463,8 @@ def test_what_there_is_to_choose_from(beaver, changed):
     assert names[:2] == ["beaver", "beaver-split"]
     assert "jsbsim:c172x" in names
     assert names[2] == "gtm"
-    derived = {entry["description"].partition("package")[2] for entry in document["aircraft"][3:]}
-    assert derived <= {", derived", ": derived at first use"}
+    derived = {entry["description"].partition("package, ")[2] for entry in document["aircraft"][3:]}
+    assert derived <= {"derived", "derived at first use"}
 
 
 def test_an_aircraft_is_there_once_its_file_is(monkeypatch, tmp_path):
@@ -473,9 +473,9 @@ def test_an_aircraft_is_there_once_its_file_is(monkeypatch, tmp_path):
     of_aircraft.imported_folder("gtm").mkdir(parents=True)
     monkeypatch.setattr(of_aircraft, "is_derived", lambda name: name == "c172x")
     listed = dict(catalogue._aircraft())
-    assert listed["gtm"].startswith("not here yet: after ")
-    assert listed["jsbsim:c172x"] == "of the jsbsim package, derived"
-    assert listed["jsbsim:c172p"] == "of the jsbsim package: derived at first use"
+    assert listed["gtm"].startswith("not imported yet, allowed after ")
+    assert listed["jsbsim:c172x"] == "from the jsbsim package, derived"
+    assert listed["jsbsim:c172p"] == "from the jsbsim package, derived at first use"
 
 
 def test_schemas_of_both_kinds_of_file(beaver):

@@ -467,7 +467,7 @@ def load(reference: str = DEFAULT, beside: Path | None = None) -> Aircraft:
     if reference in IMPORTED:
         folder = imported_folder(reference)
         if not (folder / FILE).is_file():
-            says = f"is not here yet, allowed: after {IMPORTED[reference]}"
+            says = f"is not imported yet, allowed: after {IMPORTED[reference]}"
             raise UnknownAircraft(f"{reference!r} {says}")
         return read(folder)
     if reference not in builtin_names():

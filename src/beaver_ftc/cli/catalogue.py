@@ -69,10 +69,10 @@ def _aircraft() -> Iterator[tuple[str, str]]:
         yield name, load(name).file.description
     for name, how in IMPORTED.items():
         here = (imported_folder(name) / FILE).is_file()
-        yield name, load(name).file.description if here else f"not here yet: after {how}"
+        yield name, load(name).file.description if here else f"not imported yet, allowed after {how}"
     for name in names():
-        made = ", derived" if is_derived(name) else ": derived at first use"
-        yield f"jsbsim:{name}", f"of the jsbsim package{made}"
+        made = "derived" if is_derived(name) else "derived at first use"
+        yield f"jsbsim:{name}", f"from the jsbsim package, {made}"
 
 
 def _registered(group: str) -> Iterator[tuple[str, str]]:
@@ -89,18 +89,19 @@ def _faults() -> Iterator[tuple[str, str]]:
 
     for types, of in ((TYPES, ""), (SENSOR_TYPES, "of a sensor: ")):
         for name, row in sorted(types.items(), key=lambda each: each[1].__name__):
-            yield name, of + _first_line(row)
+            yield name, of + _first_paragraph(row)
 
 
 def _signals() -> Iterator[tuple[str, str]]:
     from beaver_ftc.scenario.signals import Signal
 
     for name, shape in Signal.model_fields.items():
-        yield name, _first_line(get_args(shape.annotation)[0])
+        yield name, _first_paragraph(get_args(shape.annotation)[0])
 
 
-def _first_line(described: type) -> str:
-    return (described.__doc__ or "").partition("\n")[0]
+def _first_paragraph(described: type) -> str:
+    """The first paragraph of the docstring, as one line."""
+    return " ".join((described.__doc__ or "").partition("\n\n")[0].split())
 
 
 def _section(kind: str, entries: Entries) -> str:

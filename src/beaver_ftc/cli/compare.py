@@ -55,6 +55,12 @@ def command(options: Options) -> None:
 
     If a comparison on flights is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc run elevator-partial-loss rudder-stuck
+      beaver-ftc compare runs/elevator-partial-loss runs/rudder-stuck
+      beaver-ftc compare --sweep elevator-effectiveness --flights 20
+      beaver-ftc compare --tune --grade exact --schemes adaptive-estimators
+
     runs: Result folders that `run` wrote.
     sweep: Compare on the flights of this sweep.
     benchmark: Compare on the benchmark's standard sets of flights, and update the ranking.

@@ -45,6 +45,10 @@ def command(
 
     If the map is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc mismatch fault-free
+      beaver-ftc mismatch fault-free --variant declared,linearised,mass=1.1
+
     variant: Design models to compare, separated by commas, e.g.
     declared,engine-neglected,linearised,mass=1.1.
     map: Also print the largest mismatch over airspeed and altitude.

@@ -63,6 +63,10 @@ def command(arguments: Arguments) -> None:
     finished flights are kept, and --resume continues the sweep. With --format json the command prints the
     summary.
 
+    Examples:
+      beaver-ftc sweep elevator-effectiveness
+      beaver-ftc sweep elevator-effectiveness --search delay
+
     file: A sweep file, or the name of a built-in sweep.
     out: Folder in which each sweep has a result folder of its own.
     workers: Number of parallel processes or Ray tasks. Default: one for each core.

@@ -18,15 +18,23 @@ _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 
 @dataclass(frozen=True)
 class DeclaredErrors:
-    """Declared errors beside the published bounds, as a plug-in is given them; zero where none is declared.
+    """The errors that `fdi.bounds` declares beside the published bounds, and the actuators.
 
-    noise, bias, resolution, slope (7,): of the instruments, in the order of sensors.SIGNALS, SI; noise is the
-    standard deviation of a sample. gust_rad_s, gust_time_s (3,): rotation of the air about each axis,
-    standard deviation and correlation time; gust_effect (3, 3) 1/s: the angular acceleration it causes.
-    coefficients: tolerance of each moment coefficient, absolute, in the order of `Aircraft.moments`. inertia:
-    tolerance as a share. deflection_rad: how far a surface may be from its actuator's model.
-    model_rad_s2 (3,): standard deviation, at the trim, of the acceleration the model gets wrong by all of
-    these but the gyros and the air. bandwidth_rad_s, rate_limit_rad_s (4,): the actuators, 0 is ideal.
+    A plug-in receives them as `Context.declared`. An error that is not declared is zero.
+
+    - `noise`, `bias`, `resolution`, `slope` (7,): errors of the instruments for p, q, r (rad/s), angle of
+      attack, sideslip (rad), airspeed (m/s) and dynamic pressure (Pa). `noise` is the standard deviation of a
+      sample. `slope` is the relative error of the slope, without unit.
+    - `gust_rad_s`, `gust_time_s` (3,): standard deviation, rad/s, and correlation time, s, of the rotation of
+      the air about each axis.
+    - `gust_effect` (3, 3) 1/s: angular acceleration for each rad/s of this rotation.
+    - `coefficients`: absolute tolerance of each moment coefficient, in the order of `Aircraft.moments`.
+    - `inertia`: tolerance of the moments of inertia, share of 1.
+    - `deflection_rad`: largest difference between a surface and the model of its actuator, rad.
+    - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s². It includes all errors above
+      except those of the gyros and of the air.
+    - `bandwidth_rad_s`, `rate_limit_rad_s` (surfaces,): bandwidth, rad/s, and rate limit, rad/s, of the
+      actuators; 0 if the actuator is ideal.
     """
 
     noise: np.ndarray = field(default_factory=_ZEROS[7])
@@ -62,11 +70,14 @@ class DeclaredErrors:
 
     @property
     def gyro_rad_s(self) -> np.ndarray:
-        """Standard deviation of a gyro's sample, noise and rounding, (3,)."""
+        """Standard deviation (3,) of a sample of each gyro, from noise and rounding, rad/s."""
         return np.hypot(self.noise[:3], self.resolution[:3] / np.sqrt(12.0))
 
     def rate_variance(self, least_rad_s: float) -> np.ndarray:
-        """Variance (3,) of a measured rate; least_rad_s: what a filter takes for perfect."""
+        """Variance (3,) of the measured rates, rad²/s².
+
+        - `least_rad_s`: standard deviation that a filter assumes for a perfect gyro, rad/s.
+        """
         return least_rad_s**2 + self.gyro_rad_s**2
 
     @property

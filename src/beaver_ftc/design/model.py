@@ -575,17 +575,22 @@ def linear_response(design, x, y, f, G):
 
 
 class DesignFunctions:
-    """The design model as two functions, xdot = f(x, y) + G(y) u; y: see above."""
+    """The design model xdot = f(x, y) + G(y) u as two functions. A plug-in receives it as `Context.model`.
+
+    - `x` (3,) rad/s: body rates p, q and r.
+    - `y` (4 + signals,): other signals, in the order and units of `Measured.y`.
+    - `u` (surfaces,) rad: deflections of the surfaces from neutral.
+    """
 
     def __init__(self, record: np.ndarray) -> None:
         self._record = record[0]
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration (3,) rad/s2 at neutral surfaces; x (3,) rad/s, y. Of x (n, 3), (n, 3)."""
+        """Angular acceleration (3,) rad/s² at neutral surfaces. For `x` (n, 3) the result is (n, 3)."""
         return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
-        """Angular acceleration of each surface, (3, surfaces) rad/s2 per rad."""
+        """Effectiveness matrix (3, surfaces), rad/s² per rad: acceleration for each rad of a surface."""
         return self._response(np.zeros((1, 3)), y)[1]
 
     def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,7 +29,13 @@ if TYPE_CHECKING:
 
 
 class Proof(NamedTuple):
-    """A certificate, the log that proves it, column -> values (rows,), and the text of scenario.yaml."""
+    """The proof of a flight's alarm and exclusions, as `Flight.proof` returns it.
+
+    - `certificate`: the content of certificate.json.
+    - `log`: a mapping from the name of a column to its values (frames,). It has the columns of log.parquet,
+      and those from which the certificate is computed again.
+    - `scenario`: the text of scenario.yaml, with all defaults filled in.
+    """
 
     certificate: Document
     log: dict[str, np.ndarray]

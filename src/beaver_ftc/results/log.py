@@ -97,22 +97,26 @@ class ParquetLog:
 
 
 class MemoryLog:
-    """A `LogSink` that keeps the log in memory, and reads like a stored one."""
+    """A log in memory, for the argument `log` of `Simulation`.
+
+    - `columns`: names of the columns, in order. Empty until `open` is called.
+    - `rows` (frames, columns): all rows so far.
+    """
 
     def __init__(self) -> None:
         self.columns: tuple[str, ...] = ()
         self._chunks: list[np.ndarray] = []
 
     def open(self, columns: Sequence[str]) -> None:
-        """Start again; `columns` name the log's columns in order."""
+        """Start an empty log with these columns, in this order."""
         self.columns, self._chunks = tuple(columns), []
 
     def write(self, rows: np.ndarray) -> None:
-        """Keep a copy of `rows`, shape (n, columns), float64."""
+        """Append a copy of `rows`, a float64 array (n, columns)."""
         self._chunks.append(rows.copy())
 
     def close(self) -> None:
-        """Nothing is left to be done."""
+        """End the log. A log in memory needs no action."""
 
     @property
     def rows(self) -> np.ndarray:
@@ -122,13 +126,13 @@ class MemoryLog:
         return self._chunks[0]
 
     def frozen_copy(self) -> "MemoryLog":
-        """The log as it is now; this one may grow."""
+        """A second log with the rows so far. Later rows of the first log do not change it."""
         now = MemoryLog()
         now.columns, now._chunks = self.columns, list(self._chunks)
         return now
 
     def copy_to(self, path: Path) -> None:
-        """Write the parquet file that a run would have written."""
+        """Write the rows as a log.parquet, as `run` writes it."""
         with ParquetLog(path) as log:
             log.open(self.columns)
             log.write(self.rows)
@@ -138,7 +142,10 @@ class MemoryLog:
         return sum(len(chunk) for chunk in self._chunks)
 
     def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
-        """Yield the log a chunk at a time, each as name -> values, shape (rows,)."""
+        """Yield the log in chunks of rows. A chunk is a mapping from the name of a column to its values (n,).
+
+        - `columns`: names of the wanted columns; None for all.
+        """
         wanted = self.columns if columns is None else columns
         places = [self.columns.index(name) for name in wanted]
         for chunk in self._chunks:

@@ -97,13 +97,16 @@ class Simulation(Stepping):
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A flight at an instant, kept as what was asked of it until then.
+    """A flight at one instant. `Simulation.snapshot` returns it, and `resume` continues the flight from it.
 
-    JSBSim keeps filters, delays, integrators and engines where no property shows them, so its state cannot be
-    written back. `resume` flies the flight again to this instant, which is exact for every aircraft and
-    sensor: about 1 ms for each second of flight at 100 Hz. To fork the process costs as much as 8 s of that.
+    - `frames`: number of frames flown until this instant.
+    - `t_s`: time of this instant, s.
+    - `plugged`: which plug-in objects the flight has: `detector`, `law`, both or none.
 
-    frames, t_s: how much of the flight. plugged: which plug-ins the flight has, of `detector` and `law`.
+    The snapshot stores the commands and injected faults up to this instant, not the state of JSBSim. JSBSim
+    keeps filters, delays, integrators and engines where no property can read them. `resume` therefore flies
+    the flight again. The repeated flight is exact for every aircraft and sensor. It takes about 1 ms for each
+    second of flight at 100 Hz. A fork of the process would take as long as 8 s of repeated flight.
     """
 
     frames: int
@@ -113,9 +116,11 @@ class Snapshot:
     plugged: tuple[str, ...] = ()
 
     def resume(self, **plug_ins: "Detector | Law") -> Simulation:
-        """A new flight in this state. plug_ins: for a flight with `detector` or `law` objects, new ones.
+        """Return a new `Simulation` in the state of the snapshot.
 
-        Raises BadInput where those are missing, or given to a flight without them.
+        - `plug_ins`: `detector=` and `law=` with new objects, if the flight has such plug-in objects.
+
+        Raises BadInput if such an object is missing, or if the flight has no plug-in of this kind.
         """
         if set(plug_ins) != set(self.plugged):
             asked = " and ".join(self.plugged) or "no plug-in"

@@ -578,6 +578,9 @@ class Detectability(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc detectability elevator-partial-loss --surface elevator --airspeed 45 --altitude 1000
+
     airspeed: Airspeed, m/s. Repeat the option for several. Default: 36, 40, 44, 48 and 52 for the Beaver; for
     another aircraft, 0.9, 1 and 1.1 times its airspeed at the start.
     altitude: Altitude above sea level, m. Repeat the option for several. Default: the altitude at the start

@@ -24,6 +24,9 @@ class Linearise(StudyCommand):
     roll and spiral mode, and their levels of MIL-F-8785C. If the scenario has a fault, the command also
     prints the handling qualities at the end of the flight.
 
+    Examples:
+      beaver-ftc linearise elevator-partial-loss
+
     scenario: Scenario file or built-in name from which sensors, actuators and law are read.
     """
 

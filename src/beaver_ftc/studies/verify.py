@@ -437,6 +437,9 @@ class Verify(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc verify --hours 1 --faults 40
+
     hours: Number of flight hours without a fault.
     faults: Number of flights with one random fault.
     seed: Seed of all random draws.

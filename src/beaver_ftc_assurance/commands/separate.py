@@ -26,6 +26,9 @@ def command(
 
     The exit status is 1 if a doublet was flown and both candidates remain.
 
+    Examples:
+      beaver-ftc separate flap-stuck
+
     rate_deg_s: Largest allowed body rate, deg/s.
     out: Folder for separation.json.
     """

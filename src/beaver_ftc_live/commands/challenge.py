@@ -57,6 +57,9 @@ def submit(
     its own, without access to files, network, truth and seed. A new submission does not replace an earlier
     submission.
 
+    Examples:
+      beaver-ftc challenge submit autumn/public/detector.py --student ada --to autumn
+
     file: A Python file with one class that has reset and step, or a folder with such a file.
     student: Name of the student. Default: the name of the file or folder.
     to: Folder of the challenge. Without this option the submission is checked, but not handed in.
@@ -87,6 +90,9 @@ def grade(
     contains the reason.
 
     If the command is interrupted, the same command resumes it.
+
+    Examples:
+      beaver-ftc challenge grade autumn
 
     folder: Folder of the challenge.
     """

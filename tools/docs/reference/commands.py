@@ -73,6 +73,52 @@ _PURPOSES = {
     },
 }  # fmt: skip
 
+# Command -> what its first example prints, where the help does not say it.
+_PRINTED = {
+    "run": "The first example prints a verdict of about 20 lines: fault, detection, isolation, modes of the"
+    " supervisor, notes, tracking errors, and each expectation with its result.",
+    "list": "The example prints the names of each list.",
+    "show": "The example prints the YAML text of the scenario.",
+    "new": "Each example prints the name of the written file or folder, and the next command.",
+    "validate": "The example prints one line for each file: `valid`, or its mistakes.",
+    "schema": "The example prints one JSON document.",
+    "trim": "The example prints one line for each state, setting and surface, with its value and unit.",
+    "linearise": "The example prints one row for each fault and surface: how far the gain of the loop can "
+    "rise and fall (dB), the phase margin (deg), and the airspeed at which the margin is smallest (m/s). A "
+    "second table has the modes at each airspeed.",
+    "sweep": "The first example prints rates of detection, isolation and false alarms with their 95 % "
+    "intervals, the delays (s), the tracking errors (deg/s), and each expectation with its result. The "
+    "second example also prints the worst flight that the search found.",
+    "compare": "The first two examples fly two scenarios and compare the runs: one row for each quantity, "
+    "one column for each run. A `*` marks the rows that differ. The third example prints one row for each "
+    "scheme and each law. The fourth example chooses the parameters of one scheme.",
+    "matrix": "The first example prints a table with a row for each fault and a column for each surface. A "
+    "cell has the verdict, the delay of the alarm (s), and the tracking error divided by that of the "
+    "informed law.",
+    "detectability": "The example prints one sentence for each amplitude of the reference, such as: at 45 "
+    "m/s and 1000 m, 1.5 deg/s of pitch: a loss of elevator of 18 % and more is certain to be detected "
+    "within 0.5 s.",
+    "smallest": "The example prints the two sizes of the loss, and a table with the condition that limits "
+    "them.",
+    "power": "The example prints one line for each size of the loss.",
+    "decay": "The example prints a table with a row for each error and size.",
+    "mismatch": "The first example prints RMS, largest value and share of the bound for each source and "
+    "axis, in 1e-3 rad/s². It ends with the constant bound that would just contain the error.",
+    "bench": "The example prints the time of a frame, and its ratio to the time of the bare aircraft.",
+    "verify": "The example prints the number of flights, violations and upper confidence limits for each "
+    "scheme.",
+    "separate": "The example prints one line for each pair of candidates.",
+    "identify": "The example needs the folder `my-logs` of `beaver-ftc new my-logs --log`. It prints the "
+    "number of samples, and the share of each rate that the model explains on data left out of the fit.",
+    "diagnose": "The example prints each event with its time span, and the effectiveness of each surface "
+    "with its interval.",
+    "derive": "The example prints the number of terms of each moment coefficient, the largest error on each"
+    " axis (rad/s²) in states of the fit and in other states, and the declared bound.",
+    "challenge submit": "The example prints the points of the practice flight, and the path of the "
+    "submission.",
+    "challenge grade": "The example prints the ranking: one row for each submission.",
+}
+
 
 def page() -> str:
     """Every command."""
@@ -83,6 +129,7 @@ def page() -> str:
     for commands in purposes.values():
         for name, more in commands.items():
             parts += [f"## {name}", *_described(known[name], f"beaver-ftc {name}")]
+            parts += [_PRINTED[name]] if name in _PRINTED else []
             parts += [f"More: [{_title(more)}]({more})."] if more else []
     return "\n\n".join([*parts, _NEXT]) + "\n"
 

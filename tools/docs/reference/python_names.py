@@ -55,7 +55,7 @@ _SHORT = {  # types of NumPy that are written out as a line of their parts
 NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Scenarios and flights": {
         "load": (), "scenarios": (), "Scenario": ("with_", "warnings"), "fly": (), "Flight": (),
-        "open_run": (),
+        "open_run": (), "results.flight.Proof": (),
     },
     "Records of a flight": {
         f"{RECORDS}.{name}": ()
@@ -64,13 +64,20 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
             "Tracking", "Rates", "ModeChange", "Departure", "Expectation",
         )
     },
-    "Step by step": {"Simulation": (), "Diagnosis": ()},
+    "Step by step": {
+        "Simulation": (), "results.simulation.Snapshot": (), "results.log.MemoryLog": (), "Diagnosis": (),
+    },
     "Many flights": {"sweep": ()},
     "Aircraft, trim and linear models": {
         "aircraft.load": (), "aircraft.Aircraft": (), "trim": (), "plant.trim.TrimPoint": (), "linearise": (),
         "plant.linear.LinearModel": (),
     },
-    "Plug-ins": dict.fromkeys(("Detector", "Law", "Measured", "Reference", "Verdict", "Context"), ()),
+    "Plug-ins": dict.fromkeys(
+        (
+            "Detector", "Law", "Measured", "Reference", "Verdict", "Context", "design.model.DesignFunctions",
+            "design.context.DeclaredErrors",
+        ), (),
+    ),
     "Errors": {"BadInput": (), "SimulationFailed": ()},
 }  # fmt: skip
 SAYS = {

@@ -325,6 +325,9 @@ class Bench(StudyCommand):
     the part out and measures the difference. The first run compiles the frame again for each part. This
     compilation takes about two minutes.
 
+    Examples:
+      beaver-ftc bench --no-parts
+
     rounds: Number of repetitions of each measurement.
     no_parts: Time only the whole loop, not its parts.
     """

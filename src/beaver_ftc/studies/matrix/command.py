@@ -30,6 +30,10 @@ class Matrix(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc matrix --airspeed 45
+      beaver-ftc matrix --airspeed 45 --declared --turbulence light
+
     out: Folder in which the result folder `fault-matrix` or `pitch-lost` is written.
     airspeed: Airspeed, m/s. Repeat the option for several. Default: 38, 45 and 52 for the Beaver; for
     another aircraft, shares of its airspeed at the start.

@@ -47,6 +47,9 @@ class Mechanisms(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc mechanisms --draws 1
+
     draws: Number of random flights for each combination of fault, bandwidth, error and instruments.
     seed: Seed of all random draws.
     out: Folder in which the result folder `mechanisms` is written, with a page, a figure, CSV and JSON.

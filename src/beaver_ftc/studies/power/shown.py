@@ -321,6 +321,9 @@ class Power(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc power --surface elevator --sensors tactical-grade --turbulence none
+
     grid: Number of variations: `quick` takes about 1 min of processor time, `full` about 10 min.
     schemes: Names of schemes to compare with the default scheme, separated by commas. Default: all registered
     schemes.

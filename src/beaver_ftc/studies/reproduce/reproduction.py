@@ -312,6 +312,9 @@ class Reproduce(StudyCommand):
 
     If the command is interrupted, the same command resumes it.
 
+    Examples:
+      beaver-ftc reproduce --out runs
+
     out: Folder in which the result folder `reproduction` is written.
     """
 

@@ -29,7 +29,7 @@ FAILURES = (
 def test_without_the_data_a_line_says_where_they_are(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     with pytest.raises(
-        UnknownAircraft, match=r"^'gtm' is not here yet.*import gtm.*github.com/nasa/GTM_DesignSim"
+        UnknownAircraft, match=r"^'gtm' is not imported yet.*import gtm.*github.com/nasa/GTM_DesignSim"
     ):
         load("gtm")
 

@@ -104,7 +104,7 @@ GUST_MEMORY_RECORD = record(
     # initial gust that still counts.
     gust_velocity_change_since_start=3, remaining_initial_gust_variance_share=float,
     # Unmeasured shares: of the yawing gust by the turn at this instant, and decaying since earlier turns; of
-    # the pitching gust that was present when the diagnosis has_level_acceleration_before.
+    # the pitching gust that was present when the diagnosis started.
     unmeasured_yawing_share_by_turn_now=float, unmeasured_yawing_share_by_past_turns=float,
     unmeasured_pitching_share_by_start=float,
     # turn of the gusts' axes in the body, 1/s; whether it counts
@@ -329,8 +329,8 @@ def update_gust_rotation(gust, y, attitude, dt):
 def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, airspeed, dt):
     """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
 
-    ahead, right, down, m/s: the velocity relative to the air if the gust had not changed. V m/s: airspeed; it
-    is the speed if no gust is measured.
+    predicted_ahead, _right, _down, m/s: the velocity relative to the air if the gust had not changed.
+    airspeed m/s: it is the speed if no gust is measured.
     """
     gust.output.speed_relative_to_mean_air = airspeed
     if not gust.output.is_gust_measured:
@@ -390,7 +390,7 @@ def update_gust_estimate(gust, y, attitude, dt, k):
 
 @kernel
 def fill_gust_effect(gust, design, x, y, u):
-    """Fill `gust_acceleration` (3,) rad/s2, the effect of the gust from this instant on, and `force`, m/s2.
+    """Fill `gust_acceleration` (3,) rad/s2, the effect of the gust from now on, and `specific_force`, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
@@ -603,8 +603,8 @@ def fill_frame_mean_gust(gust, frame_share):
 def full_gust_drift_intensity(gust, V, rate_sensitivity, force_gust_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces, about the
-    body axes.
+    rate_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces, about
+    the body axes.
     """
     total, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
     for g in range(3):

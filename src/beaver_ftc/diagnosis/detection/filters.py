@@ -53,9 +53,10 @@ def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
 
 @kernel
 def advance_gyro_error_bound(filtered_gyro_bound, gyro_error_change_bound, decay_factor):
-    """Advance the filtered bound on a gyro's changing error, rad/s, by one frame; nbar as the frame began.
+    """Advance the filtered bound on a gyro's changing error, rad/s, by one frame.
 
-    See bounds.py: what a residual may owe to the gyro is this and the present nbar.
+    gyro_error_change_bound: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds at
+    most the filtered bound plus the present nbar to a residual.
     """
     return decay_factor * filtered_gyro_bound + (1.0 - decay_factor) * gyro_error_change_bound
 
@@ -72,10 +73,10 @@ def residual_interval(
 ):
     """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
 
-    The parameter may move anywhere within [low, high] at every instant, so an incipient or intermittent
-    fault is covered: int w Z theta lies between low rise + high fall and high rise + low fall, where rise
-    and fall filter the positive and the negative part of Z. The residual is that integral less omega
-    thetahat, widened by the bound on the uncertainty.
+    The parameter may move anywhere within [theta_min, theta_max] at every instant, so an incipient or
+    intermittent fault is covered. With Z+ and Z- the filtered positive and negative part of Z, the filtered
+    Z theta lies between theta_min Z+ + theta_max Z- and theta_max Z+ + theta_min Z-. The residual is this
+    effect minus Omega thetahat, plus or minus the bound on the uncertainty.
     """
     lower = (
         theta_min * filtered_positive_Z
@@ -255,7 +256,8 @@ def fault_acceleration_range(fie, i):
 
 @kernel
 def fault_acceleration_range_along_parity(fie):
-    """The same along `fie.parity_direction` (3,), in which the fault has little effect."""
+    """Least and greatest acceleration, rad/s2, along `fie.parity_direction` (3,); else as
+    `fault_acceleration_range`."""
     effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.frame_mean_effect, 0.0, 0.0, 0.0
     for i in range(3):
         spread += abs(fie.parity_direction[i]) * effect.error_bound[i]
@@ -355,9 +357,11 @@ def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
 
 @kernel
 def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out):
-    """Fill out[first : first + count] with exp(-(place - j)^2 / 2), j = 0, 1, ...; return the squares' sum.
+    """Fill out from first_index on with exp(-(grid_position - j)^2 / 2), j = 0, 1, ...; return the sum of
+    their squares.
 
-    From one to the next they change by exp(place - j - 1/2), and that by 1/e: two exponentials do for all.
+    The ratio of a value and the one before is exp(grid_position - j - 1/2). The ratio of two successive
+    ratios is 1 / e. So two exponentials are enough for all values.
     """
     value, ratio = np.exp(-0.5 * grid_position * grid_position), np.exp(grid_position - 0.5)
     sum_of_squares = 0.0
@@ -414,7 +418,7 @@ def evaluate_network(network, alpha, beta):
 def train_network(network, residual, threshold, do_weights_leak, dt):
     """Advance the weights by one frame; residual and threshold (3,) rad/s, dt s.
 
-    `do_weights_leak` lets go of what was learnt once another estimate explains the fault.
+    do_weights_leak: the weights decay, because another estimate explains the fault.
     """
     leak_factor = np.exp(-network.config.leak_per_s * dt) if do_weights_leak else 1.0
     weight_limit = network.config.weight_limit
@@ -450,7 +454,7 @@ def replace_network_output(network, fhat):
 
 @kernel
 def reset_network(network):
-    """Discard what the network has learnt."""
+    """Set the weights and the output of the network to zero."""
     network.memory.weights[:], network.output[:] = 0.0, 0.0
 
 

@@ -68,7 +68,7 @@ PITCH_BLOCK, LATERAL_BLOCK, MEAN_REVERTING_LATERAL_BLOCK = (
     0,
     1,
     2,
-)  # RETURNING: roll and yaw again, with a drift that returns to zero
+)  # the last: roll and yaw again, with a drift that returns to zero
 N_FILTER_BLOCKS = 3
 N_ONSET_SLOTS = 10
 N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: statistical.py
@@ -434,7 +434,7 @@ def fill_signatures_for_onsets(hypothesis, onset_tests, first_test):
 
 @kernel
 def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay):
-    """Whiten the shaped signatures of n onset tests, and add the frame to N, D and the bounds on N.
+    """Whiten `signature_for_onset` of the first n_tests tests, and add the frame to N, D and the bounds on N.
 
     evidence_decay: factor by which earlier sums decay. In a block of one axis all values of a second axis are
     zero.
@@ -674,7 +674,7 @@ def update_block(
 
     The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `has_regressors`,
     regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response`; evidence_decay:
-    `accumulate_evidence`; memory, has_error_map: `evaluate_hypotheses`.
+    `accumulate_evidence`; upper_bound_decay, has_error_map: `evaluate_hypotheses`.
     """
     advance_covariance(block, dt)
     if block.alarm_level > 0.0:
@@ -703,7 +703,9 @@ def estimate_theta(kind, N, D):
 
 @kernel
 def set_block_coarse_gust_acceleration(block, acceleration):
-    """Fill the response of the block's axes to the gust that the vanes measure coarsely; acceleration (3,)
-    rad/s2."""
+    """Store the effect of the coarsely estimated gust, acceleration (3,) rad/s2, in `coarse_gust_response`.
+
+    `update_block` whitens it in place.
+    """
     for i, axis in enumerate(block.axis[: block.n_axes]):
         block.coarse_gust_response[i] = acceleration[axis]

@@ -148,8 +148,8 @@ def is_within_envelope(tone_config, y):
 def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
-    tolerated: true if the block has regressors. Without `within_envelope` the frame counts as zero, so the
-    sums decay.
+    has_regressors: whether the regressors of the block count. Without `within_envelope` the frame counts as
+    zero, so the sums decay.
     """
     tone_tests, block = view.tone_tests, view.block
     n_regressors = block.n_regressors if has_regressors else 0
@@ -203,8 +203,8 @@ def tone_whitening_gain(K_x, K_d, drift_decay, cos, sin, dt):
 
 @kernel
 def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, uncertainty_bound, dt):
-    """Update `correlation_bound_by_uncertainty`: the most that an uncertainty |d| <= bounded, in whitened
-    units, adds to |N|.
+    """Update `correlation_bound_by_uncertainty`: the most that an uncertainty |d| <= uncertainty_bound,
+    over the standard deviation of g, adds to |N|.
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
@@ -435,7 +435,9 @@ def set_view_direction_and_return_leak(view, forces, gust, bound, G):
 
 @kernel
 def set_direction_across_vane_and_rolling_gust(view, forces, gust):
-    """The same for the direction across two vectors: their vector product in (roll, yaw, side force).
+    """Fill `direction` and `unit_column` for the direction across two vectors; return the share that leaks.
+
+    The direction is the vector product of the two in (roll, yaw, side force).
 
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
     """
@@ -612,9 +614,9 @@ def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
 def project_innovation(
     views, has_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
 ):
-    """Project the innovation (3,) rad/s2 on the direction of each view, into `scratch` of its block.
+    """Project the innovation (3,) rad/s2 on the direction of each view, into `frame_innovation` of its block.
 
-    Noise follows, and if constant errors are `has_regressors`, their regressors; V m/s.
+    Fill the noise too, and with `has_regressors` the regressors of constant errors; V m/s.
     """
     for view in views:
         if not view.is_used:
@@ -683,7 +685,7 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
 
     A view of the rates alone needs no confirmation: no error of a vane changes the rates alone. Peak scores
     are compared because the view and its confirmation may reach their levels at different times. The
-    confirming view must reach the naming level.
+    confirming view must reach the level of the isolation, sqrt(2 isolation_llr_margin).
     """
     if uses_force(view) and not forces.in_use:
         return 0.0
@@ -703,7 +705,7 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
 def view_alarm_score(view, views, test_config, forces, gust):
     """The score with which a view raises the alarm, 0 if it raises none.
 
-    Views raise it only where no block of the rates test_config: for an oscillation about an axis, and for a
+    Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a
     force, if accelerometers cannot break.
     """
     if view.orthogonal_to_surface == AXIS_VIEW and not view.uses_inertial_flow_angle:
@@ -737,8 +739,8 @@ class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
     orthogonal_to_surface: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW;
-    direction: at the start; losses: surfaces whose losses are tested; uses_inertial_flow_angle: at the flow
-    angle from inertial motion.
+    direction: at the start of the flight; surfaces_tested_for_loss: their indices; uses_inertial_flow_angle:
+    the force is that at the flow angle from inertial motion.
     """
 
     orthogonal_to_surface: int
@@ -916,8 +918,8 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
 def fill_block_signatures(blocks, Gu, alpha_cubed_acceleration):
     """Fill the signatures of the blocks of the rates, rad/s2.
 
-    Gu (3, n) rad/s2: effect of each surface, mean over the frame; cubic rad/s2: pitch acceleration of a
-    coefficient 1 of alpha^3.
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame; alpha_cubed_acceleration rad/s2:
+    pitch acceleration of a coefficient 1 of alpha^3.
     """
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:

@@ -728,7 +728,9 @@ def loss_llr_upper_bound(block, surface, is_loss_end):
 
 @kernel
 def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
-    """True if a loss of this surface explains the data better than all alternatives, by the naming level.
+    """True if a loss of this surface explains the data better than all alternatives.
+
+    Its log-likelihood ratio must be larger by more than `isolation_llr_margin`.
 
     estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
     is weakly excluded by WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED, excluded losses are alternatives as well.
@@ -753,7 +755,9 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
 
 @kernel
 def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_loss_end_in_pitch, is_abrupt):
-    """True if an alternative explains the data better than a loss of this surface, by the naming level.
+    """True if an alternative explains the data better than a loss of this surface.
+
+    Its log-likelihood ratio must be larger by more than `isolation_llr_margin`.
 
     Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
     only. A loss that is not declared `is_abrupt` may grow. A constant theta then explains only a part of its

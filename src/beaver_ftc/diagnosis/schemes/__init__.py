@@ -110,7 +110,7 @@ def record_isolated_surfaces(fdi, t):
 @kernel
 def built_in_detection_statistic(bank, alarm, authority, uses_statistical_estimates):
     """The largest share of its threshold that the built-in detection reaches at this frame; alarm: `ALARM` of
-    the statistical detector; likely: whether its estimates count.
+    the statistical detector; uses_statistical_estimates: whether its estimates count.
 
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.

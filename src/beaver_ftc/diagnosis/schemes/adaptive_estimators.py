@@ -122,13 +122,13 @@ class IsolationVariant(NamedTuple):
     """Lazy kernels of a row.
 
     begin(fdi): start, at the alarm, with no knowledge of any fault.
-    observe(fdi, prediction): record what each surface was commanded in the elapsed frame.
+    record_commands(fdi, prediction): record what each surface was commanded in the elapsed frame.
     isolate(fdi, measured, t, isolation_has_run): exclude faults at t s, and decide; isolation_has_run: it
     started a frame or more ago.
     """
 
     begin: Callable[..., None]
-    observe: Callable[..., None]
+    record_commands: Callable[..., None]
     isolate: Callable[..., None]
 
 
@@ -321,7 +321,7 @@ ISOLATION_VARIANTS = {
 PUBLISHED_WORST_CASE_VARIANT_INDEX = 0  # the place of the published class without statistics
 
 begin_isolation_variant = one_of([row.begin for row in ISOLATION_VARIANTS.values()])
-record_commands_in_variant = one_of([row.observe for row in ISOLATION_VARIANTS.values()])
+record_commands_in_variant = one_of([row.record_commands for row in ISOLATION_VARIANTS.values()])
 isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()])
 
 

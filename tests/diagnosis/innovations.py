@@ -16,10 +16,10 @@ from beaver_ftc.design.model import DPT_0, KW_TO_DPT, SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    MAX_HYPOTHESES,
     N_ONSET_SLOTS,
     N_ONSET_TESTS_PER_GROUP,
     SUPPORTING_CORRELATION_SIGN_BY_KIND,
+    USUAL_MAX_HYPOTHESES_PER_BLOCK,
     BlockCapacity,
     block_dtype,
 )
@@ -46,7 +46,7 @@ def misread(y, place, error, density_power_error_kw=0.0):
 def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
-    block = np.zeros(1, block_dtype(BlockCapacity(105, MAX_HYPOTHESES))).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(BlockCapacity(105, USUAL_MAX_HYPOTHESES_PER_BLOCK))).view(np.recarray)[0]
     block["n_axes"], block["axis"][:n], block["drift_decay_factor"] = n, range(n), keep
     block["drift_intensity"][:n, :n] = drift
     block["gyro_noise_variance"][:n], block["model_noise_variance"][:n] = np.square(noise), np.square(jitter)

@@ -510,7 +510,7 @@ def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
-    block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block)).view(np.recarray)[0]
+    block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block_capacity)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
     record["output"]["acceleration_variance_by_axes_turn"], block["drift_intensity_scale"], block["P_dd"] = (
         rng.normal(size=(3, 3)),

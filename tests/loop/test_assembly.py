@@ -60,7 +60,11 @@ def test_a_flight_remembers_little_and_one_of_more_terms_or_delays_as_much_as_it
     size = required_record_size(dataclasses.replace(load(), file=many))
     in_roll_and_yaw = 2 * sum(term.coefficient != "Cm" for term in load().moments)
     assert usual["fdi"]["statistical"]["block"]["regressor_tolerance"].shape[1] < in_roll_and_yaw + 5
-    assert in_roll_and_yaw + 5 <= size.rate_block.max_regressors < size.view_block.max_regressors
+    assert (
+        in_roll_and_yaw + 5
+        <= size.rate_block_capacity.max_regressors
+        < size.view_block_capacity.max_regressors
+    )
     slow = {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}
     says = {}, {"sensors": slow}, {"changes": [{"at_s": 3.0, "sensors": slow}]}
     lines = [assembled(**keys)["instruments"]["line"].size for keys in says]

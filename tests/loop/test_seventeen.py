@@ -80,7 +80,7 @@ def test_a_record_has_the_room_that_its_aircraft_needs(folder):
     assert small < 700_000  # onset tests in groups of four hypotheses, of which a view needs three at most
     assert 5_000_000 < large < 7_000_000
     assert (
-        required_record_size(many).rate_block.max_hypotheses == 3 * 8 + 2
+        required_record_size(many).rate_block_capacity.max_hypotheses == 3 * 8 + 2
     )  # ailerons and rudders: losses that are one block's
 
 

@@ -11,10 +11,10 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_EFFECT,
     GROWING_LOSS,
     LOSS_END,
-    MAX_HYPOTHESES,
     N_ONSET_SLOTS,
     N_ONSET_TESTS_PER_GROUP,
     STEP_FAULT,
+    USUAL_MAX_HYPOTHESES_PER_BLOCK,
 )
 from beaver_ftc.diagnosis.state import LOSS
 
@@ -47,7 +47,7 @@ def test_the_slot_that_starts_anew_counts_the_twos_of_the_frame():
 
 
 def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
-    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
+    kinds = USUAL_MAX_HYPOTHESES_PER_BLOCK // 2 * (LOSS, STEP_FAULT)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=(0.1, 0.2))
     names = (
         "correlation",
@@ -147,7 +147,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     """Every onset test by itself: r = x + dt (s - d), w = S^-1 r; N, D and R by w, what was there by its
     share. Of even and odd numbers of regressors."""
     rng, dt, keep, kept = np.random.default_rng(8), 0.05, 0.9, 0.8
-    kinds = MAX_HYPOTHESES // 2 * (LOSS, STEP_FAULT)
+    kinds = USUAL_MAX_HYPOTHESES_PER_BLOCK // 2 * (LOSS, STEP_FAULT)
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *kinds, tolerance=tolerance)
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
     block["K_x"], block["K_d"], block["S_inverse"], block["drift_decay_factor"] = K_x, K_d, S, kept
@@ -282,7 +282,7 @@ def test_of_hypotheses_that_a_block_does_not_have_nothing_is_reckoned():
 
 
 def test_a_lane_without_information_comes_to_nothing():
-    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *MAX_HYPOTHESES * (LOSS,))
+    block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), *USUAL_MAX_HYPOTHESES_PER_BLOCK * (LOSS,))
     (
         block["onset_tests"]["supporting_correlation_sign"],
         block["onset_tests"]["correlation"],

@@ -188,7 +188,11 @@ def test_what_goes_on_is_beyond_what_sound_instruments_may_add_up_to():
         monitor = new_watch(bound=1.0)
         test = monitor["redundancy"]["test"][ALPHA_FLOW_TEST]
         test["bound_per_s"], test["bound_per_sample"] = 0.01, 1e-4
-        each = share * (sensor_monitor.MIN_CLEARING_BOUND_RATIO * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6) / 99
+        each = (
+            share
+            * (sensor_monitor.MIN_EFFECT_OVER_BOUND_TO_CLEAR * (0.01 * H * 99 + 2e-4) + 30.0 * 2e-6)
+            / 99
+        )
         looks(monitor, course(ALPHA, moving), np.full(100, each))
         assert cleared(monitor) == clear
 
@@ -231,7 +235,7 @@ def test_an_airspeed_s_error_is_in_the_density_too():
         test = monitor["redundancy"]["test"]
         test["filtered_bound"][DENSITY_TEST], test["filtered_bound"][SPEED_TEST] = 1e-3, 0.2
         test["filtered_residual"][SPEED_TEST, 2] = -(
-            0.2 + size * sensor_monitor.MIN_CLEARING_BOUND_RATIO * 1e-3 * V / 2.0
+            0.2 + size * sensor_monitor.MIN_EFFECT_OVER_BOUND_TO_CLEAR * 1e-3 * V / 2.0
         )
         looks(monitor, course(AIRSPEED, [1e-5]), [0.01])
         assert cleared(monitor) == clear
@@ -250,7 +254,7 @@ def test_an_incidence_s_error_is_in_the_climb_too():
         monitor["redundancy"]["test"]["filtered_bound"][CLIMB_TEST] = (
             9.0,
             9.0,
-            bound * fallen / sensor_monitor.MIN_CLEARING_BOUND_RATIO,
+            bound * fallen / sensor_monitor.MIN_EFFECT_OVER_BOUND_TO_CLEAR,
         )
         looks(monitor, readings, np.full(100, each))
         assert cleared(monitor) == clear

@@ -72,7 +72,9 @@ PITCH_BLOCK, LATERAL_BLOCK, MEAN_REVERTING_LATERAL_BLOCK = (
 N_FILTER_BLOCKS = 3
 N_ONSET_SLOTS = 10
 N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: statistical.py
-MAX_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
+USUAL_MAX_HYPOTHESES_PER_BLOCK = (
+    8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
+)
 MIN_UNCERTAINTY_BOUND_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP_FAULT, ALPHA_CUBED_EFFECT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.

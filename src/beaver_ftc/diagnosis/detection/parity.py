@@ -73,10 +73,10 @@ from beaver_ftc.diagnosis.detection.forces import (
 )
 from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL_BLOCK,
-    MAX_HYPOTHESES,
     N_INPUT_READINGS,
     PITCH_BLOCK,
     STEP_FAULT,
+    USUAL_MAX_HYPOTHESES_PER_BLOCK,
     BlockCapacity,
     normalised_evidence,
 )
@@ -348,14 +348,14 @@ AXIS_VIEW, VANE_VIEW = -1, -2
 class StatisticalRecordSize(NamedTuple):
     """Capacities of a record: of a block of the rates, of a view; numbers of views and of error-map boxes."""
 
-    rate_block: BlockCapacity
-    view_block: BlockCapacity
+    rate_block_capacity: BlockCapacity
+    view_block_capacity: BlockCapacity
     n_views: int
     n_error_map_boxes: int
 
 
 USUAL_RECORD_SIZE = StatisticalRecordSize(
-    BlockCapacity(23, MAX_HYPOTHESES), BlockCapacity(36, 3), 13, 6
+    BlockCapacity(23, USUAL_MAX_HYPOTHESES_PER_BLOCK), BlockCapacity(36, 3), 13, 6
 )  # enough for most aircraft: see `required_record_size`
 
 

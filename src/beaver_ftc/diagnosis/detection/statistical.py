@@ -549,8 +549,9 @@ def statistical_dtype(size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dty
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         test_config=TEST_CONFIG_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
-        block=(block_dtype(size.rate_block), N_FILTER_BLOCKS),
-        n_views=int, views=(parity_view_dtype(size.view_block), size.n_views), tone_config=TONE_CONFIG_RECORD,
+        block=(block_dtype(size.rate_block_capacity), N_FILTER_BLOCKS),
+        n_views=int, views=(parity_view_dtype(size.view_block_capacity), size.n_views),
+        tone_config=TONE_CONFIG_RECORD,
         forces=MEASURED_FORCES_RECORD, gust=GUST_RECORD, inertial_gust=GUST_RECORD,
     )  # fmt: skip
 

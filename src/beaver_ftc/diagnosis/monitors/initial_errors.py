@@ -17,7 +17,8 @@ samples, s; test t; and filter pole m
                                     (error_bound_at_start). Then, at each sample,
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
                                     and for each test, or pair of tests, that couples with the error
-                                      b <- min(b, (r + B + 2 d W_tm) / (MIN_REMAINING_SIGNED_EFFECT_SHARE C))
+                                      b <- min(b, (r + B + 2 d W_tm)
+                                                  / (MIN_REMAINING_COUPLING_EFFECT_SHARE C))
     error_change_bound              d: bound on the change of x within the memory of the slowest filter,
                                     d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
                                     of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
@@ -93,10 +94,10 @@ MAX_DENSITY_DEVIATION_SHARE = (
 )
 MIN_DENSITY_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
-MIN_REMAINING_SIGNED_EFFECT_SHARE = 0.8
+MIN_REMAINING_COUPLING_EFFECT_SHARE = 0.8
 SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
+# Places in `coupling_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
 # per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
 # reading that is off comes first; VANE: of alpha and of beta.
 (
@@ -186,15 +187,18 @@ def update_error_change_bounds(redundancy, initial_errors):
 
 @kernel
 def fill_effects_per_unit_error(redundancy, initial_errors, signal):
-    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and `signed_effect_per_unit_error`
-    (N_COUPLINGS,).
+    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
+    `coupling_effect_per_unit_error` (N_COUPLINGS,).
 
     Both are taken at the sample before, from which this sample, signal (N_SENSORS,), is predicted.
     """
     reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
     p, q, r = reading[0], reading[1], reading[2]
     V, phi, theta = max(reading[AIRSPEED], MIN_AIRSPEED_MPS), reading[PHI], reading[THETA]
-    effect, signed_effect = initial_errors.effect_per_unit_error, initial_errors.signed_effect_per_unit_error
+    effect, signed_effect = (
+        initial_errors.effect_per_unit_error,
+        initial_errors.coupling_effect_per_unit_error,
+    )
     effect[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
@@ -237,15 +241,18 @@ def fill_effects_per_unit_error(redundancy, initial_errors, signal):
 
 @kernel
 def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
-    """Fill `effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and climb,
-    and by gravity.
+    """Fill `effect_per_unit_error` and `coupling_effect_per_unit_error` for the tests of speed, flow and
+    climb, and by gravity.
 
     V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
     for the second order in h. x: the error of the row's hypothesis.
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
     reading, a = memory.previous_reading, memory.body_acceleration
-    effect, signed_effect = initial_errors.effect_per_unit_error, initial_errors.signed_effect_per_unit_error
+    effect, signed_effect = (
+        initial_errors.effect_per_unit_error,
+        initial_errors.coupling_effect_per_unit_error,
+    )
     sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
     sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
     sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
@@ -352,11 +359,11 @@ def filter_effects_per_unit_error(redundancy, initial_errors):
                     decay[m] * initial_errors.filtered_effect_per_unit_error[i, t, m]
                     + initial_errors.effect_per_unit_error[i, t]
                 )
-    for j in range(initial_errors.signed_effect_per_unit_error.size):
+    for j in range(initial_errors.coupling_effect_per_unit_error.size):
         for m in range(decay.size):
-            initial_errors.filtered_signed_effect_per_unit_error[j, m] = (
-                decay[m] * initial_errors.filtered_signed_effect_per_unit_error[j, m]
-                + initial_errors.signed_effect_per_unit_error[j]
+            initial_errors.filtered_coupling_effect_per_unit_error[j, m] = (
+                decay[m] * initial_errors.filtered_coupling_effect_per_unit_error[j, m]
+                + initial_errors.coupling_effect_per_unit_error[j]
             )
 
 
@@ -386,7 +393,7 @@ def tighten_error_bound(initial_errors, hypothesis, max_effect, min_effect_per_u
     if min_effect_per_unit_error > 0.0:
         initial_errors.error_bound[hypothesis] = min(
             initial_errors.error_bound[hypothesis],
-            max_effect / (MIN_REMAINING_SIGNED_EFFECT_SHARE * min_effect_per_unit_error),
+            max_effect / (MIN_REMAINING_COUPLING_EFFECT_SHARE * min_effect_per_unit_error),
         )
 
 
@@ -417,7 +424,7 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis, p
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, m]
+        signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
@@ -450,7 +457,7 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
+    signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
     half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
         np.cos(half_error) * abs(signed_effect[VANE_ROLL_RATE_COUPLING])
@@ -489,7 +496,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    signed_effect = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
+    signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
     max_ratio = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]  # of reading and truth
     tighten_error_bound(
         initial_errors,
@@ -528,7 +535,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
 def update_initial_error_bounds(redundancy, initial_errors, signal):
     """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
     if max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD:  # the tests of the attitude restart
-        initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
+        initial_errors.filtered_coupling_effect_per_unit_error[:] = 0.0
         return
     update_error_change_bounds(redundancy, initial_errors)
     fill_effects_per_unit_error(redundancy, initial_errors, signal)

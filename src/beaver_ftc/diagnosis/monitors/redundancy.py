@@ -153,7 +153,8 @@ INITIAL_ERRORS_RECORD = record(
     effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
     filtered_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
     # effects of a unit with their sign
-    signed_effect_per_unit_error=N_COUPLINGS, filtered_signed_effect_per_unit_error=(N_COUPLINGS, N_POLES),
+    coupling_effect_per_unit_error=N_COUPLINGS,
+    filtered_coupling_effect_per_unit_error=(N_COUPLINGS, N_POLES),
     is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 

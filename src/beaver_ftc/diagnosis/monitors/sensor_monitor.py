@@ -120,7 +120,7 @@ ACCELEROMETER_JUMP_MEMORY_S = 2.0  # time constant with which the largest jump o
 MIN_READING_JUMP_PER_RESIDUAL = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
 MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
 # An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
-MIN_CLEARING_BOUND_RATIO = 3.0
+MIN_EFFECT_OVER_BOUND_TO_CLEAR = 3.0
 # of the spurious velocity, along the axis of a suspected accelerometer
 MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT = 0.5
 TIME_ROUNDING_S = 1e-9
@@ -277,7 +277,7 @@ def residual_sum_exceeds_reading_range(monitor):
     return (
         reading_range > 0.0
         and abs(memory.flow_residual_sum_since_alarm[j])
-        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range + MIN_CLEARING_BOUND_RATIO * explained
+        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range + MIN_EFFECT_OVER_BOUND_TO_CLEAR * explained
     )
 
 
@@ -302,7 +302,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, signal):
                 / max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
             )
             expected *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
-        if expected > MIN_CLEARING_BOUND_RATIO * (
+        if expected > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
             redundancy.test[other_test].filtered_bound[m]
             + max_error_effect_at_alarm(initial_errors, hypothesis, other_test, m)
         ):

@@ -145,6 +145,20 @@ def test_progress_ends_at_one_and_is_told_meanwhile_where_a_plug_in_flies():
     assert slow[:-1] == pytest.approx([16 * n / 100 for n in range(1, 7)])
 
 
+@pytest.mark.parametrize("detector", [None, Silent()])
+def test_a_watch_sees_every_frame_of_a_flight_that_departs(detector):
+    seen_s, memory = [], Memory()
+
+    def watch(loop):
+        loop.after_frame = lambda: seen_s.append(float(loop.frames["t"][0]))
+        return lambda: seen_s.append("end")
+
+    departs = scenario(duration_s=20, faults=[{"type": "hardover", "actuator": "elevator", "at_s": 0.5}])
+    fly(departs, memory, watch=watch, detector=detector)
+    assert 1.0 < seen_s[-2] < 19.0
+    assert seen_s == [*memory["t_s"], "end"]
+
+
 class TestFrames:
     def test_the_truth_moves_by_the_acceleration_logged(self):
         """x[k+1] = x[k] + dt a[k]: what the estimators rest on, up to the Earth's rotation."""

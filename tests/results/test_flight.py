@@ -112,10 +112,12 @@ class TestPlugIns:
         assert flight.detection.detected
         assert not bf.fly(scenario(**SHORT), detector=self.Sleepy()).detection.detected
 
+    @pytest.mark.parametrize("of", ["detector", "law"])
     @pytest.mark.parametrize("given", [Sleepy, object(), "sleepy"])
-    def test_anything_else_is_refused(self, given):
-        with pytest.raises(bf.BadInput, match=r"detector: .* allowed: an object with reset and step"):
-            bf.fly(scenario(**SHORT), detector=given)
+    @pytest.mark.parametrize("flies", [bf.fly, bf.Simulation])
+    def test_anything_else_is_refused(self, flies, given, of):
+        with pytest.raises(bf.BadInput, match=rf"^{of}: .* allowed: an object with reset and step"):
+            flies(scenario(**SHORT), **{of: given})
 
 
 def files(folder: Path):

@@ -174,8 +174,10 @@ def test_damage_acts_in_the_frame_it_is_set(bench):
     assert (whole[2], broken[2]) == pytest.approx((57.75, 56.94))
 
 
-@pytest.mark.parametrize("dt", [0.001, 0.002, 0.005, 0.01])
-def test_the_servo_is_late_by_15_ms_and_follows_at_5_hz(bench, dt):
+@pytest.mark.parametrize(
+    ("dt", "between_samples_s"), [(0.001, 0.005), (0.002, 0.006), (0.005, 0.005), (0.01, 0.01)]
+)
+def test_the_servo_is_late_by_15_ms_and_follows_at_5_hz(bench, dt, between_samples_s):
     """A ramp slower than the rate limit: late by the delay and the lag, whatever the frame."""
     fdm, rate = bench.fdm, 0.2
     bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
@@ -187,6 +189,7 @@ def test_the_servo_is_late_by_15_ms_and_follows_at_5_hz(bench, dt):
     fdm["fcs/right_aileron-cmd-rad"] = 0.0
     pole = exp(-2 * np.pi * 5 * dt)
     assert late_s == pytest.approx(0.015 + dt * pole / (1 - pole), abs=2e-4)
+    assert fdm["fcs/delay/spacing-s"] == pytest.approx(between_samples_s)
 
 
 def test_the_servo_is_no_faster_than_300_degrees_a_second(bench):

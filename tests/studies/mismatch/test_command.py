@@ -134,7 +134,7 @@ def test_variants_are_flown_side_by_side(tmp_path):
         "out",
         "--no-report",
         "--variant",
-        "declared,engine-neglected,mass=1.2",
+        "declared, engine-neglected ,mass=1.2",
     )
     assert done.returncode == 0, done.stderr
     assert "short-engine-neglected" in done.stdout
@@ -154,7 +154,7 @@ def test_variants_are_flown_side_by_side(tmp_path):
     ("variant", "says"),
     [("nonsense", "no such variant"), ("mass=heavy", "is no value"), ("mas=1.1", "mas"),
      ("mass=1000", "mass"), ("mass=[1", "'[1' is no value"), ("mass=", "'' is no value"), ("=1", ""),
-     ("declared,declared", "twice"),
+     ("declared, declared", "twice"),
      ("coefficients.Cm_alpa=0.9", "unknown aerodynamic term")],
 )  # fmt: skip
 def test_a_wrong_variant_is_bad_input_of_one_line(tmp_path, variant, says):

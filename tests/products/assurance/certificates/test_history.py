@@ -218,3 +218,33 @@ def test_in_one_frame_two_axes_are_combined_so_that_theta_drops_out():
     np.testing.assert_allclose(found[4:], [[-1.0, 0, -0.5], [1.0, 0, 0.5]])
     of.slope[4, [0, 2]] = 0.0
     assert len([*inequality.single_frame_tests(6, of)]) == 4
+
+
+@pytest.mark.parametrize(
+    ("h", "Z", "said", "effects"),
+    [
+        (
+            [-0.1, 0.2, -0.4], [0.05, 0.3, -0.9],
+            {"least": -0.5, "most": 2.0, "h": [None, 0.2, -0.4], "Z": [None, 0.3, -0.9]}, [0.0, 0.8, 0.05],
+        ),
+        (
+            [-0.1, 0.2, -0.4], [0.05, 0.3, 0.1],
+            {"most": 2.0, "h": [None, 0.2, None], "Z": [None, 0.3, None]}, [0.0, 0.8, 0.0],
+        ),
+        ([-0.1, 0.2, 0.3], [0.0, 0.0, 0.0], {"h": [None, 0.2, 0.3]}, [0.0, 0.2, 0.3]),
+        ([-0.1, -0.2, -0.4], [0.05, 0.03, -0.3], {}, [0.0, 0.0, 0.0]),
+    ],
+)  # fmt: skip
+def test_frames_in_which_the_fault_adds_nothing_have_no_number(history, h, Z, said, effects):
+    """A fault that may be absent in any frame: theta from -0.5 to 2, of a filter over three frames."""
+    along = np.array([0.0, 0.0, 1.0])
+    term = inequality.Term(along, pole_per_s=3.0, filter_start=0, last_frame=3, weight=0.7)
+    offset, slope = np.outer(h, along), np.outer(Z, along)
+    fault = inequality.Hypothesis(1, offset, slope, np.zeros((3, 3)), theta_low=-0.5, theta_high=2.0)
+    found = inequality.inequality_fields([term], fault, history)
+    healthy = inequality.inequality_fields([term], inequality.no_fault(1, 3), history)
+    decides = {name: found[name] for name in ("least", "most") if name in found}
+    assert decides | {name: found["terms"][0][name] for name in "hZ" if name in found["terms"][0]} == said
+    decay = np.exp(-3.0 * DT)
+    added = 0.7 * DT * (decay**2 * effects[0] + decay * effects[1] + effects[2])
+    assert found["sides"] == pytest.approx([healthy["sides"][0], healthy["sides"][1] + added], rel=1e-14)

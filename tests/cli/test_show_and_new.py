@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
-from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps
+from beaver_ftc.scenario.builtin import builtin_names, builtin_path, builtin_sweeps, described
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep_text
 from commands import beaver
@@ -33,6 +33,8 @@ def test_a_short_list_has_every_name_and_no_more():
             kind = line
             said[kind] = []
     assert said == {kind: [entry["name"] for entry in entries] for kind, entries in listed.items()}
+    for kind in ("scenario", "sweep", "plan"):
+        assert said[f"{kind}s"] == [name for name, _ in described(kind)]
 
 
 def test_what_is_shown_is_the_file():

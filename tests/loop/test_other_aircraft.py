@@ -15,6 +15,7 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
+from beaver_ftc.results import log, writer
 from beaver_ftc.results.exports import write_acmi
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.log import column_names as log_columns
@@ -177,3 +178,14 @@ def test_its_recording_and_views_have_its_surfaces(tmp_path):
     assert "Flaps" not in (tmp_path / "kept" / "flight.acmi").read_text()
     assert [panel.label for panel in shown["surfaces"].panels] == ["aileron", "elevator", "rudder"]
     assert len(shown["effectiveness"].panels[0].traces) == 3
+
+
+def test_a_recorded_command_is_a_share_of_the_longer_way(tmp_path):
+    """The elevator goes further up, to -0.45 rad, than down, to 0.35."""
+    short = load_scenario(FLIGHT).model_copy(update={"duration_s": 0.2})
+    writer.run(short, tmp_path, report=False, recording="table")
+    folder = tmp_path / short.name
+    written = np.genfromtxt(folder / "flight.csv", delimiter=",", names=True)
+    command_rad = log.read(folder / "log.parquet", ["elevator_cmd_rad"])["elevator_cmd_rad"]
+    assert np.abs(command_rad).min() > 0.0
+    assert written["elevator_command"] == pytest.approx(command_rad / 0.45)

@@ -500,3 +500,21 @@ def test_of_a_rate_without_a_number_no_unit_is_judged():
         trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)
     rates[:, 2] = np.nan
     trust.check_rate_units(small.flight(known, 200, rates=rates), known.fitted_ranges)
+
+
+def test_the_power_of_a_group_s_effect_is_in_variances_of_correlated_noise(model):
+    """Commands that nothing else makes up: e = B u of each lag, and the mean of e' N^-1 e about its mean."""
+    root = np.array([[0.05, 0.0, 0.0], [0.03, 0.03, 0.0], [-0.01, 0.01, 0.015]])
+    correlated = small.model(noise=(root @ root.T).tolist())
+    flown = small.flight(correlated, n=1500, seed=6)
+    power, unexplained = trust._effect_powers([(flown, np.ones(1500, bool))], correlated)
+    reach = max(correlated.n_rate_lags, correlated.n_command_lags)
+    for g in range(2):
+        lagged = [flown.commands[reach - j : 1500 - j] for j in range(1, 4)]
+        effect = sum(
+            np.outer(u[:, g], b) for u, b in zip(lagged, correlated.command_response[g], strict=True)
+        )
+        effect -= effect.mean(axis=0)
+        weighted = np.einsum("ki,ij,kj->k", effect, np.linalg.inv(correlated.residual_covariance), effect)
+        assert power[g] == pytest.approx(weighted.mean(), rel=1e-9)
+        assert 0.0 < unexplained[g] <= power[g]

@@ -399,3 +399,24 @@ def test_a_statistic_beside_its_bar(passed, of, plain, verdict, asked, actual, i
 )  # fmt: skip
 def test_the_worst_is_by_verdict_then_by_margin_over_the_limit(verdict, margin, expected, rank):
     assert judged_module._rank({"verdict": verdict, "margin": margin, "expected": expected}) == rank
+
+
+@pytest.mark.parametrize(("error", "status", "why"), [
+    (bf.BadInput("no trim"), "bad_input", "no trim"),
+    (bf.SimulationFailed("not finite"), "failed", "not finite"),
+    (ZeroDivisionError("by a plug-in"), "failed", "ZeroDivisionError: by a plug-in"),
+])  # fmt: skip
+def test_a_flight_that_fails_says_how(tmp_path, monkeypatch, error, status, why):
+    plan = plan_of(
+        tmp_path,
+        flights={"one": HEALTHY, "other": FAULTY},
+        requirements=[{"id": "A", "over": ["one", "other"], "formula": "always(altitude_m >= 0)"}],
+    )
+
+    def fails(*of):
+        raise error
+
+    monkeypatch.setattr(flown, "_flown", fails)
+    row = fly_flight(plan, plan.cases[1])
+    assert (row["flight"], row["status"], row["why"]) == ("other", status, why)
+    assert [each["verdict"] for each in row["found"]["A"]] == [NOT_SHOWN]

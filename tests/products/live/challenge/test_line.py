@@ -132,3 +132,24 @@ def test_why_nothing_more_comes_is_said(status, late, last, says):
     assert str(ended.value) == says
     code._frame = 0  # before the flight has begun there is no time to name
     assert code._when() == ""
+
+
+def test_a_message_that_a_pipe_takes_in_pieces_arrives_whole():
+    """A pipe takes 3 bytes, none for now, then 4, and so on; of one that has closed nothing is said here."""
+    taken, sizes = bytearray(), iter([3, None, 4] * 9)
+
+    def write(content):
+        size = next(sizes)
+        taken.extend(content[: size or 0])
+        return None if size is None else min(size, len(content))
+
+    code, _ = submitted(line.SubmittedCode)
+    code._process = SimpleNamespace(stdin=SimpleNamespace(write=write))
+    code._send(bytes(range(40, 60)))
+    assert taken == bytes([20, 0, 0, 0, *range(40, 60)])
+
+    def closed(content):
+        raise BrokenPipeError
+
+    code._process.stdin.write = closed
+    code._send(b"lost")

@@ -2,6 +2,7 @@
 
 import os
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 
@@ -126,3 +127,18 @@ def test_a_submission_may_read_python_and_packages_but_those_that_are_hidden(mon
     monkeypatch.setattr(confine, "_sources", lambda: [str(tmp_path / "core")])
     shown = [f"site/my_{hidden}.py", "site/numpy", "own/scipy", "lib/json", "own", "lib/os.py", "core"]
     assert confine.readable() == [str((tmp_path / place).resolve()) for place in shown]
+
+
+def test_of_the_folders_beside_only_pythons_own_are_listed(monkeypatch):
+    """What is allowed is read; a folder that it lies in is listed where an import looks through it."""
+    given = []
+    system = SimpleNamespace(syscall=lambda *of: 6, prctl=lambda *of: 0)
+    monkeypatch.setattr(confine, "_linux", lambda: system)
+    monkeypatch.setattr(confine.os, "close", lambda rules: None)
+    monkeypatch.setattr(
+        confine, "_allow", lambda system, rules, path, right: given.append((path, right)) or True
+    )
+    allowed = ["/opt/python3.11/json", "/opt/python3.11/os.py", "/home/teacher/mine", "beside"]
+    confine._restrict_files(allowed)
+    read = confine._READ_FILE | confine._READ_DIR
+    assert given == [*((path, read) for path in allowed), ("/opt/python3.11", confine._READ_DIR)]

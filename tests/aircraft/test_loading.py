@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from types import SimpleNamespace
 
 import pytest
 
@@ -115,3 +116,23 @@ def test_what_was_derived_by_this_way_of_deriving_is_an_aircraft(beside):
         assert is_derived(name) is known
     (folder / "aircraft.yaml").write_text(aircraft.first_line() + text)
     assert load(f"jsbsim:{name}").name == "trainer"
+
+
+def test_what_a_surface_does_is_the_sum_of_its_terms_at_the_usual_signals():
+    """p: span / Ix, q: chord / Iy, r: span / Iz; each signal of a term to its power."""
+
+    def term(coefficient, surface, value, *of):
+        return SimpleNamespace(coefficient=coefficient, surface=surface, value=value, of=of)
+
+    its = SimpleNamespace(
+        mass=SimpleNamespace(Ix_kg_m2=2.0, Iy_kg_m2=5.0, Iz_kg_m2=7.0),
+        geometry=SimpleNamespace(span_m=3.0, chord_m=1.1), surfaces=("tab", "flap"),
+        usual_signals={"alpha": 0.2, "dpt": 3.0},
+        moments=[
+            term("Cl", "tab", 0.5, ("alpha", 2)), term("Cl", "tab", 0.3), term("Cn", "tab", 0.7, ("dpt", 1)),
+            term("Cm", "flap", -2.0, ("alpha", 1), ("dpt", 2)), term("Cm", None, 4.0, ("alpha", 1)),
+        ],
+    )  # fmt: skip
+    effect = aircraft.Aircraft.effect.func(its)
+    assert effect["tab"] == pytest.approx([(0.5 * 0.04 + 0.3) * 3.0 / 2.0, 0.0, 2.1 * 3.0 / 7.0])
+    assert effect["flap"] == pytest.approx([0.0, -2.0 * 0.2 * 9.0 * 1.1 / 5.0, 0.0])

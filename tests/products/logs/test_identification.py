@@ -424,3 +424,10 @@ def test_a_flight_without_a_healthy_sample_is_refused_by_its_name():
         BadInput, match=r"^identify: lost: 0 samples known to be healthy, allowed: at least 2$"
     ):
         identification._choose_noise_ma_coefficients(lost, model.vehicle, (4, 4))
+
+
+def test_the_remarks_on_the_rates_of_every_flight_are_in_the_error():
+    notes = ("q_rad_s: in deg/s", "roll: of no use"), (), ("r_rad_s: late", "p_rad_s: late", "q_rad_s2: odd")
+    flights = [SimpleNamespace(samples=SimpleNamespace(notes=of)) for of in notes]
+    said = identification._remarks_on_rates(flights, MODEL)
+    assert said == "; q_rad_s: in deg/s; r_rad_s: late; p_rad_s: late"

@@ -279,3 +279,12 @@ def test_no_line_is_drawn_over_what_is_not_known():
         edge = ((t_s > 28.45) & (t_s < 31.45)) | ((t_s > 38.45) & (t_s < 41.45))
         assert edge.any()
         np.testing.assert_array_equal(np.isnan(values), edge | (t_s < 0.6))
+
+
+def test_a_spectrum_has_lines_within_the_decades_too():
+    flights = [small.flight(small.model(), 600)]
+    figure = pages._spectrum_figure(usable_stretches(flights), small.model())
+    ((axis,), fine) = figure.axes, figure.axes[0].xaxis.get_minor_ticks()
+    assert axis.get_xscale() == "log"
+    assert fine
+    assert all(tick.gridline.get_visible() for tick in fine)

@@ -199,3 +199,15 @@ def test_a_column_of_rounding_gets_no_coefficient_and_changes_no_other():
     fit = regression.least_squares(dead, y, np.zeros(400, dtype=int), 5)
     assert fit.coefficients[2].tolist() == [0.0, 0.0, 0.0]
     np.testing.assert_allclose(fit.coefficients[[0, 1, 3]], np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("more", [(), (2,)])
+def test_a_prediction_is_the_sum_over_the_samples_before_times_their_coefficients(more):
+    """x[k] - sum_j x[k - j] P[j], coefficients of no two axes alike; before the first sample is nothing."""
+    rng = np.random.default_rng(3)
+    values, predictor = rng.standard_normal((7, *more, 3)), rng.standard_normal((2, 3, 3))
+    expected = [
+        values[k] - sum(values[k - j] @ predictor[j - 1] for j in (1, 2) if k >= j)
+        for k in range(len(values))
+    ]
+    np.testing.assert_allclose(regression.subtract_noise_prediction(values, predictor), expected, atol=1e-12)

@@ -1,6 +1,7 @@
 """The test that is told the fault, in a flight of the matrix: what it is shown, and what becomes of it."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -139,3 +140,22 @@ def test_an_aircraft_with_signals_of_its_own_keeps_those():
     for term in scenario.airframe.moments:
         moved = kept.get(f"{term.surface}_cmd_rad")
         assert np.isfinite(unit_term_acceleration(scenario.airframe, term, kept, moved)).all()
+
+
+@pytest.mark.parametrize(
+    ("bandwidth", "rate", "expected"),
+    [
+        (0.0, 0.0, [0.2, 0.2, -0.3, -0.1]),
+        (0.0, 20.0, [0.2, 0.2, 0.0, -0.1]),
+        (np.log(2.0) / 0.01, 0.0, [0.1, 0.15, -0.075, -0.0875]),
+        (np.log(2.0) / 0.01, 7.0, [0.07, 0.135, 0.065, -0.005]),
+    ],
+)
+def test_a_healthy_surface_follows_the_command_within_its_travel_lag_and_rate(bandwidth, rate, expected):
+    """From 0 within -0.3 to 0.2 rad, in frames of 10 ms: half of the way, and at 20 rad/s 0.2 rad, a frame."""
+    context = SimpleNamespace(
+        surfaces=("flap", "tab"), dt_s=0.01, travel_rad=np.array([[-1.0, -0.3], [1.0, 0.2]]),
+        declared=SimpleNamespace(bandwidth_rad_s=[5.0, bandwidth], rate_limit_rad_s=[0.4, rate]),
+    )  # fmt: skip
+    log = {"tab_cmd_rad": np.array([0.5, 0.25, -1.0, -0.1]), "tab_effective_rad": np.zeros(4)}
+    assert healthy_surface_positions(context, log, "tab") == pytest.approx(expected, abs=1e-12)

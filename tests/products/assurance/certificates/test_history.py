@@ -1,9 +1,11 @@
 """What a log's rows bound, row by row and axis by axis, by scalars (docs/explanation/detection.md)."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from beaver_ftc_assurance.certificates import inequality
+from beaver_ftc_assurance.certificates import certificate, inequality
 from beaver_ftc_assurance.certificates.inequality import ROUNDING_RAD_S2, DeclaredErrors, History
 from telling import apart, numbers
 
@@ -248,3 +250,22 @@ def test_frames_in_which_the_fault_adds_nothing_have_no_number(history, h, Z, sa
     decay = np.exp(-3.0 * DT)
     added = 0.7 * DT * (decay**2 * effects[0] + decay * effects[1] + effects[2])
     assert found["sides"] == pytest.approx([healthy["sides"][0], healthy["sides"][1] + added], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("unexplained", "constant"),
+    [(True, {"q": 0.02, "r": 0.04}), (False, dict(zip("pqr", GYRO["constant_rad_s"], strict=True)))],
+)
+def test_statements_of_positions_go_by_the_declared_errors_too(history, monkeypatch, unexplained, constant):
+    """One term along q, and a bound on a position along r. A constant error of the gyro counts on these axes,
+    or on all where health explains a frame that is said to show a fault."""
+    monkeypatch.setattr(
+        certificate.kinds, "is_unexplained_by_health", lambda seen, rows: np.full(len(rows), unexplained)
+    )
+    said = [
+        {"theta": "any", "terms": [{"d": [0.0, 0.5, 0.0], "first": 1, "frame": 2}]},
+        {"theta": "course", "bounds": [{"d": [0.0, 0.0, -0.7], "first": 2, "frame": 3}]},
+    ]
+    found = certificate._declared_fields(SimpleNamespace(substeps=2), history, said)
+    assert (found["dt_s"], found["instants"], found["omega_E"]) == (DT, 2, 0.9)
+    assert found["declared"]["B"] == constant

@@ -406,14 +406,3 @@ def test_an_engine_of_which_no_speed_is_known_is_flown_by_its_range(tmp_path):
     assert "engine_rpm" not in type(slow.initial).model_fields
     flight = bf.fly(slow)
     assert len(flight.log) == 50
-
-
-@pytest.mark.parametrize("stops", [(-0.1, 0.3), (-0.3, 0.1)])
-def test_the_slipstream_is_held_by_the_shorter_way_of_the_rudder(stops):
-    """The yawing moment grows with dpt^3: a third of the way holds a third of it."""
-    layout = {"main": [0, 1, 2], "low": np.full(4, -0.3), "high": np.full(4, 0.3)}
-    of_all, either = engines._slipstream_limits(scenario(), layout)
-    layout["low"][2], layout["high"][2] = stops
-    again, shorter = engines._slipstream_limits(scenario(), layout)
-    assert again == of_all > 0.0
-    assert 0.0 < shorter**3 == pytest.approx(either**3 / 3.0)

@@ -233,3 +233,17 @@ def test_a_plug_in_that_diagnoses_has_the_record_to_itself():
     assert (*off, fdi["statistical"]["test_config"]["enabled"], power["enabled"][0]) == (0,) * 6
     assert fdi["isolation"]["estimator"]["surface"][:4].tolist() == [AILERON, ELEVATOR, RUDDER, FLAP]
     assert plugin_frame.plugged(frames, scenario, np.ones(40), None, None) is None
+
+
+@pytest.mark.parametrize(
+    ("scheme", "law", "diagnoses"),
+    [
+        ("adaptive-estimators", "nominal", 1),
+        ("zhang2005", "nominal", 1),
+        ("none", "nominal", 0),
+        ("rls-monitor", "lqr", 0),
+    ],
+)
+def test_only_a_scheme_that_is_compiled_in_diagnoses_within_the_record(scheme, law, diagnoses):
+    frame = assembled(fdi={"scheme": scheme}, control={"law": law})
+    assert frame["fdi"]["config"]["enabled"] == diagnoses

@@ -152,7 +152,7 @@ def test_an_aircraft_with_signals_of_its_own_keeps_those():
     ],
 )
 def test_a_healthy_surface_follows_the_command_within_its_travel_lag_and_rate(bandwidth, rate, expected):
-    """From 0 within -0.3 to 0.2 rad, in frames of 10 ms: half of the way, and at 20 rad/s 0.2 rad, a frame."""
+    """From 0 within -0.3 to 0.2 rad, in frames of 10 ms: half of the way, at 20 rad/s 0.2 rad, a frame."""
     context = SimpleNamespace(
         surfaces=("flap", "tab"), dt_s=0.01, travel_rad=np.array([[-1.0, -0.3], [1.0, 0.2]]),
         declared=SimpleNamespace(bandwidth_rad_s=[5.0, bandwidth], rate_limit_rad_s=[0.4, rate]),

@@ -268,3 +268,16 @@ def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells):
         f"mechanisms.{k}" for k in ("json", "csv", "png", "html")
     }
     assert (folder / "mechanisms.csv").read_text().count("\n") == 1 + len(MECHANISMS)
+
+
+def test_flights_of_another_seed_are_not_resumed(tmp_path, monkeypatch):
+    """The seed is none of the cases: the study follows from it. The cases are those of so many draws."""
+    flown = []
+    monkeypatch.setattr(command, "run_study", lambda study, *of: flown.append(study) or {})
+    for draws, seed in ((2, 1), (2, 5), (3, 5)):
+        command.run_mechanisms(tmp_path, draws=draws, seed=seed)
+    one, other, more = flown
+    assert (one.follows_from, other.follows_from, more.follows_from) == (1, 5, 5)
+    assert [*one.cases] == [*other.cases]
+    assert len(more.cases) > len(other.cases)
+    assert [study.fly.args for study in flown] == [(1,), (5,), (5,)]

@@ -1,5 +1,6 @@
 """Subset simulation: known normal tails, their intervals, what it says when it cannot, and flights."""
 
+import contextlib
 import json
 import math
 from statistics import NormalDist
@@ -10,7 +11,7 @@ import yaml
 from tools.drawn.rare import ANALYTIC, EXPECTATION, FAR, NEAR, repeated
 from tools.drawn.rare import SWEEP as BIASED
 
-from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
@@ -290,3 +291,31 @@ def test_rounds_are_flown_once(tmp_path):
         assert fly_round(1, [3]) == [{"x": 3}]
     assert flown == [1, 2, 3]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("flown_first", [True, False])
+def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
+    biased, tmp_path, monkeypatch, flown_first
+):
+    """Two flights of which one fails, then one that is flown: as many failures as flights of this round."""
+
+    def flies(number, cases):
+        assert cases == [[(0, [1.0]), (1, [2.0])], [(0, [3.0])]][number]
+        failed = [number == 0, number == 0 and not flown_first]
+        return [{"failed": of, "score": -1.0 - i} for i, of in zip(range(len(cases)), failed, strict=False)]
+
+    def go(chains, fly):
+        scores = [fly(0, np.array([[1.0], [2.0]])), fly(1, np.array([[3.0]]))]
+        assert [of.tolist() for of in scores] == [[-1.0, -2.0], [-1.0]]
+
+    monkeypatch.setattr(Chains, "go", go)
+    monkeypatch.setattr(rare, "in_rounds", lambda *of: contextlib.nullcontext(flies))
+    monkeypatch.setattr(rare, "_document", lambda sweep, expectation, chains, failed: {"failed": failed})
+    told = []
+    if not flown_first:
+        with pytest.raises(SimulationFailed, match="no flight could be flown"):
+            run_rare(biased, EXPECTATION, tmp_path, tell=told.append)
+        assert told == []
+        return
+    assert run_rare(biased, EXPECTATION, tmp_path, tell=told.append)["failed"] == 1
+    assert [line.partition(": ")[2] for line in told] == ["2 flights, level 0", "1 flights, level 0"]

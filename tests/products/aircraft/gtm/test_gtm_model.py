@@ -240,3 +240,17 @@ def test_an_engine_fails_like_a_surface(bench):
     assert sound > 3.0
     assert lost[0] < 0.0 + 1e-12
     assert lost[1] == pytest.approx(sound, abs=0.2)
+
+
+def test_forces_and_moments_are_the_coefficients_in_their_own_dimensions(bench):
+    """Area 5.9018 ft2, span 6.8488 ft about roll and yaw, chord 0.9153 ft about pitch."""
+    fdm = bench.fdm
+    bench.place(800.0, (150.0, 7.0, 12.0), (0.1, 0.05, 0.0), (0.2, -0.1, 0.3))
+    force_lbf = fdm["aero/qbar-psf"] * 5.9018
+    for name, coefficient, length_ft in (
+        ("force/X-lbs", "CX", 1.0), ("force/Y-lbs", "CY", 1.0), ("force/Z-lbs", "CZ", 1.0),
+        ("moment/L-lbsft", "Cl", 6.8488), ("moment/M-lbsft", "Cm", 0.9153), ("moment/N-lbsft", "Cn", 6.8488),
+    ):  # fmt: skip
+        value = fdm[f"aero/coefficient/{coefficient}"]
+        assert value != 0.0
+        assert fdm[f"aero/{name}"] == pytest.approx(force_lbf * length_ft * value, rel=1e-6)

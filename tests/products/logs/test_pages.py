@@ -283,7 +283,7 @@ def test_no_line_is_drawn_over_what_is_not_known():
 
 def test_a_spectrum_has_lines_within_the_decades_too():
     flights = [small.flight(small.model(), 600)]
-    figure = pages._spectrum_figure(fitting.usable_stretches(flights), small.model())
+    figure = pages._spectrum_figure(flights_with_usable_rows(flights), small.model())
     ((axis,), fine) = figure.axes, figure.axes[0].xaxis.get_minor_ticks()
     assert axis.get_xscale() == "log"
     assert fine

@@ -109,7 +109,7 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
     recordings = [SimpleNamespace(name=name) for name in reversed(names)]
     folds = [([one for one in flights if one is not kept], kept, kept.samples.name) for kept in flights]
     stubs = {
-        "usable_stretches": list,
+        "flights_with_usable_rows": list,
         "validation_folds": lambda stretches: folds,
         "fit_model": lambda fitted, *of: ([one.samples.name for one in fitted], *of),
         "add_fitted_ranges_and_alarm_threshold": lambda fitted, model: (len(fitted), *model),

@@ -4,7 +4,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from synthetic import Flight, Scenario, rows
 
-from beaver_ftc.results.figures import _entries, draw, write_figures
+from beaver_ftc.results.figures import _legend_handle_of_label, draw, write_figures
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.style import LOOKS, closeup_window, marks
@@ -129,4 +129,9 @@ def test_a_legend_has_each_label_once_by_its_first_curve_but_for_what_titles_nam
         Panel("rudder", rudder=4, command=5, bound=6),
         Panel("", measured=7, flap=8),
     ]
-    assert list(_entries(grid).items()) == [("command", 2), ("measured", 3), ("bound", 6), ("flap", 8)]
+    assert list(_legend_handle_of_label(grid).items()) == [
+        ("command", 2),
+        ("measured", 3),
+        ("bound", 6),
+        ("flap", 8),
+    ]

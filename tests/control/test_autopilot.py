@@ -5,7 +5,15 @@ import pytest
 from pydantic import ValidationError
 
 from beaver_ftc.control import autopilot as setup
-from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED, advance, to_body
+from beaver_ftc.control.autopilot import (
+    ALTITUDE,
+    AUTOPILOT,
+    BANK,
+    HEADING,
+    SPEED,
+    advance_commands,
+    set_body_rates,
+)
 from beaver_ftc.control.laws.rejecting import margins
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
@@ -46,19 +54,19 @@ class TestProfile:
         channels = {"altitude": ALTITUDE, "speed": SPEED, "heading": HEADING, "bank": BANK}
         for name, (at_s, value, pace) in legs.items():
             c = channels[name]
-            autopilot["legs"][c] = len(at_s)
-            autopilot["at_s"][c, : len(at_s)], autopilot["value"][c, : len(at_s)] = at_s, value
-            autopilot["speed"][c, : len(at_s)] = pace
+            autopilot["n_legs"][c] = len(at_s)
+            autopilot["leg_starts_at_s"][c, : len(at_s)], autopilot["leg_value"][c, : len(at_s)] = at_s, value
+            autopilot["leg_max_command_rate"][c, : len(at_s)] = pace
         return autopilot
 
     def at(self, autopilot, t_s, measured=(100.0, 40.0, 0.0, 0.0)):
         for t in np.arange(round(t_s / 0.1) + 1) * 0.1:
-            advance(autopilot, measured, t)
+            advance_commands(autopilot, measured, t)
         return autopilot
 
     def test_a_climb_at_its_pace_and_no_further(self):
         climb = {"altitude": ([1.0], [110.0], [2.0])}
-        assert self.at(self.record(**climb), 0.9)["commanded"][ALTITUDE] == 0
+        assert self.at(self.record(**climb), 0.9)["is_commanded"][ALTITUDE] == 0
         # from 1 s on, 2 m/s: after 3 s of it 6 m, and the first step is taken in the frame at 1 s
         assert self.at(self.record(**climb), 3.9)["command"][ALTITUDE] == pytest.approx(106.0)
         assert self.at(self.record(**climb), 20.0)["command"][ALTITUDE] == pytest.approx(110.0)
@@ -82,8 +90,10 @@ def test_body_rates_of_a_steady_turn():
     theta, phi = 0.2, 0.4
     autopilot = np.zeros(1, AUTOPILOT)[0]
     autopilot["gravity"], autopilot["airspeed"], autopilot["dihedral"] = 9.81, 45.0, 0.02
-    autopilot["commanded"][BANK], autopilot["limit"] = 1, 10.0
-    to_body(np.asarray(autopilot).view(np.recarray), np.zeros(8), np.array([phi, theta, 1.0]), 0.03, 0.05)
+    autopilot["is_commanded"][BANK], autopilot["rate_limit"] = 1, 10.0
+    set_body_rates(
+        np.asarray(autopilot).view(np.recarray), np.zeros(8), np.array([phi, theta, 1.0]), 0.03, 0.05
+    )
     psidot = 9.81 / 45.0 * np.tan(phi)
 
     def rotation(t):

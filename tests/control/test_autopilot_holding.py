@@ -55,8 +55,8 @@ def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, 
     hold = table().view(np.recarray)[0].holding
     speeds = np.linspace(30.0, 55.0, 2001)
     can = np.radians(-20.0 + 0.4 * speeds) + 0.3 * flap <= np.radians(elevator_deg)  # at this end or beyond
-    fastest = np.sqrt(2.0 * holding.limit_of(hold, flap, np.radians(elevator_deg), True))
-    slowest = np.sqrt(2.0 * holding.limit_of(hold, flap, np.radians(elevator_deg), False))
+    fastest = np.sqrt(2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), True))
+    slowest = np.sqrt(2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), False))
     if can.all():
         assert fastest == np.inf
     else:
@@ -72,19 +72,19 @@ def test_a_limit_moves_the_command_at_its_pace_and_lets_it_go_again():
     record = autopilot.view(np.recarray)[0]
     record.dt, record.holding.max_airspeed_rate_mps2, record.command[SPEED] = 0.1, 1.0, 45.0
     record.holding.fastest = np.inf
-    holding.approach(record)
-    assert record.held == 45.0
+    holding.approach_airspeed_to_fly(record)
+    assert record.airspeed_to_fly == 45.0
     record.holding.fastest = 40.0
-    flown = [record.held]
+    flown = [record.airspeed_to_fly]
     for _ in range(80):
-        holding.approach(record)
-        flown.append(record.held)
+        holding.approach_airspeed_to_fly(record)
+        flown.append(record.airspeed_to_fly)
     np.testing.assert_allclose(np.diff(flown)[:50], -0.1)
     assert flown[-1] == 40.0
     record.holding.fastest = np.inf
     for _ in range(60):
-        holding.approach(record)
-    assert (record.held, record.holding.limiting) == (45.0, 0)
+        holding.approach_airspeed_to_fly(record)
+    assert (record.airspeed_to_fly, record.holding.limits_airspeed) == (45.0, 0)
 
 
 def test_the_flap_takes_what_an_elevator_at_its_stop_leaves():
@@ -135,9 +135,9 @@ class TestFlights:
                 sim.inject({"type": "stuck", "actuator": "elevator", "position_deg": -7.0})
             elif fault is False:
                 assert autopilot["holding"]["in_force"][FASTEST]
-                assert autopilot["held"] == pytest.approx(40.0, abs=1.0)
+                assert autopilot["airspeed_to_fly"] == pytest.approx(40.0, abs=1.0)
                 sim.repair("elevator")
-        assert autopilot["held"] == autopilot["command"][SPEED]
+        assert autopilot["airspeed_to_fly"] == autopilot["command"][SPEED]
         assert not autopilot["holding"]["in_force"][FASTEST]
 
     def test_a_lost_aileron_limits_the_bank_and_says_so(self):

@@ -28,9 +28,14 @@ def new(command=45.0, **fields):
     speeds = np.linspace(30.0, 55.0, hold["qdyn"].size)
     hold["qdyn"], hold["flap"] = 0.5 * speeds**2, np.linspace(-0.1, 1.0, hold["flap"].size)
     hold["elevator"] = [[needed(V, flap) for flap in hold["flap"]] for V in speeds]
-    hold["known"], hold["max_airspeed_rate_mps2"], hold["reserve"], hold["from_s"] = 1, 1.0, 0.05, -1.0
-    pilot["dt"], pilot["command"][SPEED], pilot["commanded"][SPEED] = DT, command, 1
-    pilot["most_bank"] = pilot["bank_limit"] = hold["bank"] = 0.5
+    hold["has_table"], hold["max_airspeed_rate_mps2"], hold["flap_reserve"], hold["from_s"] = (
+        1,
+        1.0,
+        0.05,
+        -1.0,
+    )
+    pilot["dt"], pilot["command"][SPEED], pilot["is_commanded"][SPEED] = DT, command, 1
+    pilot["max_healthy_bank"] = pilot["bank_limit"] = hold["bank"] = 0.5
     control = new_control(main=(0, 1, 2), stand_in=FLAP, least_effectiveness=0.1)
     layout, surfaces = control["layout"], control["surfaces"]
     layout["low"], layout["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.3, 0.3, 1.0)
@@ -47,20 +52,24 @@ def test_what_acts_is_averaged_from_the_first_frame_on(unexplained):
     hold = new()[0]["holding"]
     commands = np.random.default_rng(1).uniform(-0.2, 0.2, 40)
     for command in commands:
-        autopilot.watch(hold, DT, 0.02, 0.6 * command, unexplained)
-    assert hold["frames"] == 40
-    assert hold["acting"] == pytest.approx(0.02 + 0.6 * commands.mean() + unexplained)
-    assert hold["centre"] == pytest.approx(0.6 * commands.mean())
+        autopilot.average_acting_elevator(hold, DT, 0.02, 0.6 * command, unexplained)
+    assert hold["n_averaged_frames"] == 40
+    assert hold["mean_acting_elevator"] == pytest.approx(0.02 + 0.6 * commands.mean() + unexplained)
+    assert hold["mean_commanded_elevator"] == pytest.approx(0.6 * commands.mean())
 
 
 def test_later_it_follows_within_four_seconds():
     hold = new()[0]["holding"]
-    hold["frames"], hold["acting"], hold["centre"] = 10_000, 0.3, 0.4
+    hold["n_averaged_frames"], hold["mean_acting_elevator"], hold["mean_commanded_elevator"] = (
+        10_000,
+        0.3,
+        0.4,
+    )
     for _ in range(80):
-        autopilot.watch(hold, DT, 0.02, 0.6 * 0.1, 0.0)
+        autopilot.average_acting_elevator(hold, DT, 0.02, 0.6 * 0.1, 0.0)
     left = (1.0 - DT / 4.0) ** 80
-    assert hold["acting"] == pytest.approx(0.08 + left * (0.3 - 0.08))
-    assert hold["centre"] == pytest.approx(0.06 + left * (0.4 - 0.06))
+    assert hold["mean_acting_elevator"] == pytest.approx(0.08 + left * (0.3 - 0.08))
+    assert hold["mean_commanded_elevator"] == pytest.approx(0.06 + left * (0.4 - 0.06))
 
 
 def at(elevator, flap):
@@ -76,8 +85,8 @@ def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, u
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.05, 1.0, flap_left))
     surfaces["output"]["offset"][FLAP] = 0.12
     hold = pilot["holding"]
-    hold["acting"], hold["centre"] = -0.03, 0.005
-    autopilot.find(pilot["holding"], layout, surfaces, y)
+    hold["mean_acting_elevator"], hold["mean_commanded_elevator"] = -0.03, 0.005
+    autopilot.find_airspeeds_that_can_be_held(pilot["holding"], layout, surfaces, y)
     assert hold["fastest"] == pytest.approx(at(-0.035 + 0.05 * 0.3, up), abs=0.05)
     slowest = at(-0.035 - 0.05 * 0.4, down)
     in_table = slowest * np.sqrt(DENSITY) > 30.0
@@ -88,8 +97,8 @@ def test_the_airspeeds_are_those_of_flap_and_elevator_at_their_ends(flap_left, u
 def test_a_lost_flap_stands_within_its_travel(offset, stands):
     pilot, layout, surfaces, y = new(effectiveness=(1.0, 0.0, 1.0, 0.0))
     surfaces["output"]["offset"][FLAP] = offset
-    pilot["holding"]["acting"] = needed(40.0, stands)
-    autopilot.find(pilot["holding"], layout, surfaces, y)
+    pilot["holding"]["mean_acting_elevator"] = needed(40.0, stands)
+    autopilot.find_airspeeds_that_can_be_held(pilot["holding"], layout, surfaces, y)
     assert pilot["holding"]["fastest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
     assert pilot["holding"]["slowest"] == pytest.approx(40.0 / np.sqrt(DENSITY), abs=0.05)
 
@@ -101,7 +110,7 @@ def test_the_table_is_straight_between_its_columns_and_goes_on_beyond_them(flap)
     k = min(max(np.searchsorted(hold["flap"], flap) - 1, 0), hold["flap"].size - 2)
     low, high = hold["flap"][k : k + 2]
     expected = 4.0 + low**2 + (flap - low) * (high + low)
-    assert autopilot.needed(hold, 4, flap) == pytest.approx(expected)
+    assert autopilot.interpolate_elevator_needed(hold, 4, flap) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -114,10 +123,10 @@ def test_the_table_is_straight_between_its_columns_and_goes_on_beyond_them(flap)
 )  # fmt: skip
 def test_only_a_pitch_that_is_not_whole_is_watched(effectiveness, stand_in, known, watched):
     pilot, layout, surfaces, y = new(effectiveness=effectiveness, stand_in=stand_in)
-    pilot["holding"]["known"], pilot["holding"]["frames"] = known, 3
-    autopilot.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, 1.0)
-    assert pilot["holding"]["frames"] == (4 if watched else 0)
-    assert pilot["held"] == 45.0
+    pilot["holding"]["has_table"], pilot["holding"]["n_averaged_frames"] = known, 3
+    autopilot.limit_airspeed_to_fly(pilot, layout, surfaces, np.zeros(4), 0.0, y, 1.0)
+    assert pilot["holding"]["n_averaged_frames"] == (4 if watched else 0)
+    assert pilot["airspeed_to_fly"] == 45.0
 
 
 def test_nothing_is_concluded_within_the_first_half_second():
@@ -125,20 +134,20 @@ def test_nothing_is_concluded_within_the_first_half_second():
     surfaces["output"]["offset"][[ELEVATOR, FLAP]] = needed(40.0, 0.2), 0.2
     fastest = []
     for k in range(12):
-        autopilot.protect(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
+        autopilot.limit_airspeed_to_fly(pilot, layout, surfaces, np.zeros(4), 0.0, y, k * DT)
         fastest.append(float(pilot["holding"]["fastest"]))
     assert fastest[:10] == [np.inf] * 10
     assert fastest[10:] == pytest.approx([40.0 / np.sqrt(DENSITY)] * 2, abs=0.05)
     assert pilot["holding"]["from_s"].tolist() == pytest.approx([10 * DT, -1.0, -1.0])
-    assert pilot["held"] == pytest.approx(45.0 - 2 * DT * 1.0)  # on its way at its pace
+    assert pilot["airspeed_to_fly"] == pytest.approx(45.0 - 2 * DT * 1.0)  # on its way at its pace
 
 
 def noted(command=45.0, fastest=np.inf, slowest=0.0, commanded=1, effectiveness=(1, 1, 1, 1), limit=0.5):
     pilot, layout, surfaces, _ = new(command=command, effectiveness=effectiveness)
     hold = pilot["holding"]
-    hold["fastest"], hold["slowest"], pilot["commanded"][SPEED] = fastest, slowest, commanded
+    hold["fastest"], hold["slowest"], pilot["is_commanded"][SPEED] = fastest, slowest, commanded
     pilot["bank_limit"] = limit
-    autopilot.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], 7.0)
+    autopilot.record_limits_in_force(pilot, layout["main"], surfaces["output"]["effectiveness"], 7.0)
     return hold
 
 
@@ -167,7 +176,7 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
     pilot, layout, surfaces, _ = new(effectiveness=effectiveness)
     pilot["bank_limit"] = 0.1
     for k in range(6):
-        autopilot.announce(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
+        autopilot.record_limits_in_force(pilot, layout["main"], surfaces["output"]["effectiveness"], float(k))
     assert pilot["holding"]["in_force"][BANK_LIMIT] == 1
     assert pilot["holding"]["from_s"][BANK_LIMIT] == 4.0
     left = 0.1 + 0.4 * (1.0 - DT / 4.0) ** 6
@@ -177,19 +186,23 @@ def test_a_bank_limit_is_announced_as_it_has_been_on_average(surface):
 
 def test_what_is_held_comes_within_both_limits_at_its_pace():
     pilot, *_ = new()
-    hold, pilot["held"] = pilot["holding"], 45.0
+    hold, pilot["airspeed_to_fly"] = pilot["holding"], 45.0
     hold["fastest"], hold["slowest"] = np.inf, 45.02
-    autopilot.approach(pilot)
-    assert (pilot["held"], pilot["held_moving"]) == pytest.approx((45.02, 0.02 / DT))
-    assert hold["limiting"] == 1
+    autopilot.approach_airspeed_to_fly(pilot)
+    assert (pilot["airspeed_to_fly"], pilot["airspeed_to_fly_rate"]) == pytest.approx((45.02, 0.02 / DT))
+    assert hold["limits_airspeed"] == 1
     hold["slowest"], hold["fastest"] = 0.0, 44.0
-    autopilot.approach(pilot)
-    assert (pilot["held"], pilot["held_moving"]) == pytest.approx((45.02 - DT, -1.0))
+    autopilot.approach_airspeed_to_fly(pilot)
+    assert (pilot["airspeed_to_fly"], pilot["airspeed_to_fly_rate"]) == pytest.approx((45.02 - DT, -1.0))
     hold["slowest"], hold["fastest"] = 47.0, 46.0  # nothing can be held: the faster of both ends gives way
     for _ in range(40):
-        autopilot.approach(pilot)
-    assert pilot["held"] == 46.0
-    pilot["moving"][SPEED], hold["slowest"], hold["fastest"] = 0.3, 0.0, np.inf
+        autopilot.approach_airspeed_to_fly(pilot)
+    assert pilot["airspeed_to_fly"] == 46.0
+    pilot["command_rate"][SPEED], hold["slowest"], hold["fastest"] = 0.3, 0.0, np.inf
     for _ in range(40):
-        autopilot.approach(pilot)
-    assert (pilot["held"], pilot["held_moving"], hold["limiting"]) == (45.0, 0.3, 0)
+        autopilot.approach_airspeed_to_fly(pilot)
+    assert (pilot["airspeed_to_fly"], pilot["airspeed_to_fly_rate"], hold["limits_airspeed"]) == (
+        45.0,
+        0.3,
+        0,
+    )

@@ -55,13 +55,13 @@ def test_the_legs_are_in_si_and_what_is_held_has_no_value(filled):
     pilot, control = filled
     assert (pilot["enabled"], control["reference"]["config"]["steered"]) == (1, 1)
     assert pilot["dt"] == pytest.approx(0.01)
-    assert pilot["legs"].tolist() == [2, 1, 1, 0]
-    assert pilot["at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]
-    assert np.isnan(pilot["value"][0, 0])
-    assert pilot["value"][0, 1] == 1900.0
-    assert pilot["value"][1:3, 0] == pytest.approx([42.0, np.pi / 2.0])
-    assert pilot["speed"][0, 1] == 2.5
-    assert pilot["speed"][1:3, 0].tolist() == [0.4, inf]
+    assert pilot["n_legs"].tolist() == [2, 1, 1, 0]
+    assert pilot["leg_starts_at_s"][:3, :2].tolist() == [[0.0, 20.0], [5.0, 0.0], [0.0, 0.0]]
+    assert np.isnan(pilot["leg_value"][0, 0])
+    assert pilot["leg_value"][0, 1] == 1900.0
+    assert pilot["leg_value"][1:3, 0] == pytest.approx([42.0, np.pi / 2.0])
+    assert pilot["leg_max_command_rate"][0, 1] == 2.5
+    assert pilot["leg_max_command_rate"][1:3, 0].tolist() == [0.4, inf]
     assert (pilot["changed_at_s"] == -inf).all()
 
 
@@ -105,8 +105,10 @@ def test_each_loop_is_a_few_times_slower_than_the_one_inside_it(filled):
 def test_limits_and_the_engines_range_are_taken_over(filled):
     pilot, _ = filled
     assert [pilot[f"{name}_power"] for name in ("trim", "low", "high")] == [20.0, 12.0, 28.0]
-    assert pilot["most"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
-    assert (pilot["most_bank"], pilot["steepest_alpha"]) == pytest.approx((radians(30.0), radians(15.0)))
+    assert pilot["max_healthy_rate"] == pytest.approx(np.radians([12.0, 6.0, 10.0]))
+    assert (pilot["max_healthy_bank"], pilot["steepest_alpha"]) == pytest.approx(
+        (radians(30.0), radians(15.0))
+    )
     assert pilot["slowest_mps"] == AIRCRAFT.envelope.airspeed_mps[0] + 2.0
     assert pilot["gravity"] == pytest.approx(9.80665)
 
@@ -128,7 +130,7 @@ def test_the_dihedral_is_the_roll_that_sideslip_sustains(filled):
 
 
 def test_the_weathercock_holds_full_power_at_the_largest_sideslip_accepted(filled):
-    dpt = filled[0]["weathercock"] ** (1.0 / 3.0)
+    dpt = filled[0]["dpt_cubed_held_by_sideslip"] ** (1.0 / 3.0)
     pulled = coefficient("Cn", dpt=dpt) - coefficient("Cn")
     assert abs(pulled) > 1e-4
     beta = -np.sign(pulled) * 0.2  # rad, a third of what is a departure
@@ -157,8 +159,8 @@ def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(fi
     assert hold["flap"] == pytest.approx(np.linspace(-0.1, 1.0, N_FLAP))
     expected = [[level(q, flap) for flap in hold["flap"]] for q in hold["qdyn"]]
     assert hold["elevator"] == pytest.approx(np.array(expected), abs=1e-7)
-    assert hold["known"] == 1
-    assert (hold["max_airspeed_rate_mps2"], hold["reserve"]) == pytest.approx((1.0, radians(0.7)))
+    assert hold["has_table"] == 1
+    assert (hold["max_airspeed_rate_mps2"], hold["flap_reserve"]) == pytest.approx((1.0, radians(0.7)))
     assert (hold["from_s"] == -1.0).all()
     assert (hold["bank"], hold["fastest"]) == (pytest.approx(radians(30.0)), inf)
 
@@ -184,7 +186,7 @@ def test_what_takes_more_thrust_or_incidence_than_there_is_cannot_be_held(qdyn_p
 
 def test_without_a_surface_that_stands_in_nothing_is_known_of_what_can_be_held():
     hold = set_up(stand_in=-1)[0]["holding"]
-    assert (hold["known"], hold["fastest"]) == (0, inf)
+    assert (hold["has_table"], hold["fastest"]) == (0, inf)
     assert not hold["qdyn"].any()
 
 
@@ -209,13 +211,13 @@ def test_an_aircraft_that_hardly_rolls_by_sideslip_is_not_flown_by_it():
     profile._set_up_aircraft_values(pilot, made_up({}))
     assert not pilot["thrust"].any()
     assert pilot["dihedral"] == pytest.approx(0.01 * 2.0 / 10.0)
-    assert pilot["weathercock"] == inf  # no power yaws it
+    assert pilot["dpt_cubed_held_by_sideslip"] == inf  # no power yaws it
     unstable = {"Cn_dpt3": -0.1, "Cn_beta": -0.2, "Cl_beta": -0.3, "Cl_p": -0.5}
     profile._set_up_aircraft_values(pilot, made_up(unstable))
-    assert pilot["weathercock"] == 0.0
+    assert pilot["dpt_cubed_held_by_sideslip"] == 0.0
     assert pilot["dihedral"] == pytest.approx(0.6 * 2.0 / 10.0)
     profile._set_up_aircraft_values(pilot, made_up(unstable | {"Cn_beta": 0.2, "Cn_beta3": 1.0}))
-    assert pilot["weathercock"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
+    assert pilot["dpt_cubed_held_by_sideslip"] == pytest.approx((0.2 * 0.2 + 0.2**3) / 0.1)
 
 
 def test_nothing_is_climbed_within_two_metres_a_second_of_the_slowest_flight(filled):

@@ -18,7 +18,7 @@ TRIM, Y = np.array([0.01, -0.02, 0.03, 0.04]), np.array([0.1, 0.02, 45.0, 1036.0
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
 ALARM = {"fdi.verdict.detected": 1, "fdi.verdict.detected_at_s": 2.25, "fdi.verdict.detected_axis": 1}
 NAMED = ALARM | {"fdi.verdict.isolated_estimator": 1, "fdi.verdict.isolated_at_s": 2.5}
-PILOT = {"autopilot.enabled": 1, "autopilot.commanded": [1, 1, 0, 1]}
+PILOT = {"autopilot.enabled": 1, "autopilot.is_commanded": [1, 1, 0, 1]}
 
 # Of each case the scenario's keys, and what is put into the record of its flight.
 CASES = {
@@ -87,16 +87,18 @@ CASES = {
     }),
     "probed-for-nothing": ({}, {"t": 9.0, "control.probe.memory.from_s": 2.0}),
     "profile": ({}, PILOT | {
-        "autopilot.worst": [5.0, 2.5, 0.4, 0.2], "autopilot.held_worst": 1.25,
-        "autopilot.largest_off": 4.5, "autopilot.mean_off": [-1.0, 0.5, 0.1, -0.1],
+        "autopilot.largest_deviation": [5.0, 2.5, 0.4, 0.2],
+        "autopilot.largest_deviation_from_airspeed_to_fly": 1.25,
+        "autopilot.largest_instant_airspeed_deviation": 4.5,
+        "autopilot.mean_deviation": [-1.0, 0.5, 0.1, -0.1],
     }),
     "profile-without-speed": ({}, PILOT | {
-        "autopilot.commanded": [1, 0, 1, 0], "autopilot.held_worst": 1.25,
+        "autopilot.is_commanded": [1, 0, 1, 0], "autopilot.largest_deviation_from_airspeed_to_fly": 1.25,
     }),
-    "profile-of-nothing": ({}, PILOT | {"autopilot.commanded": [0, 0, 0, 0]}),
+    "profile-of-nothing": ({}, PILOT | {"autopilot.is_commanded": [0, 0, 0, 0]}),
     "limits": ({}, PILOT | {
         "autopilot.holding.from_s": [5.0, 3.0, 0.0], "autopilot.holding.value": [55.0, 38.5, radians(25.0)],
-        "autopilot.holding.in_force": [1, 0, 1], "autopilot.holding.acting": radians(-4.25),
+        "autopilot.holding.in_force": [1, 0, 1], "autopilot.holding.mean_acting_elevator": radians(-4.25),
         "control.surfaces.output.effectiveness": [0.8, 0.1, 0.35, 0.0],
     }),
     "limits-of-roll": ({}, PILOT | {

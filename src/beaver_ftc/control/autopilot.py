@@ -89,8 +89,10 @@ GAIN = record(**dict.fromkeys(GAINS, float))
 FASTEST, SLOWEST, BANK_LIMIT = range(3)
 N_QDYN, N_FLAP = 12, 5
 HOLDING = record(
-    known=int, limiting=int, frames=int, reserve=float, max_airspeed_rate_mps2=float,
-    qdyn=N_QDYN, flap=N_FLAP, elevator=(N_QDYN, N_FLAP), acting=float, centre=float,
+    has_table=int, limits_airspeed=int, n_averaged_frames=int, flap_reserve=float,
+    max_airspeed_rate_mps2=float,
+    qdyn=N_QDYN, flap=N_FLAP, elevator=(N_QDYN, N_FLAP),
+    mean_acting_elevator=float, mean_commanded_elevator=float,
     fastest=float, slowest=float, bank=float,
     in_force=(int, 3), from_s=3, value=3,
 )  # fmt: skip
@@ -98,40 +100,43 @@ HOLDING = record(
 # A leg: from when on, to which value (not a number: hold what is), how fast. SI and rad.
 AUTOPILOT = record(
     enabled=int, flying=int, dt=float,
-    legs=(int, N_CHANNELS), leg=(int, N_CHANNELS),  # how many, and which is next
-    at_s=(N_CHANNELS, MAX_LEGS), value=(N_CHANNELS, MAX_LEGS), speed=(N_CHANNELS, MAX_LEGS),
-    commanded=(int, N_CHANNELS),  # whether the channel is flown by now
+    n_legs=(int, N_CHANNELS), next_leg_index=(int, N_CHANNELS),  # how many, and which is next
+    leg_starts_at_s=(N_CHANNELS, MAX_LEGS), leg_value=(N_CHANNELS, MAX_LEGS),
+    leg_max_command_rate=(N_CHANNELS, MAX_LEGS),
+    is_commanded=(int, N_CHANNELS),  # whether the channel is flown by now
     goal=N_CHANNELS, command=N_CHANNELS, max_command_rate=N_CHANNELS,
-    moving=N_CHANNELS,  # per second, of the command at this instant
+    command_rate=N_CHANNELS,  # per second, of the command at this instant
     changed_at_s=N_CHANNELS,
     # what is known of the aircraft
     gravity=float, thrust=2,  # m/s2 per dpt and Pa: at no alpha, and per alpha
-    engine=ENGINE, glides=int,  # what else is known of it; whether pitch holds the airspeed
+    engine=ENGINE, pitch_holds_airspeed=int,  # what else is known of it; whether pitch holds the airspeed
     trim_power=float, low_power=float, high_power=float,  # in the units of its setting
     climb_in_trim=float,  # rad, with the engine as trimmed
     dihedral=float,  # roll rate per sideslip and airspeed, 1/m
     full_power=float, allowed_power=float,  # the highest there is now, and that the rudder allows
-    weathercock=float,  # cube of the dpt whose yawing moment the largest sideslip accepted holds
+    dpt_cubed_held_by_sideslip=float,  # dpt^3 whose yawing moment the largest accepted sideslip holds
     slowest_mps=float, steepest_alpha=float,
-    most=3,  # rad/s, of the rates asked for with all surfaces healthy
-    limit=3, most_bank=float, bank_limit=float,
+    max_healthy_rate=3,  # rad/s, of the rates asked for with all surfaces healthy
+    rate_limit=3, max_healthy_bank=float, bank_limit=float,
     # memory
     alpha=float, airspeed=float,  # smoothed, rad and m/s
     recent_airspeed_mps=float,  # averaged over RECENT_AIRSPEED_S
-    drift=float,  # rad/s of turning found missing
-    lift=float,  # rad of path angle found missing
-    throttle=float, rolled=float,  # m/s2, rad/s: found missing
-    jammed=float,  # share of roll that rudder and dihedral carry
-    loose=float,  # 1: nothing acts in yaw
-    by_power=float,  # share of the time of late in which engines alone act there
+    missing_turn_rate=float,  # rad/s of turning found missing
+    missing_path_angle=float,  # rad of path angle found missing
+    missing_acceleration=float, missing_roll_rate=float,  # m/s2, rad/s: found missing
+    roll_loss_share=float,  # share of roll that rudder and dihedral carry
+    yaw_loss_share=float,  # 1: nothing acts in yaw
+    engines_alone_yaw_share=float,  # share of the time of late in which engines alone act there
     rates=3, gain=GAIN,
-    sets_power=int, setting=float,  # whether the engine is set by now, and to what
+    sets_power=int, power_setting=float,  # whether the engine is set by now, and to what
     power_airspeed=float,  # m/s, to hold while power stands in for a lost pitch
-    held=float, held_moving=float, holding=HOLDING,  # airspeed to fly, m/s, and its change
+    airspeed_to_fly=float, airspeed_to_fly_rate=float,  # m/s, and its change, m/s2
+    holding=HOLDING,
     # how far off, at most; and the mean deviation of late, from what is commanded and, airspeed, held
-    # `worst` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
-    mean_off=N_CHANNELS, held_off=float, held_worst=float, worst=N_CHANNELS,
-    largest_off=float,  # m/s, of the airspeed from what is commanded, at one instant
+    # `largest_deviation` is NOT_JUDGED until a channel is: of angles that takes SETTLED_S
+    mean_deviation=N_CHANNELS, mean_deviation_from_airspeed_to_fly=float,
+    largest_deviation_from_airspeed_to_fly=float, largest_deviation=N_CHANNELS,
+    largest_instant_airspeed_deviation=float,  # m/s, of the airspeed from what is commanded, at one instant
 )  # fmt: skip
 
 
@@ -141,8 +146,8 @@ NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that bites by so much is announced
 
 
 @kernel
-def protect(autopilot, layout, surfaces, u, unexplained, y, t):
-    """Bring autopilot.held, the airspeed to fly, to this frame: the commanded one where it can be held.
+def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
+    """Set autopilot.airspeed_to_fly of this frame: the commanded airspeed where it can be held.
 
     u (n,) rad: where the surfaces are. unexplained rad: the elevator that would give what the law's observer
     finds in pitch.
@@ -152,51 +157,51 @@ def protect(autopilot, layout, surfaces, u, unexplained, y, t):
     effectiveness, offset = surfaces.output.effectiveness, surfaces.output.offset
     left = effectiveness[e]
     whole = left >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
-    if whole or not hold.known:
-        hold.frames = 0
+    if whole or not hold.has_table:
+        hold.n_averaged_frames = 0
     else:
-        watch(hold, autopilot.dt, offset[e], left * u[e], unexplained)
-        if hold.frames * autopilot.dt > HOLD_SETTLED_S:
-            find(hold, layout, surfaces, y)
-    approach(autopilot)
-    announce(autopilot, layout.main, effectiveness, t)
+        average_acting_elevator(hold, autopilot.dt, offset[e], left * u[e], unexplained)
+        if hold.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
+            find_airspeeds_that_can_be_held(hold, layout, surfaces, y)
+    approach_airspeed_to_fly(autopilot)
+    record_limits_in_force(autopilot, layout.main, effectiveness, t)
 
 
 @kernel
-def watch(hold, dt, offset, commanded, unexplained):
-    """Average the elevator that would account for the pitch moments there are, rad: it is off by `offset`,
-    what is left of it gives `commanded`."""
+def average_acting_elevator(hold, dt, offset, commanded, unexplained):
+    """Average the elevator that would account for the pitch moments there are, rad: `offset` is how
+    far it is off, `commanded` what its remaining effectiveness gives."""
     acting = offset + commanded + unexplained
-    hold.frames += 1
-    weight = max(dt / ACTING_S, 1.0 / hold.frames)
-    hold.acting += weight * (acting - hold.acting)
-    hold.centre += weight * (commanded - hold.centre)
+    hold.n_averaged_frames += 1
+    weight = max(dt / ACTING_S, 1.0 / hold.n_averaged_frames)
+    hold.mean_acting_elevator += weight * (acting - hold.mean_acting_elevator)
+    hold.mean_commanded_elevator += weight * (commanded - hold.mean_commanded_elevator)
 
 
 @kernel
-def find(hold, layout, surfaces, y):
+def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     """The fastest and the slowest airspeed that can be held, m/s."""
     e, f = layout.main[PITCH], layout.stand_in
     left, effectiveness = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
-    least = hold.acting - hold.centre + left * layout.low[e]
-    greatest = hold.acting - hold.centre + left * layout.high[e]
-    up, down = layout.low[f] + hold.reserve, layout.high[f] - hold.reserve
+    least = hold.mean_acting_elevator - hold.mean_commanded_elevator + left * layout.low[e]
+    greatest = hold.mean_acting_elevator - hold.mean_commanded_elevator + left * layout.high[e]
+    up, down = layout.low[f] + hold.flap_reserve, layout.high[f] - hold.flap_reserve
     if effectiveness < surfaces.config.least_effectiveness:
         up = down = min(max(surfaces.output.offset[f], layout.low[f]), layout.high[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
-    hold.fastest = np.sqrt(2.0 * limit_of(hold, up, greatest, True) / per_pa)
-    hold.slowest = np.sqrt(2.0 * limit_of(hold, down, least, False) / per_pa)
+    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, True) / per_pa)
+    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, False) / per_pa)
 
 
 @kernel
-def limit_of(hold, flap, elevator, highest):
+def dynamic_pressure_limit(hold, flap, elevator, highest):
     """The highest (or lowest) dynamic pressure, Pa, of level flight with flap and elevator (rad): where the
     elevator it takes is the one there is. Infinite (or zero) where the table does not bound it."""
-    before = needed(hold, 0, flap)
+    before = interpolate_elevator_needed(hold, 0, flap)
     if before > elevator:
         return hold.qdyn[0] if highest else 0.0
     for j in range(1, N_QDYN):
-        after = needed(hold, j, flap)
+        after = interpolate_elevator_needed(hold, j, flap)
         if after > elevator:
             part = (elevator - before) / (after - before)
             return hold.qdyn[j - 1] + part * (hold.qdyn[j] - hold.qdyn[j - 1])
@@ -205,7 +210,7 @@ def limit_of(hold, flap, elevator, highest):
 
 
 @kernel
-def needed(hold, j, flap):
+def interpolate_elevator_needed(hold, j, flap):
     """Elevator for level flight at dynamic pressure j of the table and flap rad, between its columns."""
     k = 0
     while k < N_FLAP - 2 and flap > hold.flap[k + 1]:
@@ -215,34 +220,34 @@ def needed(hold, j, flap):
 
 
 @kernel
-def approach(autopilot):
+def approach_airspeed_to_fly(autopilot):
     """Bring the airspeed to fly towards the nearest to the commanded one that can be held, without a bump."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
     wanted = min(max(command, hold.slowest), hold.fastest)
-    if wanted == command and not hold.limiting:
-        autopilot.held, autopilot.held_moving = command, autopilot.moving[SPEED]
+    if wanted == command and not hold.limits_airspeed:
+        autopilot.airspeed_to_fly, autopilot.airspeed_to_fly_rate = command, autopilot.command_rate[SPEED]
         return
     most = hold.max_airspeed_rate_mps2 * autopilot.dt
-    step = min(max(wanted - autopilot.held, -most), most)
-    autopilot.held += step
-    autopilot.held_moving = step / autopilot.dt
-    hold.limiting = autopilot.held != command
+    step = min(max(wanted - autopilot.airspeed_to_fly, -most), most)
+    autopilot.airspeed_to_fly += step
+    autopilot.airspeed_to_fly_rate = step / autopilot.dt
+    hold.limits_airspeed = autopilot.airspeed_to_fly != command
 
 
 @kernel
-def announce(autopilot, main, effectiveness, t):
+def record_limits_in_force(autopilot, main, effectiveness, t):
     """Note since when a limit has bitten, and what it is at last; main (3,): who leads each axis."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
-    if autopilot.commanded[SPEED]:
-        note(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
-        note(hold, SLOWEST, hold.slowest, hold.slowest > command + NOTED_MPS, t)
+    if autopilot.is_commanded[SPEED]:
+        record_limit(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
+        record_limit(hold, SLOWEST, hold.slowest, hold.slowest > command + NOTED_MPS, t)
     if effectiveness[main[ROLL]] < 1.0 or effectiveness[main[YAW]] < 1.0:
         hold.bank += autopilot.dt / ACTING_S * (autopilot.bank_limit - hold.bank)
-        note(hold, BANK_LIMIT, hold.bank, hold.bank < autopilot.most_bank - NOTED_RAD, t)
+        record_limit(hold, BANK_LIMIT, hold.bank, hold.bank < autopilot.max_healthy_bank - NOTED_RAD, t)
 
 
 @kernel
-def note(hold, kind, value, bites, t):
+def record_limit(hold, kind, value, bites, t):
     """Keep a limit that bites now."""
     hold.in_force[kind] = bites
     if bites:
@@ -271,7 +276,7 @@ def clamp(value, most):
 
 
 @kernel
-def turn(angle):
+def wrap_to_half_turn(angle):
     """The same direction within half a turn, rad."""
     return angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
 
@@ -279,62 +284,69 @@ def turn(angle):
 @kernel
 def begin_leg(autopilot, c, now, t):
     """Take up the next leg of channel c, which is at `now` as measured."""
-    j = autopilot.leg[c]
-    autopilot.leg[c] = j + 1
-    if not autopilot.commanded[c]:
-        autopilot.commanded[c] = 1
+    j = autopilot.next_leg_index[c]
+    autopilot.next_leg_index[c] = j + 1
+    if not autopilot.is_commanded[c]:
+        autopilot.is_commanded[c] = 1
         autopilot.command[c] = now
-    value = autopilot.value[c, j]
+    value = autopilot.leg_value[c, j]
     autopilot.goal[c] = autopilot.command[c]
     if not np.isnan(value):
         away = value - autopilot.command[c]
-        autopilot.goal[c] += turn(away) if c == HEADING else away
+        autopilot.goal[c] += wrap_to_half_turn(away) if c == HEADING else away
         autopilot.changed_at_s[c] = t
-    autopilot.max_command_rate[c] = autopilot.speed[c, j]
+    autopilot.max_command_rate[c] = autopilot.leg_max_command_rate[c, j]
 
 
 @kernel
-def advance(autopilot, measured, t):
+def advance_commands(autopilot, measured, t):
     """Bring every channel's command to t s; measured (N_CHANNELS,): where they are."""
     for c in range(N_CHANNELS):
         while (
-            autopilot.leg[c] < autopilot.legs[c]
-            and t >= autopilot.at_s[c, autopilot.leg[c]] - TIME_TOLERANCE_S
+            autopilot.next_leg_index[c] < autopilot.n_legs[c]
+            and t >= autopilot.leg_starts_at_s[c, autopilot.next_leg_index[c]] - TIME_TOLERANCE_S
         ):
             begin_leg(autopilot, c, measured[c], t)
-        if autopilot.commanded[c]:
+        if autopilot.is_commanded[c]:
             away, most = (
                 autopilot.goal[c] - autopilot.command[c],
                 autopilot.max_command_rate[c] * autopilot.dt,
             )
             step = min(max(away, -most), most)
             autopilot.command[c] += step
-            autopilot.moving[c] = step / autopilot.dt if most < np.inf else 0.0
+            autopilot.command_rate[c] = step / autopilot.dt if most < np.inf else 0.0
 
 
 @kernel
 def steer(autopilot, control, u, measured, unexplained, t):
     """One frame, at t s: fill autopilot.rates (3,) rad/s, and the engine setting where an airspeed is
-    commanded. control: the records of the law (control/state.py). u, unexplained: see `protect`.
+    commanded. control: the records of the law (control/state.py). u, unexplained: see
+    `limit_airspeed_to_fly`.
     """
     layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
     axes, power, by_engines = control.axes, control.power, control.engines.output.authority
     y, attitude = measured.y, measured.attitude
     if not autopilot.flying:
         take_over(autopilot, y, attitude)
-    advance(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
-    follow(autopilot, layout, surfaces, saturated, by_engines[1, YAW] > 0.0, y)
-    limit(autopilot, layout, axes.G, axes.hold, by_engines)
-    protect(autopilot, layout, surfaces, u, unexplained, y, t)
-    push = slope_of(autopilot, power, y)
+    advance_commands(autopilot, (measured.altitude, y[AIRSPEED], attitude[YAW], attitude[ROLL]), t)
+    smooth_signals_and_losses(autopilot, layout, surfaces, saturated, by_engines[1, YAW] > 0.0, y)
+    limit_rates_and_bank(autopilot, layout, axes.G, axes.hold, by_engines)
+    limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t)
+    push = acceleration_per_power(autopilot, power, y)
     rudder = layout.main[YAW]
     left, at_stop = surfaces.output.effectiveness[rudder], saturated[rudder]
-    autopilot.full_power = full_power(autopilot, power, left, at_stop, y)
-    path = path_of(autopilot, measured, push)
-    to_body(autopilot, y, attitude, rolling(autopilot, attitude), pitching(autopilot, y, attitude, path))
-    autopilot.sets_power = autopilot.commanded[SPEED] and not autopilot.glides
+    autopilot.full_power = highest_power(autopilot, power, left, at_stop, y)
+    path = path_angle_to_fly(autopilot, measured, push)
+    set_body_rates(
+        autopilot,
+        y,
+        attitude,
+        bank_angle_rate(autopilot, attitude),
+        pitch_attitude_rate(autopilot, y, attitude, path),
+    )
+    autopilot.sets_power = autopilot.is_commanded[SPEED] and not autopilot.pitch_holds_airspeed
     if autopilot.sets_power:
-        throttle(autopilot, power, y, path, push)
+        set_power(autopilot, power, y, path, push)
 
 
 @kernel
@@ -347,7 +359,7 @@ def take_over(autopilot, y, attitude):
 
 
 @kernel
-def follow(autopilot, layout, surfaces, saturated, engines_yaw, y):
+def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_yaw, y):
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
     no more roll, whatever their estimated effectiveness. engines_yaw: whether engines can yaw the
     aircraft."""
@@ -360,30 +372,32 @@ def follow(autopilot, layout, surfaces, saturated, engines_yaw, y):
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     at_stop = saturated[layout.main[ROLL]] == 1
     gone = remaining(layout, effectiveness, ROLL) < least or at_stop
-    autopilot.jammed += dt / autopilot.gain.jammed_s * (gone - autopilot.jammed)
+    autopilot.roll_loss_share += dt / autopilot.gain.jammed_s * (gone - autopilot.roll_loss_share)
     free = remaining(layout, effectiveness, YAW) < least
-    autopilot.loose += dt / autopilot.gain.jammed_s * (free - autopilot.loose)
+    autopilot.yaw_loss_share += dt / autopilot.gain.jammed_s * (free - autopilot.yaw_loss_share)
     if engines_yaw:
         by_power = free or saturated[layout.main[YAW]] == 1
-        autopilot.by_power += dt / BY_POWER_S * (by_power - autopilot.by_power)
+        autopilot.engines_alone_yaw_share += dt / BY_POWER_S * (by_power - autopilot.engines_alone_yaw_share)
 
 
 @kernel
-def limit(autopilot, layout, G, hold, engine_authority):
+def limit_rates_and_bank(autopilot, layout, G, hold, engine_authority):
     """Rates and bank that the surfaces left can give: their spare acceleration for a while. G (3, n): with
     the effectiveness of each in it; hold (3,) rad/s2; engine_authority: as in `allocation.attainable`."""
     for i in range(3):
         least, greatest = attainable(G, layout, engine_authority, i)
         spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
-        autopilot.limit[i] = min(autopilot.most[i], spare * autopilot.gain.authority_s)
-    by_sideslip = autopilot.jammed * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
-    autopilot.limit[ROLL] = max(autopilot.limit[ROLL], by_sideslip)
-    steepest = autopilot.most_bank * (1.0 - max(0.5 * autopilot.jammed, 0.2 * autopilot.loose))
-    autopilot.bank_limit = min(steepest, autopilot.limit[ROLL] * autopilot.gain.bank_s)
+        autopilot.rate_limit[i] = min(autopilot.max_healthy_rate[i], spare * autopilot.gain.authority_s)
+    by_sideslip = autopilot.roll_loss_share * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
+    autopilot.rate_limit[ROLL] = max(autopilot.rate_limit[ROLL], by_sideslip)
+    steepest = autopilot.max_healthy_bank * (
+        1.0 - max(0.5 * autopilot.roll_loss_share, 0.2 * autopilot.yaw_loss_share)
+    )
+    autopilot.bank_limit = min(steepest, autopilot.rate_limit[ROLL] * autopilot.gain.bank_s)
 
 
 @kernel
-def slope_of(autopilot, power, y):
+def acceleration_per_power(autopilot, power, y):
     """Acceleration along the path per unit of power, m/s2, where no table has it; the table's are brought to
     this airspeed."""
     if autopilot.engine.settings:
@@ -393,7 +407,7 @@ def slope_of(autopilot, power, y):
 
 
 @kernel
-def full_power(autopilot, power, left, at_stop, y):
+def highest_power(autopilot, power, left, at_stop, y):
     """The highest power with what is left of the rudder: the Beaver's propeller yaws with dpt^3.
 
     What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
@@ -402,62 +416,64 @@ def full_power(autopilot, power, left, at_stop, y):
     """
     high = autopilot.high_power
     if at_stop:
-        lowest = ceiling(power, y, autopilot.weathercock ** (1.0 / 3.0))
+        lowest = ceiling(power, y, autopilot.dpt_cubed_held_by_sideslip ** (1.0 / 3.0))
         cut = min(autopilot.allowed_power, power.output.command[0]) - CUT_INHG_S * autopilot.dt
         autopilot.allowed_power = min(max(cut, lowest), high)
     else:
         autopilot.allowed_power = min(autopilot.allowed_power + RAISE_INHG_S * autopilot.dt, high)
     if left >= 1.0:
         return autopilot.allowed_power
-    held = max(left, 0.0) * power.config.highest_dpt**3 + (1.0 - left) * autopilot.weathercock
+    held = max(left, 0.0) * power.config.highest_dpt**3 + (1.0 - left) * autopilot.dpt_cubed_held_by_sideslip
     return min(autopilot.allowed_power, ceiling(power, y, held ** (1.0 / 3.0)))
 
 
 @kernel
-def path_of(autopilot, measured, push):
+def path_angle_to_fly(autopilot, measured, push):
     """Path angle to fly, rad; the one that is flown where no altitude is commanded."""
-    if autopilot.glides and autopilot.commanded[SPEED]:
-        return glide_of(autopilot)
-    if not autopilot.commanded[ALTITUDE]:
+    if autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]:
+        return glide_path_angle(autopilot)
+    if not autopilot.is_commanded[ALTITUDE]:
         return measured.attitude[PITCH] - autopilot.alpha
     V = autopilot.airspeed
     error = autopilot.command[ALTITUDE] - measured.altitude
-    wanted = (autopilot.moving[ALTITUDE] + autopilot.gain.altitude * error) / V + autopilot.lift
-    low, high = paths(autopilot, push)
+    wanted = (
+        autopilot.command_rate[ALTITUDE] + autopilot.gain.altitude * error
+    ) / V + autopilot.missing_path_angle
+    low, high = path_angle_limits(autopilot, push)
     path = min(max(wanted, low), high)
     if path == wanted:
-        lift = autopilot.lift + autopilot.dt * autopilot.gain.altitude_i * error / V
-        autopilot.lift = clamp(lift, MOST_MISSING)
+        lift = autopilot.missing_path_angle + autopilot.dt * autopilot.gain.altitude_i * error / V
+        autopilot.missing_path_angle = clamp(lift, MOST_MISSING)
     return path
 
 
 @kernel
-def glide_of(autopilot):
+def glide_path_angle(autopilot):
     """Path angle at which gravity brings the airspeed to where it is commanded, rad."""
-    error = autopilot.held - autopilot.airspeed
-    along = autopilot.held_moving + autopilot.throttle + autopilot.gain.speed * error
+    error = autopilot.airspeed_to_fly - autopilot.airspeed
+    along = autopilot.airspeed_to_fly_rate + autopilot.missing_acceleration + autopilot.gain.speed * error
     steeper = along / autopilot.gravity
     limited = clamp(steeper, MOST_PATH_RAD)
     if limited == steeper:
-        find_missing(autopilot, error)
+        integrate_missing_acceleration(autopilot, error)
     return autopilot.climb_in_trim - limited
 
 
 @kernel
-def find_missing(autopilot, error):
+def integrate_missing_acceleration(autopilot, error):
     """Integrate the acceleration that an airspeed takes in addition to the computed one; error m/s."""
-    found = autopilot.throttle + autopilot.dt * autopilot.gain.speed_i * error
-    autopilot.throttle = clamp(found, MOST_MISSING * autopilot.gravity)
+    found = autopilot.missing_acceleration + autopilot.dt * autopilot.gain.speed_i * error
+    autopilot.missing_acceleration = clamp(found, MOST_MISSING * autopilot.gravity)
 
 
 @kernel
-def paths(autopilot, push):
+def path_angle_limits(autopilot, push):
     """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare."""
     slow = autopilot.slowest_mps
     fast, idle, full = np.inf, autopilot.trim_power, autopilot.trim_power
-    if autopilot.commanded[SPEED]:
-        slow = max(slow, autopilot.held - autopilot.gain.spare_mps)
-        fast = autopilot.held + autopilot.gain.spare_mps
+    if autopilot.is_commanded[SPEED]:
+        slow = max(slow, autopilot.airspeed_to_fly - autopilot.gain.spare_mps)
+        fast = autopilot.airspeed_to_fly + autopilot.gain.spare_mps
         idle, full = autopilot.low_power, max(autopilot.full_power, autopilot.low_power)
     trim, engine = autopilot.trim_power, autopilot.engine
     at_idle = autopilot.climb_in_trim + gained(engine, push, trim, idle) / autopilot.gravity
@@ -468,49 +484,60 @@ def paths(autopilot, push):
 
 
 @kernel
-def pitching(autopilot, y, attitude, path):
+def pitch_attitude_rate(autopilot, y, attitude, path):
     """The rate of the pitch attitude, rad/s."""
-    if not (autopilot.commanded[ALTITUDE] or (autopilot.glides and autopilot.commanded[SPEED])):
+    if not (
+        autopilot.is_commanded[ALTITUDE] or (autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED])
+    ):
         return 0.0
     wanted = path + autopilot.alpha * np.cos(attitude[ROLL]) - attitude[PITCH]
-    rate = clamp(autopilot.gain.attitude * wanted, autopilot.limit[PITCH])
+    rate = clamp(autopilot.gain.attitude * wanted, autopilot.rate_limit[PITCH])
     return min(rate, autopilot.gain.protection * (autopilot.steepest_alpha - y[ALPHA]))
 
 
 @kernel
-def rolling(autopilot, attitude):
+def bank_angle_rate(autopilot, attitude):
     """The rate of the bank angle, rad/s; slower where engines alone yaw and roll."""
-    loop_gain_share = 1.0 - autopilot.jammed * autopilot.by_power * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
-    if autopilot.commanded[HEADING]:
-        error = turn(autopilot.command[HEADING] - attitude[YAW])
-        left = 1.0 - autopilot.loose * (1.0 - autopilot.gain.loose)
-        found = autopilot.drift + autopilot.dt * autopilot.loose * autopilot.gain.heading_i * error
-        autopilot.drift = autopilot.loose * clamp(found, MOST_DRIFT_RAD_S)
+    loop_gain_share = 1.0 - autopilot.roll_loss_share * autopilot.engines_alone_yaw_share * (
+        1.0 - LOOP_GAIN_SHARE_BY_POWER
+    )
+    if autopilot.is_commanded[HEADING]:
+        error = wrap_to_half_turn(autopilot.command[HEADING] - attitude[YAW])
+        left = 1.0 - autopilot.yaw_loss_share * (1.0 - autopilot.gain.loose)
+        found = (
+            autopilot.missing_turn_rate
+            + autopilot.dt * autopilot.yaw_loss_share * autopilot.gain.heading_i * error
+        )
+        autopilot.missing_turn_rate = autopilot.yaw_loss_share * clamp(found, MOST_DRIFT_RAD_S)
         turning = (
             loop_gain_share * left * autopilot.gain.heading * error
-            + autopilot.moving[HEADING]
-            + autopilot.drift
+            + autopilot.command_rate[HEADING]
+            + autopilot.missing_turn_rate
         )
         bank = autopilot.airspeed / autopilot.gravity * turning
-    elif autopilot.commanded[BANK]:
+    elif autopilot.is_commanded[BANK]:
         bank = autopilot.command[BANK]
     else:
         return 0.0
     away = clamp(bank, autopilot.bank_limit) - attitude[ROLL]
-    wanted = loop_gain_share * autopilot.gain.bank * away + autopilot.jammed * autopilot.rolled
-    rate = clamp(wanted, autopilot.limit[ROLL])
+    wanted = (
+        loop_gain_share * autopilot.gain.bank * away + autopilot.roll_loss_share * autopilot.missing_roll_rate
+    )
+    rate = clamp(wanted, autopilot.rate_limit[ROLL])
     if rate == wanted:
-        autopilot.rolled += autopilot.jammed * autopilot.dt * loop_gain_share * autopilot.gain.bank_i * away
+        autopilot.missing_roll_rate += (
+            autopilot.roll_loss_share * autopilot.dt * loop_gain_share * autopilot.gain.bank_i * away
+        )
     return rate
 
 
 @kernel
-def to_body(autopilot, y, attitude, rolling, pitching):
+def set_body_rates(autopilot, y, attitude, rolling, pitching):
     """Body rates of the attitude's rates (rad/s) in a coordinated turn; the rudder keeps the sideslip."""
     rates = autopilot.rates
     sin_roll, cos_roll = np.sin(attitude[ROLL]), np.cos(attitude[ROLL])
     sin_pitch, cos_pitch = np.sin(attitude[PITCH]), np.cos(attitude[PITCH])
-    lateral = autopilot.commanded[HEADING] or autopilot.commanded[BANK]
+    lateral = autopilot.is_commanded[HEADING] or autopilot.is_commanded[BANK]
     turning = 0.0
     if lateral:
         turning = autopilot.gravity / autopilot.airspeed * sin_roll / max(cos_roll, 0.1)
@@ -519,24 +546,24 @@ def to_body(autopilot, y, attitude, rolling, pitching):
     rates[YAW] = 0.0
     if lateral:
         sideslip = -rolling / (autopilot.dihedral * autopilot.airspeed)
-        wanted = autopilot.jammed * clamp(sideslip, MOST_SIDESLIP_RAD)
+        wanted = autopilot.roll_loss_share * clamp(sideslip, MOST_SIDESLIP_RAD)
         keeping = autopilot.gain.sideslip * (y[BETA] - wanted)
         rates[YAW] = turning * cos_pitch * cos_roll - pitching * sin_roll + keeping
-    rates[YAW] = clamp(rates[YAW], autopilot.limit[YAW])
+    rates[YAW] = clamp(rates[YAW], autopilot.rate_limit[YAW])
 
 
 @kernel
-def throttle(autopilot, power, y, path, push):
+def set_power(autopilot, power, y, path, push):
     """Set the power; while power stands in for a lost pitch, also the airspeed for its law and the
     acceleration that the path takes: that law has an airspeed loop of its own."""
-    error = autopilot.held - autopilot.airspeed
+    error = autopilot.airspeed_to_fly - autopilot.airspeed
     autopilot.recent_airspeed_mps += (
         autopilot.dt / RECENT_AIRSPEED_S * (autopilot.airspeed - autopilot.recent_airspeed_mps)
     )
-    along = autopilot.held_moving + autopilot.throttle
+    along = autopilot.airspeed_to_fly_rate + autopilot.missing_acceleration
     if power.memory.engaged:
         autopilot.power_airspeed = autopilot.recent_airspeed_mps + clamp(
-            autopilot.held - autopilot.recent_airspeed_mps, MAX_FROM_RECENT_MPS
+            autopilot.airspeed_to_fly - autopilot.recent_airspeed_mps, MAX_FROM_RECENT_MPS
         )
         error = autopilot.power_airspeed - autopilot.airspeed
     else:
@@ -544,33 +571,41 @@ def throttle(autopilot, power, y, path, push):
     climbing = autopilot.gravity * (path - autopilot.climb_in_trim)
     wanted = power_for(autopilot.engine, push, autopilot.trim_power, along + climbing)
     high = min(autopilot.full_power, ceiling(power, y, power.config.highest_dpt))
-    room = KEPT_ASIDE * autopilot.by_power * (autopilot.high_power - autopilot.low_power)
+    room = KEPT_ASIDE * autopilot.engines_alone_yaw_share * (autopilot.high_power - autopilot.low_power)
     limited = max(min(wanted, high - room), autopilot.low_power + room)
     if limited == wanted:
-        find_missing(autopilot, error)
-    autopilot.setting = limited
+        integrate_missing_acceleration(autopilot, error)
+    autopilot.power_setting = limited
 
 
 @kernel
-def judge(autopilot, altitude_m, airspeed_mps, heading, bank, t):
+def record_deviations(autopilot, altitude_m, airspeed_mps, heading, bank, t):
     """Note the deviation of every channel from its command: its mean of late, and the largest, of angles
-    once SETTLED_S have passed. Of the airspeed the mean is judged; `largest_off` is at one instant."""
+    once SETTLED_S have passed. Of the airspeed the mean is judged;
+    `largest_instant_airspeed_deviation` is at one instant."""
     where = (altitude_m, airspeed_mps, heading, bank)
     for c in range(N_CHANNELS):
-        if not autopilot.commanded[c]:
+        if not autopilot.is_commanded[c]:
             continue
         away = where[c] - autopilot.command[c]
         if c == HEADING:
-            away = turn(away)
-        autopilot.mean_off[c] += autopilot.dt / MEAN_S * (away - autopilot.mean_off[c])
+            away = wrap_to_half_turn(away)
+        autopilot.mean_deviation[c] += autopilot.dt / MEAN_S * (away - autopilot.mean_deviation[c])
         if c == SPEED:
-            autopilot.largest_off = max(autopilot.largest_off, abs(away))
-            away = autopilot.mean_off[c]
-            from_held = where[c] - autopilot.held
-            autopilot.held_off += autopilot.dt / MEAN_S * (from_held - autopilot.held_off)
-            autopilot.held_worst = max(autopilot.held_worst, abs(autopilot.held_off))
+            autopilot.largest_instant_airspeed_deviation = max(
+                autopilot.largest_instant_airspeed_deviation, abs(away)
+            )
+            away = autopilot.mean_deviation[c]
+            from_held = where[c] - autopilot.airspeed_to_fly
+            autopilot.mean_deviation_from_airspeed_to_fly += (
+                autopilot.dt / MEAN_S * (from_held - autopilot.mean_deviation_from_airspeed_to_fly)
+            )
+            autopilot.largest_deviation_from_airspeed_to_fly = max(
+                autopilot.largest_deviation_from_airspeed_to_fly,
+                abs(autopilot.mean_deviation_from_airspeed_to_fly),
+            )
         if c in (ALTITUDE, SPEED) or t >= autopilot.changed_at_s[c] + SETTLED_S:
-            autopilot.worst[c] = max(autopilot.worst[c], abs(away))
+            autopilot.largest_deviation[c] = max(autopilot.largest_deviation[c], abs(away))
 
 
 THRUST = "dpt"  # the signal that stands for the engine
@@ -598,13 +633,16 @@ def set_up_autopilot(autopilot: np.void, control: np.void, scenario: Scenario) -
         return
     autopilot["enabled"], autopilot["dt"] = 1, 1.0 / scenario.rate_hz
     set_up_profile(autopilot, scenario)
-    autopilot["changed_at_s"], autopilot["worst"] = -inf, NOT_JUDGED
+    autopilot["changed_at_s"], autopilot["largest_deviation"] = -inf, NOT_JUDGED
     autopilot["gain"] = tuple(_gains(scenario.airframe).values())
     autopilot["gravity"] = GRAVITY_MPS2
     _set_up_aircraft_values(autopilot, scenario)
     less, more = (scenario.airframe.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
     autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
-    autopilot["most"], autopilot["most_bank"] = np.radians(MOST_DEG_S), radians(MOST_BANK_DEG)
+    autopilot["max_healthy_rate"], autopilot["max_healthy_bank"] = (
+        np.radians(MOST_DEG_S),
+        radians(MOST_BANK_DEG),
+    )
     for name in ("trim", "low", "high"):
         autopilot[f"{name}_power"] = control["power"]["config"][name]
     autopilot["allowed_power"] = control["power"]["config"]["high"]
@@ -623,11 +661,13 @@ def set_up_profile(autopilot: np.void, scenario: Scenario) -> None:
     """Fill in the legs; in flight too, where those that have been begun are the same as before."""
     for c, (name, unit) in enumerate(_UNIT.items()):
         legs = getattr(scenario.autopilot, name)
-        autopilot["legs"][c] = len(legs)
+        autopilot["n_legs"][c] = len(legs)
         for j, leg in enumerate(legs):
-            autopilot["at_s"][c, j] = leg.at_s
-            autopilot["value"][c, j] = nan if leg.value is None else leg.value * unit
-            autopilot["speed"][c, j] = getattr(leg, "climb_mps", getattr(leg, "change_mps2", inf))
+            autopilot["leg_starts_at_s"][c, j] = leg.at_s
+            autopilot["leg_value"][c, j] = nan if leg.value is None else leg.value * unit
+            autopilot["leg_max_command_rate"][c, j] = getattr(
+                leg, "climb_mps", getattr(leg, "change_mps2", inf)
+            )
 
 
 def _set_up_aircraft_values(autopilot: np.void, scenario: Scenario) -> None:
@@ -637,16 +677,16 @@ def _set_up_aircraft_values(autopilot: np.void, scenario: Scenario) -> None:
     mass_kg = aircraft.mass.mass_kg * scenario.design_model.mass
     per_mass = aircraft.geometry.wing_area_m2 / mass_kg
     autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
-    autopilot["glides"] = aircraft.airspeed_by == "pitch"
+    autopilot["pitch_holds_airspeed"] = aircraft.airspeed_by == "pitch"
     if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
         set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
     autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
-    autopilot["weathercock"] = inf
+    autopilot["dpt_cubed_held_by_sideslip"] = inf
     if terms.get("Cn_dpt3"):
         beta = POWER_SIDESLIP_RAD
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
-        autopilot["weathercock"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
+        autopilot["dpt_cubed_held_by_sideslip"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
     slowest, fastest = aircraft.envelope.airspeed_mps
     autopilot["slowest_mps"] = slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest))
 
@@ -665,8 +705,11 @@ def _set_up_level_flight_table(holding: np.void, layout: np.void, scenario: Scen
     mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
     qdyn_pa, flap_rad = tuple(holding["qdyn"]), tuple(holding["flap"])
     needed = elevator_needed(aircraft, surfaces, mass_kg, scale, qdyn_pa, flap_rad)
-    holding["known"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
-    holding["max_airspeed_rate_mps2"], holding["reserve"] = MAX_AIRSPEED_RATE_MPS2, radians(FLAP_RESERVE_DEG)
+    holding["has_table"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
+    holding["max_airspeed_rate_mps2"], holding["flap_reserve"] = (
+        MAX_AIRSPEED_RATE_MPS2,
+        radians(FLAP_RESERVE_DEG),
+    )
 
 
 @lru_cache(maxsize=32)

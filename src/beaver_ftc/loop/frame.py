@@ -24,7 +24,7 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, engines, laws, state
 from beaver_ftc.control.accommodation import MAX_EVENTS
-from beaver_ftc.control.autopilot import SPEED, judge, steer
+from beaver_ftc.control.autopilot import SPEED, record_deviations, steer
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
@@ -333,10 +333,10 @@ def record_sampled(signal, row, column, columns):
 def record_profile(autopilot, row, column):
     """The commanded profile, of the channels that are flown, and the airspeed of it that can be held."""
     for c in range(autopilot.command.size):
-        if autopilot.commanded[c]:
+        if autopilot.is_commanded[c]:
             row[column + c] = autopilot.command[c]
-    if autopilot.commanded[SPEED]:
-        row[column + autopilot.command.size] = autopilot.held
+    if autopilot.is_commanded[SPEED]:
+        row[column + autopilot.command.size] = autopilot.airspeed_to_fly
 
 
 @apart
@@ -509,8 +509,10 @@ def fly_profile(frame, commanded):
         unexplained /= prediction.G[PITCH, elevator]  # rad of the elevator
     steer(autopilot, control, prediction.u, frame.measured, unexplained, frame.t)
     if autopilot.sets_power:
-        engines.follow_autopilot(control.power, autopilot.setting, autopilot.power_airspeed)
-    judge(autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t)
+        engines.follow_autopilot(control.power, autopilot.power_setting, autopilot.power_airspeed)
+    record_deviations(
+        autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t
+    )
     for i in range(3):
         commanded[i] += autopilot.rates[i]
 

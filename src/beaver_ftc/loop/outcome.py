@@ -304,19 +304,22 @@ def _by_channel(frame: np.void, off: str) -> dict[str, float | None] | None:
     autopilot = frame["autopilot"]
     if not autopilot["enabled"]:
         return None
-    flown = zip(CHANNELS, autopilot["commanded"], autopilot[off], strict=True)
+    flown = zip(CHANNELS, autopilot["is_commanded"], autopilot[off], strict=True)
     return {name: float(away) if commanded else None for name, commanded, away in flown}
 
 
 def _profile(frame: np.void) -> dict[str, float | None] | None:
     """Largest deviation from the commanded profile, by channel; None where there is none, and of angles that
     had no time to settle."""
-    off, autopilot = _by_channel(frame, "worst"), frame["autopilot"]
+    off, autopilot = _by_channel(frame, "largest_deviation"), frame["autopilot"]
     if off is None:
         return None
     judged = {name: None if away == NOT_JUDGED else away for name, away in off.items()}
-    of_speed = {LIMITED: autopilot["held_worst"], AT_ONE_INSTANT: autopilot["largest_off"]}
-    flown = autopilot["commanded"][SPEED]
+    of_speed = {
+        LIMITED: autopilot["largest_deviation_from_airspeed_to_fly"],
+        AT_ONE_INSTANT: autopilot["largest_instant_airspeed_deviation"],
+    }
+    flown = autopilot["is_commanded"][SPEED]
     return judged | {name: float(off) if flown else None for name, off in of_speed.items()}
 
 
@@ -327,7 +330,7 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
         return ()
     holding, main = frame["autopilot"]["holding"], frame["control"]["layout"]["main"]
     effectiveness = frame["control"]["surfaces"]["output"]["effectiveness"]
-    pitch = f"{surfaces[main[PITCH]]} acts as at {degrees(holding['acting']):.1f} deg"
+    pitch = f"{surfaces[main[PITCH]]} acts as at {degrees(holding['mean_acting_elevator']):.1f} deg"
     lateral = min((main[ROLL], main[YAW]), key=lambda s: float(effectiveness[s]))
     left = f"{100 * effectiveness[lateral]:.0f} % of the {surfaces[lateral]} left"
     kinds = (
@@ -491,7 +494,7 @@ def landing_of(
         probing_s=_probing_s(frame),
         engine_power=_engine_power(frame),
         profile=_profile(frame),
-        arrival=_by_channel(frame, "mean_off"),
+        arrival=_by_channel(frame, "mean_deviation"),
         limits=_limits(frame, surfaces),
         changes=replaced,
         withdrawn=_withdrawn(fdi, surfaces),

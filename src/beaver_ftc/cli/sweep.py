@@ -100,7 +100,7 @@ def command(arguments: Arguments) -> None:
 
 
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
-    """How likely an expectation is not met: a number and its interval."""
+    """Estimate the probability that an expectation is not met, with its interval."""
     from beaver_ftc.cli import told
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.sweep.rare import as_text, run_rare

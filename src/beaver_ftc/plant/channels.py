@@ -75,7 +75,7 @@ POS = len(FIXED)
 
 @lru_cache(maxsize=32)
 def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
-    """What is read from the truth of an aircraft, in order."""
+    """Channels that are read from the truth of an aircraft, in order."""
     return (
         *FIXED,
         *((f"{s}_pos_rad", of.position, 1.0) for s, of in aircraft.surface.items()),
@@ -107,7 +107,7 @@ def further_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
 
 
 def most_channels(n: int) -> int:
-    """Room for the truth of any aircraft with n surfaces."""
+    """Largest number of channels of the truth of an aircraft with n surfaces."""
     return POS + 3 * n + MAX_SIGNALS + N_FURTHER
 
 

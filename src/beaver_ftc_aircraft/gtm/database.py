@@ -68,7 +68,7 @@ def read(path: Path) -> Database:
 
 
 class _Wrong(ValueError):
-    """What of the file is not as it must be."""
+    """A part of the file has not the required form."""
 
 
 def _refused(path: Path, says: str) -> BadInput:
@@ -98,7 +98,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _at(content: dict[str, Any], where: str) -> Any:
-    """What is at a name with dots in it."""
+    """Return the entry at a dotted name."""
     first, *others = where.split(".")
     try:
         return reduce(getattr, others, content[first])

@@ -44,7 +44,7 @@ class Mavlink:
         self._mav.robust_parsing = True
 
     def pack(self, message: Message) -> bytes:
-        """A message as bytes."""
+        """Return a MAVLink message as bytes."""
         return bytes(message.pack(self._mav))
 
     def unpack(self, data: bytes) -> list[Message]:
@@ -55,7 +55,7 @@ class Mavlink:
         return sound
 
     def texts(self, said: Iterable[Text]) -> bytes:
-        """STATUSTEXT messages, several to a text that is too long for one."""
+        """Return STATUSTEXT messages; a text that is too long for one message is split."""
         packed = b""
         for _, severity, text in said:
             given = text.encode("ascii", "replace")
@@ -88,7 +88,7 @@ class GroundLine:
         self._beat_s = -HEARTBEAT_S
 
     def fileno(self) -> int:
-        """To wait for it."""
+        """The file descriptor of the socket, for `select`."""
         return self._socket.fileno()
 
     def say(self, said: Iterable[Text]) -> None:
@@ -126,5 +126,5 @@ class GroundLine:
             return
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the socket."""
         self._socket.close()

@@ -48,7 +48,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 @kernel
 def missed(memory, reference, i, x):
-    """Error of axis i, rad/s; its integral stands still while a surface is at its stop."""
+    """Tracking error of axis i, rad/s. Its integral is held while a surface is at its stop."""
     error = reference.output.model_rate[i] - x[i]
     if not memory.saturated:
         memory.integral[i] += reference.config.dt * error

@@ -25,7 +25,7 @@ KEPT = "; what has been flown is kept, go on with --resume"
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that after any crash it is there with all of its content, or as it was before."""
+    """Write a file atomically: after a crash it has its new content or its old content."""
     replace_whole(path, lambda file: file.write(content))
 
 
@@ -45,7 +45,7 @@ def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove what a process that was killed had half written."""
+    """Remove incomplete files that a killed process has left."""
     for partial in folder.rglob(".*.partial"):
         partial.unlink(missing_ok=True)
 
@@ -103,7 +103,7 @@ class Parts:
         self.folder, self._codec, self._kept = folder, codec, kept
 
     def __bool__(self) -> bool:
-        """Whether anything has landed."""
+        """Whether the folder has at least one batch."""
         return self.folder.is_dir() and any(self.folder.glob(f"*{self._codec.suffix}"))
 
     def land(self, batch: int | str, rows: Any) -> None:

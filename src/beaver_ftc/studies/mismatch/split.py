@@ -54,7 +54,7 @@ class Stretch:
 
     @property
     def unexplained(self) -> np.ndarray:
-        """What no source accounts for, (n, 3) rad/s2."""
+        """The part of the mismatch that no source explains, (n, 3) rad/s2."""
         return self.total - sum(self.contributions[name] for name in SOURCES)
 
     @property
@@ -161,7 +161,7 @@ class Tally:
         return kept
 
     def add(self, stretch: Stretch) -> None:
-        """Take in a stretch."""
+        """Add the frames of a stretch to the tally."""
         self.frames += stretch.t_s.size
         for name, values in stretch.named.items():
             self.figures.setdefault(name, Figures()).add(values, stretch.eta_bar)

@@ -15,7 +15,7 @@ LEAST = 1e-3  # what is smaller is said to be so: nobody reads 2.29e-07 deg/s
 
 
 def finite(value: Any) -> Any:
-    """A value for a document: what never happens, or is not known, is null."""
+    """Return a value for a JSON document: None for an infinite or missing number."""
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
@@ -35,12 +35,12 @@ def _digits(value: float, digits: int) -> str:
 
 
 def seconds(value: float | None, none: str = "never") -> str:
-    """A time in s, or what to say where there is none."""
+    """Return a time, s, as text; `none` if there is no time."""
     return none if value is None else f"{value:.2f} s"
 
 
 def aligned(rows: Rows) -> str:
-    """Rows of cells as lines, in columns."""
+    """Return rows of cells as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)

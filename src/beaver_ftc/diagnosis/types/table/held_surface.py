@@ -311,13 +311,13 @@ def propagate_returns(config, surface, type_index):
 
 @kernel
 def travel_range(surface):
-    """It may be anywhere in its travel, rad."""
+    """Return the whole travel of the surface as its possible interval, rad."""
     return surface.actuator.travel_low, surface.actuator.travel_high
 
 
 @kernel
 def reset_stuck_memory(surface, type_index):
-    """It may be anywhere in its travel."""
+    """Set the possible jammed positions to the whole travel of the surface."""
     surface.stuck.feasible_low_before_release[:], surface.stuck.feasible_high_before_release[:] = (
         travel_range(surface)
     )
@@ -341,7 +341,7 @@ def consistent_stuck_interval(config, surface, type_index, k):
 
 @kernel
 def add_stuck_release(config, surface, type_index, k):
-    """It may be released where it is jammed."""
+    """Add a release from the interval of the jammed position."""
     promote_sets_before_release(surface, type_index)
     low, high, _ = position_at_frame_start(config, surface, k)
     add_release(
@@ -402,7 +402,7 @@ def consistent_float_interval(config, surface, type_index, k):
 
 @kernel
 def add_float_release(config, surface, type_index, k):
-    """It may be released at neutral."""
+    """Add a release from the neutral position."""
     low, high, _ = position_at_frame_start(config, surface, k)
     neutral = limit_to_travel(surface, 0.0)
     add_release(surface, type_index, max(low, neutral), min(high, neutral))
@@ -428,13 +428,13 @@ def neutral_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | Non
 
 @kernel
 def stuck_deflection_error(surface, type_index):
-    """Off its command, rad, by the middle of where it can be jammed."""
+    """Middle of the interval of the jammed position minus the command, rad."""
     return feasible_set_midpoint(surface, type_index) - surface.last_observation.healthy_position
 
 
 @kernel
 def float_deflection_error(surface, type_index):
-    """Off its command, rad: at neutral."""
+    """Neutral position minus the command, rad."""
     return limit_to_travel(surface, 0.0) - surface.last_observation.healthy_position
 
 
@@ -504,7 +504,7 @@ def max_runaway_down_deflection(config, surface, k):
 
 @kernel
 def consistent_hardover_up_interval(config, surface, type_index, k):
-    """It is beyond where its least rate takes it, or at the stop."""
+    """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
     return held_or_returning_set(
         config,
         surface,

@@ -319,3 +319,17 @@ def test_only_a_first_round_of_which_no_flight_could_be_flown_ends_it(
         return
     assert run_rare(biased, EXPECTATION, tmp_path, tell=told.append)["failed"] == 1
     assert [line.partition(": ")[2] for line in told] == ["2 flights, level 0", "1 flights, level 0"]
+
+
+def test_the_design_point_is_the_nearest_event_by_the_number_of_its_flight():
+    """Of three rounds of three flights: the nearest to the middle of those whose score is not below zero."""
+    chains = Chains(2, 1)
+    rounds = [
+        ([[0.1, 0.0], [3.0, 4.0], [5.0, 6.0]], [-0.1, 0.0, 2.0], (5.0, 1, [3.0, 4.0])),
+        ([[3.0, 4.1], [0.0, 0.2], [4.0, -0.5]], [1.0, -0.2, 0.0], (16.25**0.5, 5, [4.0, -0.5])),
+        ([[5.0, 5.0], [4.0, 0.5], [0.0, 0.0]], [1.0, 1.0, -3.0], (16.25**0.5, 5, [4.0, -0.5])),
+    ]
+    for points, scores, (distance, flight, point) in rounds:
+        chains._flown(lambda number, flat, scores=scores: np.array(scores), np.array(points))
+        assert chains.design[:2] == pytest.approx((distance, flight))
+        assert chains.design[2].tolist() == point

@@ -190,7 +190,7 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
     )
     if scheme.advance_to_frame is adaptive_estimators.advance_to_frame:
         faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["isolation_variant"]]
-        yield from (faults.begin, faults.observe, faults.isolate)
+        yield from (faults.begin, faults.record_commands, faults.isolate)
         if fdi["statistical"]["test_config"]["enabled"]:
             yield from (
                 adaptive_estimators.update_statistical_tests,

@@ -34,7 +34,7 @@ from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
 from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
-from beaver_ftc.results.exports import RECORDINGS
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
@@ -157,7 +157,7 @@ def recorded(document: Document, kind: str, folder: Path) -> Log:
     scenario = bf.load(document)
     run(scenario, folder, report=False, recording=kind)
     place = folder / scenario.name
-    return Log(scenario, place, place / RECORDINGS[kind])
+    return Log(scenario, place, place / RECORDING_FILE_OF_KIND[kind])
 
 
 Said = tuple[DiagnosisRows, str | None]
@@ -312,7 +312,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--flights", type=int, default=1, help="of each law, airspeed, surface and fault")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--as", dest="kind", choices=sorted(RECORDINGS), default="table")
+    parser.add_argument("--as", dest="kind", choices=sorted(RECORDING_FILE_OF_KIND), default="table")
     parser.add_argument("--aircraft", default="beaver")
     parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
     parser.add_argument("--type", choices=TYPES, default=LOSS)

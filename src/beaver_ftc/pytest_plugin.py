@@ -216,9 +216,8 @@ class ExpectationItem(pytest.Item):
         for expectation in flown.expectations:
             if expectation.name == self.name and not expectation.passed:
                 why = f"; {expectation.reason}" if expectation.reason else ""
-                raise ExpectationMissed(
-                    f"{self.name}: {expectation.both_values}{why}\nkept: {flown.folder} (see report.html)"
-                )
+                missed = f"{self.name}: {expectation.expected_and_actual_text}{why}"
+                raise ExpectationMissed(f"{missed}\nkept: {flown.folder} (see report.html)")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """What was missed, without a traceback through the testbed."""

@@ -12,7 +12,7 @@ from synthetic import FDI, Expect, Fault, Flight, Scenario
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import report, verdict
-from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_recording
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog, unit_of, units
@@ -168,10 +168,10 @@ def _written(path, frames=FRAMES, hz=HZ, group=4):
     return path
 
 
-@pytest.mark.parametrize("kind", RECORDINGS)
+@pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)
 def test_a_recording_and_its_vehicle_file(kind, tmp_path, changed):
     write_recording(_written(tmp_path / "log.parquet"), TRAVEL_RAD, kind, tmp_path)
-    content = (tmp_path / RECORDINGS[kind]).read_bytes()
+    content = (tmp_path / RECORDING_FILE_OF_KIND[kind]).read_bytes()
     said = content.decode().splitlines() if kind == "table" else base64.b64encode(content).decode()
     assert not changed({"file": said, "vehicle": (tmp_path / "vehicle.yaml").read_text().splitlines()})
 

@@ -17,7 +17,7 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results import log, writer
 from beaver_ftc.results.flight import Flight as Opened
-from beaver_ftc.results.log import Columns, MemoryLog, ParquetLog, log_frame
+from beaver_ftc.results.log import Columns, MemoryLog, ParquetLog, log_dataframe
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.writer import refuse_foreign, result_folder
 from beaver_ftc.scenario.schema import Scenario
@@ -132,7 +132,7 @@ def test_a_table_is_the_same_from_memory_and_from_the_disk(tmp_path, changed):
     stored = log.StoredLog(tmp_path / "log.parquet")
     stored.copy_to(tmp_path / "copy.parquet")
     assert (tmp_path / "copy.parquet").read_bytes() == (tmp_path / "log.parquet").read_bytes()
-    tables = [log_frame(each, found) for each in (memory, stored)]
+    tables = [log_dataframe(each, found) for each in (memory, stored)]
     assert tables[0].equals(tables[1])
     assert tables[0].attrs == tables[1].attrs
     assert not changed(tables[0].attrs)

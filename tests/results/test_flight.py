@@ -128,7 +128,7 @@ def test_lists_within_lists_are_frozen_and_numbers_by_axis_have_names():
     rates, exit = {"p": 0.1, "q": 0.2, "r": 0.3}, {"start_s": 1.0, "end_s": 2.0}
     found = model.Metrics.of({"tracking": {"pre_fault_rms_deg_s": rates}, "envelope_exits": [exit]})
     assert found.tracking.pre_fault_rms_deg_s == model.Rates(p=0.1, q=0.2, r=0.3)
-    assert found.envelope_exits == (model.Exit(1.0, 2.0),)
+    assert found.envelope_exits == (model.EnvelopeExit(1.0, 2.0),)
     assert found.tracking.post_fault_rms_deg_s is None
     assert found.supervisor == ()
 
@@ -142,7 +142,7 @@ def test_the_document_of_a_flight_is_its_records_and_back(flight):
     ended = {**changed, "detection_time_s": None, "isolated": None}
     alarmed = {**changed, "detection_time_s": 0.5, "isolated": None, "false_alarm": True}
     for document in (changed, ended, alarmed):
-        assert model.Change.of(document).document() == document
+        assert model.ChangeInFlight.of(document).document() == document
     sensor = {"actuator": None, "sensor": "q", "type": "bias", "at_s": 1.0}
     assert model.Fault.of(sensor).document() == sensor
     assert list(model.Fault.of(sensor).document()) == list(sensor)

@@ -86,7 +86,7 @@ def test_a_replayed_alarm_is_as_late_as_a_flown_one():
 
 def test_a_truth_without_frames_begins_when_it_is_said_to():
     onset = Onset(4.995)
-    assert onset.begins_s == 4.995
+    assert onset.first_frame_with_fault_s == 4.995
     assert onset.delay_s(5.0) == pytest.approx(0.005)
     assert onset.is_false(np.array([4.9, 4.995, 5.0])).tolist() == [True, False, False]
     healthy = Onset(None)

@@ -12,7 +12,7 @@ from synthetic import COLUMNS, Expect, Flight, Scenario, rows
 
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import as_json, metrics
-from beaver_ftc.results.report import _verdict_words, render, script_style_and_data, write_report
+from beaver_ftc.results.report import _verdict_entry, render, script_style_and_data, write_report
 
 NASTY = "</script><script>throw 1</script> <b>&amp;"
 
@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
 
 
 def test_a_scenario_without_a_description_has_none():
-    assert _verdict_words(metrics(Flight()), "name: a\n")["description"] == ""
+    assert _verdict_entry(metrics(Flight()), "name: a\n")["description"] == ""
 
 
 def test_report_needs_nothing_but_itself(folder):

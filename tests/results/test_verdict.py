@@ -3,7 +3,7 @@
 import pytest
 
 from beaver_ftc.results import verdict
-from beaver_ftc.results.model import Certified, Change, DeclaredFault, Metrics
+from beaver_ftc.results.model import CertificateCounts, ChangeInFlight, DeclaredFault, Metrics
 from beaver_ftc.results.verdict import expectations_in_words
 from beaver_ftc.scenario.schema import Expect
 
@@ -219,12 +219,14 @@ def test_a_probing_in_words():
 
 def test_a_change_in_flight_is_said_with_what_the_diagnosis_before_it_found():
     change = {"law": "adaptive", "scheme": None, "sensors": {}, "time_s": 6.0}
-    assert verdict._change_text(Change.of(change)) == "law adaptive at 6.00 s"
-    assert verdict._change_text(Change.of({**change, "law": None})) == "declared sensors at 6.00 s"
+    assert verdict._change_text(ChangeInFlight.of(change)) == "law adaptive at 6.00 s"
+    assert verdict._change_text(ChangeInFlight.of({**change, "law": None})) == "declared sensors at 6.00 s"
     found = {"sensors": {"p": 1}, "detection_time_s": 2.5, "isolated": None, "false_alarm": False}
-    said = verdict._change_text(Change.of({**change, **found}))
+    said = verdict._change_text(ChangeInFlight.of({**change, **found}))
     assert said == "law adaptive, sensors at 6.00 s; the diagnosis before: alarm at 2.50 s, not isolated"
-    said = verdict._change_text(Change.of({**change, **found, "isolated": "rudder", "false_alarm": True}))
+    said = verdict._change_text(
+        ChangeInFlight.of({**change, **found, "isolated": "rudder", "false_alarm": True})
+    )
     assert said.endswith("the diagnosis before: FALSE ALARM at 2.50 s, rudder")
 
 
@@ -380,7 +382,7 @@ def test_the_rest_of_a_flight_in_words(changes, what, said):
     ],
 )
 def test_a_certificate_is_counted_with_the_command_that_checks_it(statements, without, said):
-    assert verdict._certificate_text(Certified(statements, without), "runs/x") == said
+    assert verdict._certificate_text(CertificateCounts(statements, without), "runs/x") == said
 
 
 @pytest.mark.parametrize(

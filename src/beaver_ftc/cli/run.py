@@ -181,7 +181,7 @@ def _certificate(folder: Path) -> Document:
     """How much of the flight its certificate states."""
     import json
 
-    from beaver_ftc.results.writer import CERTIFICATE
+    from beaver_ftc.results.writer import CERTIFICATE_FILE
 
-    written = json.loads((folder / CERTIFICATE).read_text(encoding="utf-8"))
+    written = json.loads((folder / CERTIFICATE_FILE).read_text(encoding="utf-8"))
     return {"certificate": {name: len(written[name]) for name in ("statements", "without")}}

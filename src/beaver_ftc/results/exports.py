@@ -36,7 +36,7 @@ ValuesByColumn = dict[str, NDArray[np.float64]]
 ColumnsByTopic = dict[str, ValuesByColumn]
 """Fields of each message; every message has the stamps `t_s`."""
 
-RECORDINGS = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
+RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
 _RATE_AXES, _ANGLE_OF_ARDUPILOT_FIELD = ("p", "q", "r"), {"Roll": "phi", "Pitch": "theta", "Yaw": "psi"}
 _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
@@ -124,7 +124,7 @@ def _acmi_properties(row: dict[str, float], full_flap_rad: float | None) -> str:
 def write_recording(
     log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path, signals: Sequence[str] = ()
 ) -> None:
-    """Write a flight's log as `kind` (of RECORDINGS) with its vehicle.yaml into a folder.
+    """Write a flight's log as `kind` (of RECORDING_FILE_OF_KIND) with its vehicle.yaml into a folder.
 
     travel_rad: the farther stop of each surface. signals: what the aircraft measures beside rates and flow.
     """
@@ -139,7 +139,7 @@ def write_recording(
     for topic, fields in _further_topics(known, further, kind).items():
         topics[topic] = topics.get(topic, {}) | fields
     t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
-    write(folder / RECORDINGS[kind], t_us, topics)
+    write(folder / RECORDING_FILE_OF_KIND[kind], t_us, topics)
     flow = _recorded_name_of_flow_column(further, kind)
     felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
     text = _vehicle_file_text(topics, travel_rad, kind) + f"signals: [{felt}]\n"

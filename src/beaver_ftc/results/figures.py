@@ -194,11 +194,11 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     return figure, grid
 
 
-def _panel_height_inches(panel: Panel, across: int) -> float:
+def _panel_height_inches(panel: Panel, n_panel_columns: int) -> float:
     """Height of a panel's axes in inches."""
     if panel.value_names or panel.bars:
         return 0.25 + 0.25 * len(panel.value_names or panel.rows)
-    return 1.75 if across == 1 else 1.5
+    return 1.75 if n_panel_columns == 1 else 1.5
 
 
 def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks: Sequence[Mark]) -> None:
@@ -221,7 +221,7 @@ def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks
         axes.set_ylim(-0.4, len(panel.value_names) - 0.6)
     elif panel.limits:
         axes.set_ylim(*panel.limits)
-    elif panel.clipped:
+    elif panel.clips_spikes:
         _limit_axis_to_quantiles(axes, panel, series)
     if panel.log_scale:
         axes.set_yscale("log")
@@ -239,7 +239,7 @@ def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bo
         color=look.colour,
         linestyle=_linestyle(look.dash),
         linewidth=look.width,
-        zorder=look.above,
+        zorder=look.z_order,
         drawstyle="steps-post" if stepped else "default",
         label=trace.label or "_",
     )

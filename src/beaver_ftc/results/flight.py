@@ -73,9 +73,9 @@ class Flight:
 
         Raises BadInput for a flight that kept none.
         """
-        from beaver_ftc.results.log import log_frame
+        from beaver_ftc.results.log import log_dataframe
 
-        return log_frame(self._log_or_raise(), self._typed_metrics)
+        return log_dataframe(self._log_or_raise(), self._typed_metrics)
 
     @property
     def name(self) -> str:

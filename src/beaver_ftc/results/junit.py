@@ -49,7 +49,9 @@ def _seconds_text(took_s: float) -> str:
 def _expectation_case(name: str, expectation: Expectation) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname=name, name=expectation.name)
     if not expectation.passed:
-        says = expectation.both_values + (f": {expectation.reason}" if expectation.reason else "")
+        says = expectation.expected_and_actual_text + (
+            f": {expectation.reason}" if expectation.reason else ""
+        )
         ElementTree.SubElement(case, "failure", message=_xml_safe_text(says), type="ExpectationMissed")
     return case
 

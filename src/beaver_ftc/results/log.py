@@ -306,7 +306,7 @@ def unit_of(column: str) -> str:
     )
 
 
-def log_frame(log: "Log", found: Metrics) -> "DataFrame":
+def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
     """The log as a DataFrame, float64, with scenario, seed, verdict and units in `attrs`."""
     from pandas import DataFrame
 

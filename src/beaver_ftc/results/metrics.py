@@ -66,7 +66,7 @@ class Onset:
     rate_hz: float | None = None
 
     @property
-    def begins_s(self) -> float:
+    def first_frame_with_fault_s(self) -> float:
         """Time of the first frame with the fault; infinite where nothing breaks."""
         if self.at_s is None:
             return inf
@@ -80,7 +80,7 @@ class Onset:
         """From the fault's first frame to an event; None without one, or if it came before the fault."""
         if time_s is None or self.is_false(time_s):
             return None
-        return round(max(time_s - self.begins_s, 0.0), _TIME_DECIMALS)
+        return round(max(time_s - self.first_frame_with_fault_s, 0.0), _TIME_DECIMALS)
 
 
 def strikes_within(at_s: Any, flown_s: Any) -> Any:
@@ -352,16 +352,18 @@ def _metrics_before_expectations(flight: "Landing", truth: Truth) -> Metrics:
         ),
         changes=tuple(_change_record(change, truth) for change in flight.changes),
         mode_changes_left_out=flight.mode_changes - len(flight.supervisor),
-        envelope_exits=tuple(model.Exit(*map(_rounded_known_number, exit)) for exit in flight.envelope_exits),
-        envelope=model.Envelope(
+        envelope_exits=tuple(
+            model.EnvelopeExit(*map(_rounded_known_number, exit)) for exit in flight.envelope_exits
+        ),
+        envelope=model.EnvelopeExitTotals(
             flight.exits, _rounded_known_number(flight.outside_s), flight.exits - len(flight.envelope_exits)
         ),
         departure=_departure_record(flight),
         authority=_record_of_mapping(model.Authority, flight.authority),
-        engine_power=_record_of_mapping(model.EnginePower, flight.engine_power),
-        profile=_record_of_mapping(model.Profile, _profile_deviations_in_deg(flight.profile)),
+        engine_power=_record_of_mapping(model.EnginePowerUse, flight.engine_power),
+        profile=_record_of_mapping(model.ProfileDeviations, _profile_deviations_in_deg(flight.profile)),
         arrival=_arrival_record(flight),
-        limits=tuple(model.Limit.of(_with_rounded_numbers(limit)) for limit in flight.limits),
+        limits=tuple(model.ProtectionLimit.of(_with_rounded_numbers(limit)) for limit in flight.limits),
         saturation_s=_with_rounded_numbers(flight.saturation_s),
         hints=(),
         expectations=(),
@@ -505,12 +507,12 @@ def _profile_deviations_in_deg(off: dict[str, float | None] | None) -> Document 
     return {name: None if away is None else in_deg.get(name, float)(away) for name, away in off.items()}
 
 
-def _arrival_record(flight: "Landing") -> model.Arrival | None:
+def _arrival_record(flight: "Landing") -> model.ArrivalDeviations | None:
     """Where a flight along a profile has come to; null without an autopilot, or if the aircraft is lost."""
     off = _profile_deviations_in_deg(flight.arrival)
     if off is None or flight.departure is not None:
         return None
-    return _record_of_mapping(model.Arrival, {**off, "in_envelope": not flight.outside_at_end})
+    return _record_of_mapping(model.ArrivalDeviations, {**off, "in_envelope": not flight.outside_at_end})
 
 
 def _departure_record(flight: "Landing") -> model.Departure | None:
@@ -532,9 +534,9 @@ def fault_free_s(flight: "Landing") -> float:
     return min([flight.frames / flight.scenario.rate_hz, *_alarm_times_s(flight), *faults])
 
 
-def _change_record(change: Document, truth: Truth) -> model.Change:
+def _change_record(change: Document, truth: Truth) -> model.ChangeInFlight:
     """A change in flight, with what to think of the alarm of the diagnosis that it ended."""
-    made, alarm_s = model.Change.of(_with_rounded_numbers(change)), change.get("detection_time_s")
+    made, alarm_s = model.ChangeInFlight.of(_with_rounded_numbers(change)), change.get("detection_time_s")
     return made if alarm_s is None else replace(made, false_alarm=truth.onset.is_false(alarm_s))
 
 
@@ -576,9 +578,9 @@ def _rounded_number_or_none(value: float | None) -> float | None:
     return round(float(value), 9)
 
 
-def _condition_record(flight: "Landing") -> model.Condition:
+def _condition_record(flight: "Landing") -> model.FlightCondition:
     scenario = flight.scenario
-    return model.Condition(
+    return model.FlightCondition(
         airspeed_mps=scenario.initial.airspeed_mps,
         altitude_m=scenario.initial.altitude_m,
         rate_hz=scenario.rate_hz,
@@ -589,7 +591,7 @@ def _condition_record(flight: "Landing") -> model.Condition:
     )
 
 
-def hints(flight: "Landing", found: Metrics) -> list[str]:
+def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
     """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (
@@ -598,15 +600,15 @@ def hints(flight: "Landing", found: Metrics) -> list[str]:
         else ()
     )
     said = [
-        *(says(scenario, found) for says in of_diagnosis),
+        *(says(scenario, flight_metrics) for says in of_diagnosis),
         _hint_residual_near_threshold(flight),
-        _hint_late_reallocation(found),
+        _hint_late_reallocation(flight_metrics),
     ]
     said.append(_hint_drift(flight))
     return [sentence for sentence in said if sentence]
 
 
-def _hint_outside_fault_class(scenario: "Scenario", found: Metrics) -> str:
+def _hint_outside_fault_class(scenario: "Scenario", flight_metrics: Metrics) -> str:
     on_surfaces = [(getattr(fault, "actuator", None), fault.type) for fault in scenario.faults]
     strange = [
         f"{surface} {kind.replace('_', ' ')}"
@@ -623,12 +625,12 @@ def _hint_outside_fault_class(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _hint_several_faults(scenario: "Scenario", found: Metrics) -> str:
+def _hint_several_faults(scenario: "Scenario", flight_metrics: Metrics) -> str:
     return "" if scenario.fdi.pairs else of_several(scenario)
 
 
-def _hint_fault_too_small(scenario: "Scenario", found: Metrics) -> str:
-    detection = found.detection
+def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
+    detection = flight_metrics.detection
     if not scenario.faults or detection.detected or detection.guaranteed_delay_s is not None:
         return ""
     if detection.inconclusive:  # which has a line of its own
@@ -639,9 +641,9 @@ def _hint_fault_too_small(scenario: "Scenario", found: Metrics) -> str:
     )
 
 
-def _hint_alarm_in_one_frame(scenario: "Scenario", found: Metrics) -> str:
+def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
     """The shortest delay that there is: it says nothing of a flight in which something is uncertain."""
-    delay_s, frame_s = found.detection.delay_s, 1.0 / scenario.rate_hz
+    delay_s, frame_s = flight_metrics.detection.delay_s, 1.0 / scenario.rate_hz
     if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S or not _has_no_errors(scenario):
         return ""
     return (
@@ -669,12 +671,12 @@ def _hint_residual_near_threshold(flight: "Landing") -> str:
     )
 
 
-def _hint_late_reallocation(found: Metrics) -> str:
+def _hint_late_reallocation(flight_metrics: Metrics) -> str:
     """Why the law goes on with a surface that has been named long since: another takes over only where it is
     weak or stuck, which the name alone does not say. Nothing of several faults: which of them another surface
     took over is not known here."""
-    isolation = found.isolation
-    taken_s = [change.time_s for change in found.supervisor if change.mode == TAKEN_OVER]
+    isolation = flight_metrics.isolation
+    taken_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
     if not taken_s or isolation.time_s is None or taken_s[0] - isolation.time_s < LONG_S:
         return ""
     if isolation.faults:

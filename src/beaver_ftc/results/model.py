@@ -96,7 +96,7 @@ def _as_json_value(value: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Condition(Part):
+class FlightCondition(Part):
     """The flight condition, and who diagnosed and controlled."""
 
     airspeed_mps: float
@@ -303,7 +303,7 @@ class ModeChange(Part):
 
 
 @dataclass(frozen=True)
-class Change(Part):
+class ChangeInFlight(Part):
     """What was changed in flight; of a diagnosis that ended with it its alarm and the name it gave."""
 
     time_s: float
@@ -328,7 +328,7 @@ class Change(Part):
 
 
 @dataclass(frozen=True)
-class Exit(Part):
+class EnvelopeExit(Part):
     """A spell outside the validated envelope."""
 
     start_s: float
@@ -336,7 +336,7 @@ class Exit(Part):
 
 
 @dataclass(frozen=True)
-class Envelope(Part):
+class EnvelopeExitTotals(Part):
     """All spells outside together; exits_left_out: how many are not listed."""
 
     exits: int
@@ -381,7 +381,7 @@ class Authority(Part):
 
 
 @dataclass(frozen=True)
-class EnginePower(Part):
+class EnginePowerUse(Part):
     """Since when and for how long pitch was left to the engine, and the manifold pressures, inHg."""
 
     from_s: float
@@ -391,7 +391,7 @@ class EnginePower(Part):
 
 
 @dataclass(frozen=True)
-class Profile(Part):
+class ProfileDeviations(Part):
     """Largest deviation from the commanded profile, by channel; None where it is not flown. Those of the
     airspeed are of a mean over 10 s, the last excepted. limited: from the commanded airspeed as far as it can
     be held."""
@@ -405,7 +405,7 @@ class Profile(Part):
 
 
 @dataclass(frozen=True)
-class Arrival(Part):
+class ArrivalDeviations(Part):
     """The mean deviation at the end, with its sign; and whether the flight ends in the envelope."""
 
     altitude_m: float | None
@@ -416,7 +416,7 @@ class Arrival(Part):
 
 
 @dataclass(frozen=True)
-class Limit(Part):
+class ProtectionLimit(Part):
     """A limit that envelope protection has put on the command."""
 
     time_s: float
@@ -444,7 +444,7 @@ class Expectation(Part):
     reason: str | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
     @property
-    def both_values(self) -> str:
+    def expected_and_actual_text(self) -> str:
         """What was expected and what came out, as tests and CI show them."""
         expected, actual = map(_as_json_value, (self.expected, self.actual))
         return f"expected {expected}, actual {actual}"
@@ -463,7 +463,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Certified(Part):
+class CertificateCounts(Part):
     """Of a certificate: statements that it proves, and alarms or exclusions without a proof."""
 
     statements: int
@@ -471,7 +471,7 @@ class Certified(Part):
 
 
 @dataclass(frozen=True)
-class Latency(Part):
+class LatencyMs(Part):
     """From a packet to its answer, ms."""
 
     median: float
@@ -480,7 +480,7 @@ class Latency(Part):
 
 
 @dataclass(frozen=True)
-class Interval(Part):
+class PacketIntervalMs(Part):
     """Between two packets, ms."""
 
     mean: float
@@ -506,8 +506,8 @@ class Link(Part):
     strangers: int
     off_rate: int
     silences: int
-    latency_ms: Latency
-    interval_ms: Interval
+    latency_ms: LatencyMs
+    interval_ms: PacketIntervalMs
     longest_silence_s: float
     diagnosed_from_s: float | None
     speed: float
@@ -523,7 +523,7 @@ class Metrics(Part):
     scenario: str
     seed: int
     frames: int
-    flight: Condition
+    flight: FlightCondition
     fault: Fault | None
     faults: tuple[DeclaredFault, ...]
     detection: Detection
@@ -532,16 +532,16 @@ class Metrics(Part):
     fault_free_s: float
     tracking: Tracking
     supervisor: tuple[ModeChange, ...]
-    changes: tuple[Change, ...]
+    changes: tuple[ChangeInFlight, ...]
     mode_changes_left_out: int
-    envelope_exits: tuple[Exit, ...]
-    envelope: Envelope
+    envelope_exits: tuple[EnvelopeExit, ...]
+    envelope: EnvelopeExitTotals
     departure: Departure | None
     authority: Authority | None
-    engine_power: EnginePower | None
-    profile: Profile | None
-    arrival: Arrival | None
-    limits: tuple[Limit, ...]
+    engine_power: EnginePowerUse | None
+    profile: ProfileDeviations | None
+    arrival: ArrivalDeviations | None
+    limits: tuple[ProtectionLimit, ...]
     saturation_s: dict[str, float]
     hints: tuple[str, ...]
     expectations: tuple[Expectation, ...]
@@ -549,7 +549,7 @@ class Metrics(Part):
     versions: dict[str, str]
     interrupted_s: float | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
     link: Link | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
-    certificate: Certified | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
+    certificate: CertificateCounts | None = field(default=None, metadata=_LEFT_OUT_IF_NONE, kw_only=True)
 
     @property
     def judged(self) -> Judged:

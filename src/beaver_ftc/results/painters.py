@@ -93,25 +93,25 @@ def _send_pictures(painter: Connection, pictures: "Sequence[Picture]") -> bool:
     return True
 
 
-def _draw_until_closed(there: Connection, not_ours: Sequence[Connection]) -> None:
+def _draw_until_closed(connection: Connection, other_ends: Sequence[Connection]) -> None:
     """Draw what is asked for until the other end is closed: by its process, or with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for each in not_ours:
+    for each in other_ends:
         each.close()
     from beaver_ftc.results.figures import figure_class
 
     figure_class()
     while True:
         try:
-            pictures = there.recv()
+            pictures = connection.recv()
         except (EOFError, OSError):
             return
         try:
             save_all(pictures)
-            there.send(None)
+            connection.send(None)
         except Exception as error:
-            there.send(error)
+            connection.send(error)
 
 
 def shares_of_equal_work(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":

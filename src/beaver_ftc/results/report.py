@@ -56,7 +56,7 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
     texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
     return template(_TEMPLATE_FOLDER / "report.html.j2").render(
-        runs=[_verdict_words(document, text) for document, text in zip(documents, texts, strict=True)],
+        runs=[_verdict_entry(document, text) for document, text in zip(documents, texts, strict=True)],
         names=names,
         modes=MODE_COLOURS,
         marks=(shown := list({m.name: m for each in documents for m in marks(Metrics.of(each))}.values())),
@@ -73,7 +73,7 @@ def register_section(section: ReportSection) -> None:
         _REGISTERED_SECTIONS.append(section)
 
 
-def _verdict_words(metrics: Document, scenario: str) -> Document:
+def _verdict_entry(metrics: Document, scenario: str) -> Document:
     import yaml
 
     found = Metrics.of(metrics)
@@ -196,7 +196,7 @@ def _panel_entry(panel: Panel) -> Document:
         "steps": panel.value_names or panel.rows,
         "bars": panel.bars,
         "during": panel.bars_during_column,
-        "clipped": panel.clipped,
+        "clipped": panel.clips_spikes,
         "shade": panel.shade_column,
         "shadeLabel": panel.shade_label,
         "shadeColour": SHADES.get(panel.shade_label, ""),

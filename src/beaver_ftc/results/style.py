@@ -23,7 +23,7 @@ class Look:
     colour: str
     dash: tuple[float, ...] = ()
     width: float = 1.4
-    above: int = 2
+    z_order: int = 2
 
 
 LOOKS = {

@@ -39,17 +39,18 @@ class FormulaError(ValueError):
 
 
 class Formula(NamedTuple):
-    """An operator with its parts; interval in s, None for all that is to come; what: a column or a number."""
+    """An operator with its parts; interval in s, None for all that is to come; column_or_number: name or
+    value of an operator `column` or `number`."""
 
     operator: str
     parts: tuple["Formula", ...] = ()
     interval: tuple[float, float] | None = None
-    what: str | float = ""
+    column_or_number: str | float = ""
 
     @property
     def columns(self) -> frozenset[str]:
         """The columns it is about."""
-        own = {str(self.what)} if self.operator == "column" else set()
+        own = {str(self.column_or_number)} if self.operator == "column" else set()
         return frozenset(own.union(*(part.columns for part in self.parts)))
 
     @property
@@ -132,7 +133,7 @@ class _Parser:
             return found
         if token == "-":
             return _formula_of_numbers(
-                "-", Formula("number", what=0.0), self._parse_operand(_BINDING_POWER["*"] - 1)
+                "-", Formula("number", column_or_number=0.0), self._parse_operand(_BINDING_POWER["*"] - 1)
             )
         if token == "abs":
             self._take_token("(")
@@ -145,10 +146,10 @@ class _Parser:
         if re.fullmatch(r"[\d.].*", token):
             if not isfinite(float(token)):
                 raise FormulaError(f"{token[:40]!r} is too large for a number")
-            return Formula("number", what=float(token))
+            return Formula("number", column_or_number=float(token))
         if not token or token in _RESERVED_WORDS or not re.fullmatch(r"[A-Za-z_].*", token):
             raise FormulaError(f"{token or 'the end'!r} where a column, a number or ( is due")
-        return Formula("column", what=token)
+        return Formula("column", column_or_number=token)
 
     def _parse_interval(self) -> tuple[float, float] | None:
         if self._next_token != "[":
@@ -213,7 +214,11 @@ def _robustness_by_frame(
     """What a formula is worth at each frame, (frames,)."""
     operator = formula.operator
     if operator in ("number", "column"):
-        return np.full(frames, formula.what) if operator == "number" else columns[str(formula.what)]
+        return (
+            np.full(frames, formula.column_or_number)
+            if operator == "number"
+            else columns[str(formula.column_or_number)]
+        )
     parts = [_robustness_by_frame(part, columns, rate_hz, frames) for part in formula.parts]
     if operator in _FRAMEWISE_FUNCTION_OF_OPERATOR:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

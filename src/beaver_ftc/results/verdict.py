@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.results.model import (
     AxisAuthority,
-    Certified,
-    Change,
+    CertificateCounts,
+    ChangeInFlight,
     DeclaredFault,
     Detection,
     Expectation,
     Fault,
     Isolation,
-    Limit,
     Metrics,
     Named,
+    ProtectionLimit,
     Withdrawn,
 )
 from beaver_ftc.scenario.declared import in_words
@@ -82,7 +82,7 @@ def _further_fault_texts(metrics: Metrics) -> list[str]:
     ]
 
 
-MAX_LISTED = 4  # places, or types: more are counted
+MAX_LISTED_CANDIDATES = 4  # places, or types: more are counted
 
 
 def _candidates_text(candidates: Sequence[str]) -> str:
@@ -117,7 +117,7 @@ _AIRCRAFT_PART_OF_SURFACE_WORD = {
 
 def _surfaces_text(names: Sequence[str]) -> str:
     """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
-    if len(names) <= MAX_LISTED:
+    if len(names) <= MAX_LISTED_CANDIDATES:
         return " or ".join(_without_underscores(name) for name in names)
     parts: dict[str, int] = {}
     for name in names:
@@ -154,14 +154,15 @@ def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
 class ExpectationInWords(NamedTuple):
     """An expectation compared with the flight.
 
-    limit: what is expected; actual: what the flight gave, empty where it adds nothing; share: actual / limit
+    limit: what is expected. actual: what the flight gave, empty if it adds nothing. share_of_limit: actual
+    over limit, None if the expectation is no limit.
     """
 
     name: str
     limit: str
     actual: str
     passed: bool
-    share: float | None
+    share_of_limit: float | None
 
     @property
     def sentence(self) -> str:
@@ -258,7 +259,7 @@ def _verdict_table(metrics: Metrics, folder: str) -> "Table":
     return table
 
 
-def _certificate_text(written: Certified, folder: str) -> str:
+def _certificate_text(written: CertificateCounts, folder: str) -> str:
     """How many alarms and exclusions are certified, and the command that checks them."""
     if not written.statements and not written.without:
         return "nothing to certify: no alarm"
@@ -266,7 +267,7 @@ def _certificate_text(written: Certified, folder: str) -> str:
     return f"{_count_and_noun(written.statements, 'statement')}{without}; check: beaver-ftc check {folder}"
 
 
-def _change_text(change: Change) -> str:
+def _change_text(change: ChangeInFlight) -> str:
     """What was changed in flight, and what a diagnosis that ended with it had found."""
     to = [f"{key} {name}" for key, name in (("law", change.law), ("scheme", change.scheme)) if name]
     said = f"{', '.join([*to, *(['sensors'] if change.sensors else [])]) or 'declared sensors'}"
@@ -321,7 +322,7 @@ def _profile_text(metrics: Metrics) -> str:
 _LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
 
 
-def _protection_limit_text(limit: Limit) -> str:
+def _protection_limit_text(limit: ProtectionLimit) -> str:
     """What envelope protection has limited, since when and why."""
     what = _LIMIT_FORMAT_OF_QUANTITY[limit.limits].format(limit.side, limit.value)
     until = "" if limit.in_force else ", no longer at the end"

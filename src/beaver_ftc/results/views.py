@@ -73,7 +73,7 @@ class Panel:
     shade_column: str = ""  # a 0/1 column: the panel is shaded while it is 1
     shade_label: str = ""
     line_at: float | None = None  # a value worth a line across
-    clipped: bool = (
+    clips_spikes: bool = (
         False  # spikes beyond the quantiles AXIS_QUANTILES do not set the axis; an arrow marks them
     )
     bars: bool = False  # a row for each label, with a bar while one of its traces is 0,
@@ -283,7 +283,7 @@ def _surfaces_view(names: Sequence[str]) -> View:
             ),
             shade_column=f"{surface}_saturated",
             shade_label="saturated",
-            clipped=True,
+            clips_spikes=True,
         )
         for place, surface in enumerate(names)
     )

@@ -32,7 +32,7 @@ try:
 except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-CERTIFICATE = "certificate.json"
+CERTIFICATE_FILE = "certificate.json"
 # What a run leaves; what else lies in a result folder is declared by the commands that write it.
 FILES_OF_A_RUN = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures", "aircraft",
@@ -86,7 +86,7 @@ def run(
             document = metrics(flight)
             (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
         if certificate:
-            with _note_failure_and_go_on(folder, CERTIFICATE, failed):
+            with _note_failure_and_go_on(folder, CERTIFICATE_FILE, failed):
                 certificate.write(folder)
         if report and document:
             with _note_failure_and_go_on(folder, "report.html", failed):

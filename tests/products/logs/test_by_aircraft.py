@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.exports import RECORDINGS, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import by_aircraft, stepped
 from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.recording import Column, RecordedFlight
@@ -38,7 +38,7 @@ def exported(folder, kind, to):
     travel = bf.aircraft("beaver").travel
     stops = {name: max(abs(one.min_rad), abs(one.max_rad)) for name, one in travel.items()}
     write_recording(folder / "log.parquet", stops, kind, to, ("dpt",))
-    return to / RECORDINGS[kind], load_vehicle(to / "vehicle.yaml")
+    return to / RECORDING_FILE_OF_KIND[kind], load_vehicle(to / "vehicle.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def only(recording, rows):
     return RecordedFlight(recording.name, columns)
 
 
-@pytest.mark.parametrize("kind", RECORDINGS)
+@pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)
 def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.results.exports import RECORDINGS, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from flying import SINES
 
@@ -43,13 +43,13 @@ def test_a_logs_alarm_and_exclusions_are_proved(name, faults, tmp_path, monkeypa
     folder = bf.fly(scenario).save(tmp_path, report=False)
     stops = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in bf.aircraft("beaver").travel.items()}
     write_recording(folder / "log.parquet", stops, "table", tmp_path, ("dpt",))
-    head, *rows = Path(RECORDINGS["table"]).read_text().splitlines(keepends=True)
+    head, *rows = Path(RECORDING_FILE_OF_KIND["table"]).read_text().splitlines(keepends=True)
     kept = [
         row for row in rows if not 1.1 < float(row.split(",")[0]) < 1.3
     ]  # the fault is in the second stretch
-    Path(RECORDINGS["table"]).write_text("".join([head, *kept]))
+    Path(RECORDING_FILE_OF_KIND["table"]).write_text("".join([head, *kept]))
     asked = ["--aircraft", "beaver", "--scenario", str(folder / "scenario.yaml"), "--certificate"]
-    done = CliRunner().invoke(app, ["diagnose", RECORDINGS["table"], *asked])
+    done = CliRunner().invoke(app, ["diagnose", RECORDING_FILE_OF_KIND["table"], *asked])
     assert done.exit_code == 0, done.output
     document, log, *refused = proved(tmp_path / "diagnoses" / "flight")
     assert refused == [[], []]

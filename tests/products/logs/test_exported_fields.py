@@ -12,7 +12,7 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.results.exports import RECORDINGS, write_acmi, write_csv, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_csv, write_recording
 from beaver_ftc.results.junit import write_junit
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
@@ -119,12 +119,12 @@ RECORDED = {
 }
 
 
-@pytest.mark.parametrize("kind", RECORDINGS)
+@pytest.mark.parametrize("kind", RECORDING_FILE_OF_KIND)
 def test_every_field_of_a_recording(path, columns, tmp_path, kind):
     pytest.importorskip("pyulog")
     pytest.importorskip("pymavlink")
     write_recording(path, TRAVEL_RAD, kind, tmp_path, ("dpt",))
-    found = read_flight(tmp_path / RECORDINGS[kind]).columns
+    found = read_flight(tmp_path / RECORDING_FILE_OF_KIND[kind]).columns
     assert found.keys() == RECORDED[kind].keys()
     for name, (column, factor) in RECORDED[kind].items():
         np.testing.assert_allclose(found[name].t_s, columns["t_s"], rtol=0, atol=0.6e-6, err_msg=name)

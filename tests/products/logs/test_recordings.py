@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.results.exports import RECORDINGS, write_recording
+from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs.recording import nearest_names
 from beaver_ftc_logs.samples import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
@@ -22,7 +22,7 @@ def log_path(tmp_path_factory):
     return folder / "elevator-partial-loss" / "log.parquet"
 
 
-@pytest.fixture(params=RECORDINGS)
+@pytest.fixture(params=RECORDING_FILE_OF_KIND)
 def samples(request, log_path, tmp_path):
     """The recording as `identify` gets it, at the log's own rate."""
     pytest.importorskip("pyulog")
@@ -30,7 +30,7 @@ def samples(request, log_path, tmp_path):
     write_recording(log_path, TRAVEL_RAD, request.param, tmp_path)
     vehicle = tmp_path / "vehicle.yaml"
     vehicle.write_text(vehicle.read_text() + "max_rate_hz: 100\n")
-    return load_flights_for_fit([tmp_path / RECORDINGS[request.param]], load_vehicle(vehicle))[0]
+    return load_flights_for_fit([tmp_path / RECORDING_FILE_OF_KIND[request.param]], load_vehicle(vehicle))[0]
 
 
 def test_rates_and_commands_come_back(samples, log_path):

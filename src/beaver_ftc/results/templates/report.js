@@ -270,7 +270,7 @@ class Panel {
   }
 
   inOrder() {
-    return [...this.spec.traces].sort((a, b) => DATA.looks[a.role].above - DATA.looks[b.role].above);
+    return [...this.spec.traces].sort((a, b) => DATA.looks[a.role].z_order - DATA.looks[b.role].z_order);
   }
 
   drawAxes({ pen, x, y, left, right, top, bottom, low, high }) {

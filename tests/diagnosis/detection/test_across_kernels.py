@@ -306,10 +306,10 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors
 
 def test_views_that_are_not_there_are_not_asked(fdi, rng):
     fdi["statistical"]["n_views"] = 1
-    before = fdi["statistical"]["views"].copy()
+    before = [view.tobytes() for view in fdi["statistical"]["views"]]
     Across.observe(fdi, rng.normal(size=3), np.ones((3, 4)), np.ones((3, 4)), FLOW, 3, False)
-    after = fdi["statistical"]["views"]
-    changed = [now.tobytes() != then.tobytes() for now, then in zip(after, before, strict=True)]
+    after = [view.tobytes() for view in fdi["statistical"]["views"]]
+    changed = [now != then for now, then in zip(after, before, strict=True)]
     assert changed == [True] + [False] * (USUAL_RECORD_SIZE.n_views - 1)
 
 

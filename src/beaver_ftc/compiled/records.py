@@ -94,18 +94,19 @@ def record(**fields: Any) -> np.dtype:
 def _on_lines(dtype: np.dtype, parts: Collection[str]) -> np.dtype:
     """The same record, each of these parts on a line of the processor's cache if it fills several: of an
     array that begins between two, each access of a vector instruction touches both."""
+    kinds = {name: dtype[name] for name in dtype.names or ()}
     offsets, end = [], 0
-    for name in dtype.names or ():
-        of = dtype[name]
-        apart = LINE_BYTES if name in parts and of.itemsize >= FEWEST_LINES * LINE_BYTES else of.alignment
-        offsets.append(_up_to(apart, end))
-        end = offsets[-1] + of.itemsize
-    named = {"names": dtype.names, "formats": [dtype[name] for name in dtype.names or ()], "offsets": offsets}
-    whole = LINE_BYTES if end >= FEWEST_LINES * LINE_BYTES else dtype.alignment
-    return np.dtype(named | {"itemsize": _up_to(whole, end)}, align=True)
+    for name, kind in kinds.items():
+        large = name in parts and kind.itemsize >= FEWEST_LINES * LINE_BYTES
+        offsets.append(_up_to(LINE_BYTES if large else kind.alignment, end))
+        end = offsets[-1] + kind.itemsize
+    size = _up_to(LINE_BYTES if end >= FEWEST_LINES * LINE_BYTES else dtype.alignment, end)
+    layout: Any = {"names": [*kinds], "formats": [*kinds.values()], "offsets": offsets, "itemsize": size}
+    return np.dtype(layout, align=True)
 
 
 def _up_to(step: int, size: int) -> int:
+    """The size, rounded up to a multiple of the step."""
     return -(-size // step) * step
 
 

@@ -76,7 +76,7 @@ def _new_memory(n_bytes: int) -> np.ndarray:
     """New bytes, from the beginning of a line of the processor's cache: see compiled/records.py."""
     bytes_and_gap = np.empty(n_bytes + LINE_BYTES, np.uint8)
     gap = -bytes_and_gap.__array_interface__["data"][0] % LINE_BYTES
-    return np.frombuffer(memoryview(bytes_and_gap), np.uint8, n_bytes, gap)
+    return np.frombuffer(bytes_and_gap.data, np.uint8, n_bytes, gap)
 
 
 def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:

@@ -253,6 +253,25 @@ def test_frames_in_which_the_fault_adds_nothing_have_no_number(history, h, Z, sa
 
 
 @pytest.mark.parametrize(
+    ("instant_share", "frames", "unexplained"),
+    [
+        (1.0, [1, 2, 3], [True, True, False]), (0.5, [1, 2, 3], [False, False, False]),
+        (0.5, [4, 5, 6, 7], [False, True, True, False]), (0.5, [5], [True]), (1.0, [7], [True]),
+    ],
+)  # fmt: skip
+def test_of_several_instants_the_frames_beside_count_too(instant_share, frames, unexplained):
+    """Health explains frames 0, 3 and 8; on the other frames one axis is beyond its bound."""
+    exceeds = np.array([0, 1, 1, 0, 1, 1, 1, 1, 0], bool)
+    seen = SimpleNamespace(
+        rates_rad_s=np.zeros((9, 3)), instant_share=instant_share,
+        innovation=lambda rows: np.outer(exceeds, [0.0, -2.0, 0.0])[rows],
+        innovation_bound=lambda rows: np.ones((9, 3))[rows],
+    )  # fmt: skip
+    found = certificate.kinds.is_unexplained_by_health(seen, np.array(frames))
+    assert found.tolist() == unexplained
+
+
+@pytest.mark.parametrize(
     ("unexplained", "constant"),
     [(True, {"q": 0.02, "r": 0.04}), (False, dict(zip("pqr", GYRO["constant_rad_s"], strict=True)))],
 )

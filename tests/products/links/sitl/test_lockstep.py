@@ -141,6 +141,25 @@ def test_an_answer_of_the_last_stamp_is_flown_once(px4):
     assert (outputs[:4], rate_hz, in_charge) == (pytest.approx((0.1, 0.2, 0.3, 0.4)), 250.0, True)
 
 
+def kinds_of(packed):
+    """The kinds of the MAVLink 2 messages in a packet."""
+    while packed:
+        yield int.from_bytes(packed[7:10], "little")
+        packed = packed[12 + packed[1] :]
+
+
+def test_each_message_comes_at_its_rate_and_what_is_waited_for_last(px4):
+    """At 250 Hz: HIL_GPS at 10 Hz, HIL_STATE_QUATERNION at 50 Hz, HIL_SENSOR in each frame."""
+    answer, told = px4.autopilot.hear(px4.end.connect(0.0)), []
+    for k in range(60):
+        sent = px4.end.take(answer, 0.004 * k)
+        told.append([kind for kind in kinds_of(sent) if kind in (107, 113, 115)])
+        answer = px4.autopilot.hear(sent)
+    assert all(kinds[-1] == 107 for kinds in told)
+    first = {kind: [k for k, kinds in enumerate(told, 1) if kind in kinds] for kind in (113, 115)}
+    assert first == {113: [25, 50], 115: [*range(5, 61, 5)]}
+
+
 def test_time_passes_while_it_starts_and_our_law_flies_until_it_is_armed(px4):
     px4.autopilot._silent, px4.autopilot._armed_after = 3, 2
     told = px4.autopilot.hear(px4.end.connect(0.0))

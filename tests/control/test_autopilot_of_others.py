@@ -39,9 +39,9 @@ def test_a_propeller_climbs_turns_and_speeds_up():
     assert np.degrees(log["psi_rad"][-1]) == pytest.approx(30.0, abs=0.5)
     assert log["altitude_m"][-1] == pytest.approx(1540.0, abs=1.0)
     assert log["airspeed_mps"][-1] == pytest.approx(50.8, abs=0.5)
-    assert np.ptp(log["missing_acceleration"]) > 0.05
-    assert log["missing_acceleration"].min() >= 0.0
-    assert log["missing_acceleration"].max() <= 1.0
+    assert np.ptp(log["throttle"]) > 0.05
+    assert log["throttle"].min() >= 0.0
+    assert log["throttle"].max() <= 1.0
 
 
 def energy_lost_m(log):

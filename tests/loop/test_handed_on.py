@@ -6,6 +6,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
 from flying import loss, scenario
+from telling import bits
 
 FRAMES = 150
 GRADE = {"sensors": {"q": {"bias_deg_s": 0.2, "delay_s": 0.1, "bandwidth_rad_s": 50.0, "dropout_share": 0.1}}}
@@ -68,12 +69,6 @@ def fields(record, path=""):
         else:
             found[path + name] = np.array(value)
     return found
-
-
-def bits(value):
-    """Of every number in an array, also of records: not of the gaps between them, which a copy leaves."""
-    names = value.dtype.names
-    return value.tobytes() if names is None else b"".join(bits(value[name]) for name in names)
 
 
 MOVED = set().union(*GOES_ON.values(), {"since"})

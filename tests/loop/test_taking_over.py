@@ -16,6 +16,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.fault_matrix import trimmed_deg
 from flying import loss, scenario
+from telling import bits
 
 TRIM = Trim(np.zeros(3), np.array([0.1, 0.02, 45.0, 1036.0, 0.3]), np.zeros(4))
 TRAVEL = np.array([[-0.5, -0.4, -0.3, -0.1], [0.5, 0.45, 0.35, 1.0]])
@@ -255,15 +256,14 @@ def test_a_law_in_its_own_place_goes_on_where_it_was(law):
     fresh = new.copy()
     take_law(frame, new)
     parts = [f"{stage}.{part}" for stage in STAGES for part in before[stage].dtype.names]
-    bits = {
-        part: [_part(record, part).tobytes() for record in (before, fresh, frame["control"])]
-        for part in parts
+    seen = {
+        part: [bits(_part(record, part)) for record in (before, fresh, frame["control"])] for part in parts
     }
-    changed = {part for part, (then, begun, _) in bits.items() if then != begun}
-    kept = {part for part in changed if bits[part][2] == bits[part][0]}
+    changed = {part for part, (then, begun, _) in seen.items() if then != begun}
+    kept = {part for part in changed if seen[part][2] == seen[part][0]}
     assert changed - kept == {"reference.memory"}
     assert {"power.memory", "power.output", "reference.output", "surfaces.output"} <= kept
-    assert all(bits[part][2] == bits[part][1] for part in parts if part.endswith("config"))
+    assert all(seen[part][2] == seen[part][1] for part in parts if part.endswith("config"))
 
 
 STAGES = ("reference", "surfaces", "allocation", "probe", "power")

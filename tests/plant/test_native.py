@@ -98,6 +98,17 @@ def test_another_layout_is_recognised_without_a_crash(monkeypatch, tmp_path, wro
     assert not addresses.is_proved.__wrapped__(addresses.LAYOUT._replace(**wrong))
 
 
+@pytest.mark.parametrize("name", ["node_pointer", "executive_base", "executive_pointer"])
+def test_no_word_beyond_an_object_is_read(name):
+    """The last word of an object fits, one byte more does not; whatever the other words are."""
+    import jsbsim
+
+    size = (jsbsim.FGPropertyNode if name == "node_pointer" else jsbsim.FGFDMExec).__basicsize__
+    others = addresses.LAYOUT._replace(node_pointer=0, executive_base=0, executive_pointer=0)
+    fits = [addresses._sizes_fit(others._replace(**{name: offset})) for offset in (size - 8, size - 7)]
+    assert fits == [True, False]
+
+
 @needs_native
 def test_a_missing_function_is_recognised(monkeypatch):
     monkeypatch.setattr(addresses, "GETTER", "_ZNK9NoSuchName")

@@ -234,9 +234,11 @@ def told() -> Iterator[Callable[[str], None]]:
             sys.stderr.write(f"\r\033[K{line}")
             sys.stderr.flush()
 
-    yield tell
-    if shown:
-        sys.stderr.write("\r\033[K")
+    try:
+        yield tell
+    finally:
+        if shown:
+            sys.stderr.write("\r\033[K")
 
 
 class _Progress:

@@ -121,7 +121,7 @@ def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: fl
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring the estimates of all surfaces and of the unknown acceleration to this frame
-    (base.CompiledLaw)."""
+    (control.CompiledLaw)."""
     surfaces, informed = control.surfaces, control.config.informed
     begin_frame(surfaces.output, assessment, informed)
     for s in range(surfaces.output.target.size):

@@ -201,6 +201,13 @@ def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
 
 
 @kernel
+def move_healthy_surfaces_otherwise(prediction, command):
+    """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
+    prediction.u[:] = prediction.u_before
+    move_healthy_surfaces(prediction, command)
+
+
+@kernel
 def add_instant_to_frame(prediction, bound, layout, diagnoses_all_types, measured):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
     fill_uncertainty_bound_now(bound, prediction.design, measured, prediction.u)

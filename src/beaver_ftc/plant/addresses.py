@@ -113,7 +113,10 @@ def _sizes_fit(layout: Layout) -> bool:
 
     words = sys.implementation.name == "cpython" and ctypes.sizeof(ctypes.c_void_p) == 8
     sizes = jsbsim.FGPropertyNode.__basicsize__, jsbsim.FGFDMExec.__basicsize__
-    within = layout.node_pointer <= sizes[0] - 8 and layout[3:] <= (sizes[1] - 8,) * 2
+    within = (
+        layout.node_pointer <= sizes[0] - 8
+        and max(layout.executive_base, layout.executive_pointer) <= sizes[1] - 8
+    )
     return (
         words
         and sizes == (layout.node_size, layout.executive_size)

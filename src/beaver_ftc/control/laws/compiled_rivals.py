@@ -31,7 +31,7 @@ def rival_dtype(n: int) -> np.dtype:
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
-    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, reference, layout, x = control.compiled_rivals, control.reference, control.layout, measured.x
     memory, out, allocated = law.memory, law.output, control.allocation.output
     out.command[:] = layout.trim
@@ -131,13 +131,13 @@ def solve(G, main, demand, out):
 
 def unexplained(control: np.void) -> np.ndarray:
     """What the law attributes to no model, (3,) rad/s2: the rivals estimate nothing, and hand on what the law
-    before them had found (base.CompiledLaw)."""
+    before them had found (control.CompiledLaw)."""
     inherited: np.ndarray = control["compiled_rivals"]["memory"]["inherited"].copy()
     return inherited
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight (base.CompiledLaw)."""
+    """Take over in flight (control.CompiledLaw)."""
     control["compiled_rivals"]["memory"]["inherited"] = unexplained
 
 

@@ -25,14 +25,14 @@ def published_dtype(n: int) -> np.dtype:
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Fill the gains (base.CompiledLaw)."""
+    """Fill the gains (control.CompiledLaw)."""
     config = scenario.control
     law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2
 
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
-    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
     out = law.output
     laws.prepare(control, assessment, prediction, mode, t)
@@ -73,7 +73,7 @@ def integrate(law, axes, reference, u, x):
 
 
 def unexplained(control: np.void) -> np.ndarray:
-    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
     return unexplained_by(control["published"], control["surfaces"]["output"]["unknown"])
 
 
@@ -84,7 +84,7 @@ def unexplained_by(law: np.void, fhat: np.ndarray) -> np.ndarray:
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight: the integrators begin where the demand is (base.CompiledLaw)."""
+    """Take over in flight: the integrators begin where the demand is (control.CompiledLaw)."""
     uses_network = control["config"]["uses_verdict"] and not control["config"]["informed"]
     begin_integrators(control["published"], unexplained, learnt if uses_network else np.zeros(3))
 

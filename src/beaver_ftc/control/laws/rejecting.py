@@ -244,8 +244,10 @@ def set_up(
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Derive the gains of a scenario into the law's configuration (base.CompiledLaw); y: the measured signals
-    in trim."""
+    """Derive the gains of a scenario into the law's configuration (control.CompiledLaw).
+
+    y: the measured signals in trim.
+    """
     config, dt, layout = scenario.control, 1.0 / scenario.rate_hz, control["layout"]
     speeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_POINTS)
     signals = np.tile(y, (N_POINTS, 1))
@@ -443,8 +445,10 @@ def rejecting_dtype(n: int) -> np.dtype:
 
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
-    """Bring the effectiveness of all surfaces to this frame (base.CompiledLaw): the diagnosis' estimate, and
-    where the law is not informed of the truth also what its observer sees."""
+    """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw).
+
+    It is the diagnosis' estimate; where the law is not informed of the truth, also what its observer sees.
+    """
     if control.config.informed:
         accommodation.accommodate(control, assessment, faults, prediction, measured)
         return
@@ -467,7 +471,7 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
-    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, out, surfaces = control.rejecting, control.allocation.output, control.surfaces.output
     laws.prepare(control, assessment, prediction, mode, t)
     main, share = control.layout.main, out.transfer_share
@@ -687,13 +691,13 @@ def targets(reference, i, share):
 
 
 def unexplained(control: np.void) -> np.ndarray:
-    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
     found: np.ndarray = control["rejecting"]["observer"]["disturbance"].copy()
     return found
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight (base.CompiledLaw): the observer goes on, or begins with what is measured."""
+    """Take over in flight (control.CompiledLaw): the observer goes on, or begins with what is measured."""
     control["rejecting"]["observer"] = before["rejecting"]["observer"]
     control["rejecting"]["observer"]["disturbance"] = unexplained
 

@@ -30,7 +30,7 @@ from beaver_ftc.diagnosis.schemes.published import (
 from beaver_ftc.plugins import LAWS, settings
 from beaver_ftc.scenario.schema import Scenario
 
-# adapts: whether anything does; networks: and a network. gain: of effectiveness, s3/rad2. integral_weight: c.
+# adapts: whether anything does; networks: and a network. gain: of effectiveness, s2/rad2. integral_weight: c.
 # least, most: of an effectiveness, projection P, or infinite.
 CONFIG = record(adapts=int, networks=int, gain=float, integral_weight=float, least=float, most=float)
 MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
@@ -43,7 +43,7 @@ def zhang2005_dtype(n: int) -> np.dtype:
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, scenario: Scenario, y: np.ndarray) -> None:
-    """Fill the law's configuration (base.CompiledLaw)."""
+    """Fill the law's configuration (control.CompiledLaw)."""
     settled, config = scenario.control, law["config"]
     option = settings(LAWS, settled.law, settled.options)
     published.configure(law["feedback"], control, prediction, scenario, y)
@@ -64,7 +64,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, scenario: Sce
 
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
-    """Bring both parts to this frame: what surfaces and the unknown are taken for (base.CompiledLaw)."""
+    """Bring both parts to this frame: what surfaces and the unknown are taken for (control.CompiledLaw)."""
     law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
     begin_frame(surfaces.output, assessment, True)
     if assessment.detected and law.config.adapts:
@@ -98,7 +98,7 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
-    """From what is measured to the command of each surface (base.CompiledLaw)."""
+    """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, reference, out = control.zhang2005, control.reference, control.zhang2005.feedback.output
     laws.prepare(control, assessment, prediction, mode, t)
     published.demand(law.feedback, reference.output, measured.x, prediction.f, law.network.output)
@@ -111,13 +111,13 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 
 def unexplained(control: np.void) -> np.ndarray:
-    """What the law attributes to no model, (3,) rad/s2 (base.CompiledLaw)."""
+    """What the law attributes to no model, (3,) rad/s2 (control.CompiledLaw)."""
     law = control["zhang2005"]
     return published.unexplained_by(law["feedback"], law["network"]["output"])
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight: the integrators begin where the demand is (base.CompiledLaw)."""
+    """Take over in flight: the integrators begin where the demand is (control.CompiledLaw)."""
     published.begin_integrators(control["zhang2005"]["feedback"], unexplained, np.zeros(3))
 
 

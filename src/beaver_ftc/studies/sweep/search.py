@@ -1,6 +1,6 @@
 """Worst-case search: instead of drawing flights, look for the admissible one with the worst outcome.
 
-Differential evolution [Storn and Price 1997], current-to-best/1/bin, on the unit cube of the varied keys, a
+Differential evolution [Storn1997], current-to-best/1/bin, on the unit cube of the varied keys, a
 generation a batch. Each generation follows from the seed and from the outcomes before it alone: a search that
 is interrupted goes on exactly as it would have, and any number of workers finds the same flight. Scipy's
 `differential_evolution` calls the objective itself and keeps no state: it cannot go on.
@@ -23,7 +23,7 @@ from beaver_ftc.studies.sweep.one_flight import DEPARTED
 from beaver_ftc.studies.sweep.sampling import Assignment, value_at
 from beaver_ftc.studies.sweep.store import Store
 
-WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn and Price 1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
+WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
 _OF_SEARCH = 2
 _ALMOST_ONE = math.nextafter(1.0, 0.0)
 

@@ -25,14 +25,17 @@ FILE = Path(__file__).parents[1] / "chosen.yaml"
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 TUNED_DRAWS = range(61)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-CONSTANT_HEAD = ("row", "name", "constant", "determines", "file", "chosen by")
+CONSTANT_HEAD = ("row", "name", "constant", "value", "determines", "file", "chosen by")
 FLIGHT_HEAD = ("row", "name", "flights that chose the constant", "their seeds")
 RESULT_HEAD = ("row", "name", "page", "flights of the results", "their seeds")
 
 
 def chosen_constants() -> str:
     """The constants, in rows with a number."""
-    return _table(CONSTANT_HEAD, lambda choice: (choice["constant"], choice["sets"], *_where(choice)))
+    return _table(
+        CONSTANT_HEAD,
+        lambda choice: (choice["constant"], choice["value"], choice["sets"], *_where(choice)),
+    )
 
 
 def chosen_flights() -> str:

@@ -30,6 +30,76 @@ IN_WORDS = {  # names of settings and of ablations that the document has, as the
     "square references, which jump themselves": "square references, which jump",
     "the health (an elevator fault instead)": "nothing is removed; an elevator fault is added",
 }
+TRACKED = "Above: deflections, deg. Below: tracking errors and {}, deg/s. Horizontal: time, s"
+RESIDUALS = "Residual and threshold on each axis, deg/s. Horizontal: time, s"
+CAPTIONS = {  # of each figure: what it shows, what its axes are, and what to see
+    "fig-2a": ("Nominal law, no fault", TRACKED.format("pitch rate"), "The pitch rate follows its reference"),
+    "fig-2b": (
+        "Nominal law, elevator fault at 12 s",
+        TRACKED.format("pitch rate"),
+        "After the fault the pitch rate no longer follows its reference",
+    ),
+    "fig-3": (
+        "Detection of the elevator fault",
+        RESIDUALS,
+        "The residual of the pitch rate exceeds its threshold after one frame",
+    ),
+    "fig-4a": (
+        "Isolation estimator of the aileron, elevator fault",
+        RESIDUALS,
+        "The residual of the pitch rate exceeds its threshold, so the aileron is excluded (grey)",
+    ),
+    "fig-4b": (
+        "Isolation estimator of the elevator, elevator fault",
+        RESIDUALS,
+        "No residual exceeds its threshold, so the elevator remains the only candidate",
+    ),
+    "fig-4c": (
+        "Isolation estimator of the rudder, elevator fault",
+        RESIDUALS,
+        "The residual of the pitch rate exceeds its threshold, so the rudder is excluded (grey)",
+    ),
+    "fig-5": (
+        "Fault-tolerant law, elevator fault",
+        TRACKED.format("pitch rate"),
+        "After isolation the flap moves in place of the elevator",
+    ),
+    "fig-6": (
+        "Nominal law, unanticipated fault at 12 s",
+        TRACKED.format("pitch rate"),
+        "The aircraft departs 2 s after the fault",
+    ),
+    "fig-7": (
+        "Fault-tolerant law, unanticipated fault",
+        TRACKED.format("pitch rate"),
+        "About 3 s after the fault the pitch rate follows its reference again",
+    ),
+    "aileron": (
+        "Fault-tolerant law, aileron fault",
+        TRACKED.format("roll rate"),
+        "The roll rate follows its reference with a larger error than before the fault",
+    ),
+    "rudder": (
+        "Fault-tolerant law, rudder fault",
+        TRACKED.format("yaw rate"),
+        "The alarm comes 0.28 s after the fault",
+    ),
+    "unanticipated-detection": (
+        "Detection of the unanticipated fault",
+        RESIDUALS,
+        "The residual of the pitch rate exceeds its threshold after one frame",
+    ),
+    "as-printed": (
+        "Detection with equation (2) as printed, no fault",
+        RESIDUALS,
+        "The residual of the pitch rate exceeds its threshold at the start of the flight",
+    ),
+    SENSITIVITY: (
+        "How far each number stays from its limit",
+        "One row for each statement. Horizontal: ratio of number and limit, logarithmic, no unit",
+        "Left of 1 the number keeps its limit",
+    ),
+}
 MANY = 10  # settings of a row that are written only once, if several rows have the same
 
 
@@ -151,7 +221,17 @@ def reproduction_figures() -> str:
 def _figures() -> str:
     titles = [(view.title, view.name) for view, _, _ in FIGURES]
     shown = [*titles, ("How far each number stays from its limit", SENSITIVITY)]
-    return "\n\n".join(f"![{title}]({FOLDER}/{name}.png)" for title, name in shown)
+    return "\n\n".join(
+        f"![{title}]({FOLDER}/{name}.png)\n\n*Figure {count}. {_caption(title, name)}.*"
+        for count, (title, name) in enumerate(shown, 1)
+    )
+
+
+def _caption(title: str, name: str) -> str:
+    """What a figure shows; of a figure of the paper, also its number there."""
+    shows, axes, see = CAPTIONS[name]
+    of_paper = f" ({title.split(':', maxsplit=1)[0]} of the paper)" if title.startswith("Fig.") else ""
+    return f"{shows}{of_paper}. {axes}. {see}"
 
 
 def reproduction_probe() -> str:

@@ -164,15 +164,15 @@ def headline(document: Document) -> str:
     """What became of the statements, in sentences."""
     tested, built = document["testable"], document["construction"]
     settings = len(document["sensitivity"])
-    some, count = built["hold"], built["statements"]
+    some, count, background = built["hold"], built["statements"], document["background"]
     holding = "all of these hold" if some == count else f"{some} of these {count} hold"
     return (
-        f"Of {tested['statements']} testable statements, {tested['hold']} hold, {tested['do_not']} do not "
-        f"hold, and {tested['unsettled']} hold even without the mechanism that the statement credits. "
-        f"{tested['elsewhere']} of the {tested['hold']} also hold in every one of {settings} settings that "
-        f"the paper did not fly. {count} other statements follow from the construction of the "
-        f"code, so they show nothing about the scheme; {holding} "
-        f"in our flights. The last {document['background']} statements contain nothing that can be measured."
+        f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} can "
+        f"be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and {tested['unsettled']} hold "
+        f"with and without the mechanism that the statement credits. {tested['elsewhere']} of the "
+        f"{tested['hold']} also hold in every one of {settings} settings that the paper did not fly. "
+        f"{count} follow from the construction of the code, so they show nothing about the scheme; {holding} "
+        f"in our flights. {background} contain nothing that can be measured."
     )
 
 

@@ -180,13 +180,15 @@ class Vehicle(Section):
     acceleration: QuantityColumnOrName | None = Field(
         default=None,
         description="column of the specific force along the z axis, in either sign. The median of its "
-        "magnitude is about 1 g, m/s2",
+        "magnitude must be about 1 g",
+        json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
     airspeed: QuantityColumnOrName | None = Field(
         default=None,
         description="column of the airspeed. The model is valid only in the range of airspeeds that the fit "
-        "used, m/s",
+        "used",
+        json_schema_extra={"unit": "m/s"},
         examples=["airspeed_m_s"],
     )
     energy: EnergyColumns | None = Field(

@@ -44,8 +44,8 @@ How to read the tables:
   speed in rpm, pz the manifold pressure in inHg. P is the power in kW, V the airspeed in m/s, rho the
   density in kg/m3. Ix, Iy, Iz and Jxz are the [moments of inertia](reference/beaver.md), and a name with
   `dot` is a derivative with respect to time.
-- The *command* is the position that law or pilot want. The *demand* is the command after it is limited to the
-  stops: the input of the actuator.
+- The *command* is the position that the law or the pilot requires. The *demand* is the command after it is
+  limited to the stops: the input of the actuator.
 - A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
 _TILTED = "aero/coefficient/CY_betadot-tilted"
 _PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))

@@ -138,10 +138,13 @@ class SurfaceSection(Section):
         description="property that commands the deflection", examples=["fcs/elevator-cmd-rad"]
     )
     position: Property = Field(
-        description="property of the actuator's output, rad", examples=["fcs/elevator-pos-rad"]
+        description="property of the actuator's output",
+        json_schema_extra={"unit": "rad"},
+        examples=["fcs/elevator-pos-rad"],
     )
     effective: Property = Field(
-        description="property of the deflection that the aerodynamics feel, rad",
+        description="property of the deflection on which the aerodynamics depend",
+        json_schema_extra={"unit": "rad"},
         examples=["fcs/elevator-effective-rad"],
     )
     travel_rad: Stops = Field(

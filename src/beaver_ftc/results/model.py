@@ -138,7 +138,7 @@ class Statistical(Part):
     """The alarm of the statistical detector.
 
     - `time_s`: time of its alarm, s; None without an alarm.
-    - `alarm_level`: level that its log likelihood ratio must exceed, in standard deviations.
+    - `alarm_level`: level that its score must exceed, in standard deviations.
     - `closest_approach`: largest share of the alarm level that it reached before a fault.
     """
 

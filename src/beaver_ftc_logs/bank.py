@@ -275,7 +275,7 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
     flight is whitened, empty if it is not."""
     settings, max_squared_residual = (
         model.settings,
-        _MAX_SQUARED_RESIDUAL if len(model.noise_predictor(noise_ma_coefficients)) else np.inf,
+        _MAX_SQUARED_RESIDUAL if len(model.residual_ar_coefficients(noise_ma_coefficients)) else np.inf,
     )
     memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(

@@ -61,7 +61,7 @@ _RATE_UNIT_BY_NAME_PART = {
     "deg/s": "deg/s",
     "dps": "deg/s",
 }
-_PWM_NEUTRAL_RANGE_US = (700.0, 2300.0)
+_PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
 _MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
 _MIN_ANGLE_RATE_CORRELATION = 0.7
 _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
@@ -356,7 +356,7 @@ def _vehicle_file_column_entry(column_name: str, unit: str, si_unit: str) -> Any
 def _vehicle_file_command_entry(column_name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
     median, max_magnitude = float(np.nanmedian(values)), _largest_magnitude(values)
-    if _PWM_NEUTRAL_RANGE_US[0] < median < _PWM_NEUTRAL_RANGE_US[1]:
+    if _PWM_MEDIAN_RANGE_US[0] < median < _PWM_MEDIAN_RANGE_US[1]:
         return {"column": column_name, "scale": 0.0025, "offset": -3.75}
     return {"column": column_name, "unit": "%"} if 10.0 < max_magnitude <= 105.0 else column_name
 

@@ -408,7 +408,7 @@ def _surfaces_at_fault(
                 last_name != UNKNOWN_SURFACE
                 and (
                     unchanged_samples < rename_samples
-                    or _still_names_all_surfaces(new_name, last_name, model)
+                    or _would_restore_excluded_surfaces(new_name, last_name, model)
                 )
             )
         )
@@ -416,7 +416,7 @@ def _surfaces_at_fault(
     return named
 
 
-def _still_names_all_surfaces(new_name: str, last_name: str, model: Model) -> bool:
+def _would_restore_excluded_surfaces(new_name: str, last_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
     return model.settings.assumes_one_group_at_fault and (

@@ -885,12 +885,14 @@ def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> F
         group_rows = slice(
             first_command_row + group_index * lags, first_command_row + (group_index + 1) * lags
         )
-        error_correlation, standardized_errors = (
-            fit.error_correlation[group_rows, group_rows],
+        coefficient_error_correlation, standardized_errors = (
+            fit.coefficient_error_correlation[group_rows, group_rows],
             fit.standard_errors[group_rows] / noise_sd,
         )
         summed_response = fit.coefficients[group_rows].sum(axis=0) / noise_sd
-        variance = np.einsum("la,lm,ma->a", standardized_errors, error_correlation, standardized_errors)
+        variance = np.einsum(
+            "la,lm,ma->a", standardized_errors, coefficient_error_correlation, standardized_errors
+        )
         summed_response_sd[group_index] = np.sqrt(summed_response**2 @ np.maximum(variance, 0.0)) / max(
             float(summed_response @ summed_response), MIN_DIVISOR
         )
@@ -900,7 +902,7 @@ def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> F
         information[group_index] += np.einsum(
             "la,lm,ma->",
             standardized_response,
-            np.linalg.pinv(error_correlation, rcond=_RANK_TOLERANCE),
+            np.linalg.pinv(coefficient_error_correlation, rcond=_RANK_TOLERANCE),
             standardized_response,
         )
     return np.minimum(
@@ -927,7 +929,8 @@ def gain_standard_error_by_column(
             fit.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
         )
         inverse = np.linalg.pinv(
-            fit.error_correlation[np.ix_(coefficient_rows, coefficient_rows)], rcond=_RANK_TOLERANCE
+            fit.coefficient_error_correlation[np.ix_(coefficient_rows, coefficient_rows)],
+            rcond=_RANK_TOLERANCE,
         )
         information = np.einsum(
             "la,lm,ma->", standardized_coefficients, inverse, standardized_coefficients

@@ -38,7 +38,7 @@ _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0)
 FREE_RUN_WINDOW_S = 2.0
 _MAX_FREE_RUN_WINDOWS = 400
 _AIRSPEED_POWER_CANDIDATES = (0.0, 1.0, 3.0)
-_N_WHITENING_ROUNDS = 8
+_MAX_WHITENING_ROUNDS = 8
 _MAX_COMMAND_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 
@@ -138,7 +138,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         whiten_samples(one, noise_ma_coefficients)
         for one, noise_ma_coefficients in zip(flights, noise_averages, strict=True)
     ]
-    for _ in range(_N_WHITENING_ROUNDS):
+    for _ in range(_MAX_WHITENING_ROUNDS):
         regressors, rates, _ = fitting.stacked_regression_data(
             fitting.flights_with_usable_rows(whitened_flights), vehicle, *rate_and_command_lags
         )

@@ -421,7 +421,7 @@ class Model(Section):
             1.0,
         )
 
-    def noise_predictor(self, ma_coefficients: Sequence[float]) -> Floats:
+    def residual_ar_coefficients(self, ma_coefficients: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
         known = [
             one.ar_coefficients for one in self.noise_models if one.ma_coefficients == list(ma_coefficients)
@@ -429,9 +429,9 @@ class Model(Section):
         return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
 
     def whitened_intercept(self, ma_coefficients: Sequence[float]) -> Floats:
-        """The intercept less its prediction by `noise_predictor`, (3,)."""
+        """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
         constant = np.array(self.intercept)
-        return np.asarray(constant - constant @ self.noise_predictor(ma_coefficients).sum(axis=0))
+        return np.asarray(constant - constant @ self.residual_ar_coefficients(ma_coefficients).sum(axis=0))
 
     def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

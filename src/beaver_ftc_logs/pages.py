@@ -347,7 +347,7 @@ def _coefficient_correlation_figure(fit: RateRegression, names: list[str]) -> An
     size = 2.5 + 0.19 * len(names)
     figure = _new_figure(size + 0.8, size)
     axis = figure.subplots()
-    image = axis.imshow(fit.error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    image = axis.imshow(fit.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
     axis.set_yticks(range(len(names)), names, fontsize=6)
     figure.colorbar(image, shrink=0.7).ax.tick_params(labelsize=7)

@@ -117,7 +117,10 @@ def whitened_rates_and_responses(
     """As `unexplained_rates_and_responses`, less the prediction of each residual from those before it by the
     flight's noise model: a healthy flight leaves a white residual."""
     is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model, scales_by_labels)
-    predictor, is_whitened = model.noise_predictor(samples.noise_ma_coefficients), is_predictable.copy()
+    predictor, is_whitened = (
+        model.residual_ar_coefficients(samples.noise_ma_coefficients),
+        is_predictable.copy(),
+    )
     for lag in range(1, len(predictor) + 1):
         is_whitened &= _delay_rows(is_predictable, lag, False)
     return (
@@ -144,14 +147,14 @@ def subtract_noise_prediction(values: Floats, predictor: Floats) -> Floats:
 @dataclass(frozen=True)
 class RateRegression:
     """coefficients (m, 3); residual_covariance (3, 3); standard_errors (m, 3); standard_error_inflation: the
-    factor by which the residuals' colour widens them over those of white ones, (m, 3); error_correlation (m,
-    m) of the coefficients' errors, alike on every axis."""
+    factor by which the residuals' colour widens them over those of white ones, (m, 3);
+    coefficient_error_correlation (m, m): of the coefficients' errors, alike on every axis."""
 
     coefficients: Floats
     residual_covariance: Floats
     standard_errors: Floats
     standard_error_inflation: Floats
-    error_correlation: Floats
+    coefficient_error_correlation: Floats
 
 
 def least_squares(

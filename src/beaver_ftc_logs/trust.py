@@ -495,7 +495,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         return None
     columns, names = _column_contributions_to_rates(samples, model)
     columns = regression.subtract_noise_prediction(
-        columns, model.noise_predictor(samples.noise_ma_coefficients)
+        columns, model.residual_ar_coefficients(samples.noise_ma_coefficients)
     )
     (whitening, effective_sample_share, log_noise_size), n_groups = (
         _flight_noise_whitening(samples, model),
@@ -619,11 +619,11 @@ def _rows_out_of_fitted_ranges_by_reason(
     for name, values, (low, high) in columns:
         margin = _RANGE_MARGIN_SHARE * (high - low) + MIN_DIVISOR
         reasons[_outside_range_text(name, low, high)] = _mostly_true_recently(
-            ~_is_within(values, low - margin, high + margin), samples
+            ~_is_within_or_unknown(values, low - margin, high + margin), samples
         )
     if fitted.airspeed_range_mps is not None and samples.airspeed is not None:
         low, high = fitted.airspeed_range_mps
-        is_outside = ~_is_within(
+        is_outside = ~_is_within_or_unknown(
             samples.airspeed, (1.0 - _AIRSPEED_MARGIN_SHARE) * low, (1.0 + _AIRSPEED_MARGIN_SHARE) * high
         )
         reasons[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(is_outside, samples)
@@ -634,7 +634,7 @@ def _outside_range_text(name: str, low: float, high: float) -> str:
     return f"{name} is outside {low:.3g} to {high:.3g}, where the model was fitted"
 
 
-def _is_within(values: Floats, low: float, high: float) -> Mask:
+def _is_within_or_unknown(values: Floats, low: float, high: float) -> Mask:
     return np.asarray(~np.isfinite(values) | ((values >= low) & (values <= high)))
 
 

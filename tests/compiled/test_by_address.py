@@ -128,7 +128,7 @@ for fault_class in ("published", "all"):
 
 
 # One law's kernels, one scheme's, and what they share: no other law or scheme is compiled.
-SCHEME_STEPS = ("begin_scheme", "advance_to_frame", "update_verdict", "prepare_next_frame")
+SCHEME_STEPS = ("begin_scheme", "advance_estimators_to_frame", "update_verdict", "prepare_next_frame")
 OF_A_FLIGHT = {"stepping.fly_one"}
 OF_A_FLIGHT |= {f"adaptive_estimators.{step}" for step in SCHEME_STEPS}
 OF_A_FLIGHT |= {"rejecting.accommodate", "rejecting.command"}

@@ -706,7 +706,7 @@ def add_gust_estimate_noise(
     if statistical["forces"]["in_use"]:
         forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
         flow_angle_noise_by_forces = np.sqrt(forces["accelerometer_innovation_variance"]) / np.abs(
-            forces["acceleration_and_force_per_vane_error"][:, 1]
+            forces["axis_and_force_innovation_per_vane_error"][:, 1]
         )
         statistical["forces"]["gust_acceleration_noise_std"] = gust_acceleration_noise_std(
             flow_angle_noise_by_forces, design, y, u, span_m

@@ -674,7 +674,7 @@ def advance_estimators(isolation, bound, x, predicted_acceleration, dt):
 
 @kernel
 def update_likelihood_exclusion(
-    fie, tests, filter_blocks, isolation, loss_estimator, abrupt, vane_error_can_hide
+    fie, tests, statistical_blocks, isolation, loss_estimator, abrupt, vane_error_can_hide
 ):
     """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed_by_likelihood` and
     `weakly_excluded`.
@@ -687,14 +687,14 @@ def update_likelihood_exclusion(
     fie.excluded_by_likelihood = 0
     if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not abrupt):
         fie.confirmed_by_likelihood = statistical.confirms_loss(
-            tests, filter_blocks, all_estimators, loss_estimator, s
+            tests, statistical_blocks, all_estimators, loss_estimator, s
         )  # what follows later may be its end
     if fie.confirmed_by_likelihood or not statistical.excludes_loss(
-        tests, filter_blocks, all_estimators, loss_estimator, s, False, abrupt
+        tests, statistical_blocks, all_estimators, loss_estimator, s, False, abrupt
     ):
         return
     fie.excluded_by_likelihood = statistical.excludes_loss(
-        tests, filter_blocks, all_estimators, loss_estimator, s, True, abrupt
+        tests, statistical_blocks, all_estimators, loss_estimator, s, True, abrupt
     )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
     if fie.excluded_by_likelihood and vane_error_can_hide:

@@ -310,7 +310,7 @@ class DiagnosisReadout:
         return float(self._fdi["statistical"]["test_config"]["alarm_level"])
 
     @cached_property
-    def filter_blocks(self) -> tuple[StatisticalBlock, ...]:
+    def statistical_blocks(self) -> tuple[StatisticalBlock, ...]:
         """The filters of the statistical detector."""
         return tuple(map(_read_block, self._fdi["statistical"]["block"]))
 

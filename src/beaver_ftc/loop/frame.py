@@ -417,7 +417,7 @@ def diagnose(frame):
         predict_acceleration(
             prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
         )
-        schemes.advance_to_frame(scheme, fdi, prediction, measured, k, frame.t)
+        schemes.advance_estimators_to_frame(scheme, fdi, prediction, measured, k, frame.t)
     schemes.update_verdict(scheme, fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
     schemes.prepare_next_frame(scheme, fdi, prediction, measured, k)

@@ -182,11 +182,11 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
     scheme = SCHEMES[fdi["config"]["scheme_number"]]
     yield from (
         scheme.begin_scheme,
-        scheme.advance_to_frame,
+        scheme.advance_estimators_to_frame,
         scheme.update_verdict,
         scheme.prepare_next_frame,
     )
-    if scheme.advance_to_frame is adaptive_estimators.advance_to_frame:
+    if scheme.advance_estimators_to_frame is adaptive_estimators.advance_estimators_to_frame:
         faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["isolation_variant"]]
         yield from (faults.begin, faults.record_commands, faults.isolate)
         if fdi["statistical"]["test_config"]["enabled"]:

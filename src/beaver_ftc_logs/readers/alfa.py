@@ -59,7 +59,7 @@ def read(path: Path) -> RecordedFlight:
     ordered = {topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()}
     origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][ordered[_GYRO_TOPIC][0][0]])
     columns = dict(_read_columns(topics, ordered, origin_ns))
-    _add_attitude_errors(columns)
+    _add_commanded_less_measured_attitude(columns)
     _add_airspeed_from_wind(columns)
     events = sorted(_failure_events(topics, origin_ns), key=lambda event: event.t_s)
     return RecordedFlight(path.name, columns, tuple(events))
@@ -87,7 +87,7 @@ def _read_columns(
             yield name, Column(t_s, _CONVERSION_OF_UNIT[unit](topics[topic][field])[kept_rows], note)
 
 
-def _add_attitude_errors(columns: dict[str, Column]) -> None:
+def _add_commanded_less_measured_attitude(columns: dict[str, Column]) -> None:
     """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
     for axis in ("roll", "pitch"):
         command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")

@@ -172,7 +172,7 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
             Y[place] + 10 * DT * record["flow_angle_rate"][f]
         )
         assert force["innovation_per_flow_angle_drift"] == pytest.approx(
-            11 * DT * force["acceleration_and_force_per_vane_error"][1]
+            11 * DT * force["axis_and_force_innovation_per_vane_error"][1]
         )
 
 
@@ -196,7 +196,7 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
         np.std(drawn, axis=0), rel=0.06
     )
     without = record["component"]["noise_variance"][:, 0] - record["component"]["noise_variance"][:, 1]
-    slopes = record["component"]["acceleration_and_force_per_vane_error"][:, 1] * np.radians([0.02, 0.03])
+    slopes = record["component"]["axis_and_force_innovation_per_vane_error"][:, 1] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
 
@@ -235,7 +235,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
     )
     walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_COMPONENT, NORMAL_COMPONENT)]
     assert np.sqrt(more) == pytest.approx(
-        np.abs(record["component"]["acceleration_and_force_per_vane_error"][:, 1]) * walked
+        np.abs(record["component"]["axis_and_force_innovation_per_vane_error"][:, 1]) * walked
     )
 
 
@@ -353,7 +353,7 @@ def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     for f, name, place, axis in ((SIDE_COMPONENT, "CY", 1, 2), (NORMAL_COMPONENT, "CZ", 0, 1)):
         off = Y + 1e-5 * np.eye(5)[place]
         slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
-        assert record["component"][f]["acceleration_and_force_per_vane_error"] == pytest.approx(
+        assert record["component"][f]["axis_and_force_innovation_per_vane_error"] == pytest.approx(
             [-ALONG_Y[axis, place], -slope], rel=1e-4
         )
 
@@ -364,7 +364,7 @@ def test_constant_errors_are_tolerated_term_by_term():
     terms = forces.force_terms(AIRCRAFT, NORMAL_COMPONENT)
     shares = force["regressor_tolerance"][: len(terms)] / np.abs([t.value for t in terms])
     assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
-    slope = abs(force["acceleration_and_force_per_vane_error"][1]) / per_coefficient()
+    slope = abs(force["axis_and_force_innovation_per_vane_error"][1]) / per_coefficient()
     of_constant = 0.07 * abs(terms[0].value) + np.radians(0.5) * slope
     assert terms[0].is_constant
     assert force["regressor_tolerance"][0] == pytest.approx(of_constant)
@@ -398,7 +398,7 @@ def test_in_turbulence_gusts_turn_the_flow():
     )
     gained = moving["inertial_innovation_drift_intensity"] - still["inertial_innovation_drift_intensity"]
     sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)
-    more = np.sqrt(gained) / np.abs(moving["acceleration_and_force_per_vane_error"][:, 1])
+    more = np.sqrt(gained) / np.abs(moving["axis_and_force_innovation_per_vane_error"][:, 1])
     tau, n = L / V, 40_000  # (1 + sqrt(3) tau s) / (1 + tau s)^2, of white noise of intensity sigma^2 tau
     noise, one, two, gust = rng.normal(0.0, sigma * np.sqrt(tau / dt), n), 0.0, 0.0, np.empty(n)
     for k in range(n):
@@ -483,7 +483,7 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     force = viewed["statistical"]["forces"]["component"][second - SIDE_FORCE]
     s = int(view["orthogonal_to_surface"])
     of_it = (
-        force["acceleration_and_force_per_vane_error"]
+        force["axis_and_force_innovation_per_vane_error"]
         if s == VANE_VIEW
         else (G[first, s], force["scaled_force_per_surface_rad"][s])
     )
@@ -511,7 +511,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     )
     force = statistical["forces"]["component"][SIDE_COMPONENT]
     column = np.array(
-        [force["roll_acceleration_per_vane_error"], *force["acceleration_and_force_per_vane_error"]]
+        [force["roll_innovation_per_vane_error"], *force["axis_and_force_innovation_per_vane_error"]]
     )
     share = Across.turn(viewed, view, np.zeros((3, 4)))
     mix = view["direction"][[ROLL, YAW, SIDE_FORCE]]
@@ -747,7 +747,9 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(dynamic_pressure_over_t
     fdi, fast = felt(Bounds(sensors=sensors)), Y * (1.0, 1.0, 1.0, dynamic_pressure_over_trim, 1.0)
     record = fdi["statistical"]["forces"]
     update_all_force_innovations(record, fdi["statistical"]["gust"], measured(y=fast), U, DT)
-    slopes = dynamic_pressure_over_trim * record["component"]["acceleration_and_force_per_vane_error"][:, 1]
+    slopes = (
+        dynamic_pressure_over_trim * record["component"]["axis_and_force_innovation_per_vane_error"][:, 1]
+    )
     noise = np.radians([0.02, 0.03])
     assert record["dynamic_pressure_over_trim"] == pytest.approx(dynamic_pressure_over_trim)
     assert record["component"]["noise_variance"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
@@ -776,7 +778,7 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     damped = (
         record["component"]["innovation_per_air_rotation"]
         @ turning
-        / record["component"]["acceleration_and_force_per_vane_error"][:, 1]
+        / record["component"]["axis_and_force_innovation_per_vane_error"][:, 1]
     )
     assert still - record["y_without_vanes"][:2] == pytest.approx(damped[::-1])
 

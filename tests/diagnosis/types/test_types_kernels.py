@@ -646,14 +646,10 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
     assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))
     fdi["types"]["config"]["released_surface_returns_via_actuator"] = released_surface_returns_via_actuator
-    assert (
-        on(held_surface.held_or_returning_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.STATUS_HELD
-    )
-    assert (
-        on(held_surface.held_or_returning_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.STATUS_HELD
-    )
+    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.3, 0.4) == held_surface.STATUS_HELD
+    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.1, 0.2) == held_surface.STATUS_HELD
     surface["release"]["has_released"][STUCK] = 1
-    assert on(held_surface.held_or_returning_status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
+    assert on(held_surface.update_held_status, fdi, surface, STUCK, 0.1, 0.2) == elsewhere
 
 
 def test_where_a_surface_was_as_the_judged_frame_began():

@@ -208,9 +208,13 @@ def test_the_sole_surface_that_is_possible():
 )
 def test_what_looks_like_a_jam_may_be_slow_until_it_has_stood_off_for_long(evidence, n_rest_frames, slow):
     fdi, surface = one(STUCK, SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
-    assert bool(on(verdict.type_can_hide_at_rest, fdi, surface)) == slow
-    assert not on(verdict.type_can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames))
-    assert not on(verdict.type_can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames))
+    assert bool(on(verdict.remaining_type_can_hide_at_rest, fdi, surface)) == slow
+    assert not on(
+        verdict.remaining_type_can_hide_at_rest, *one(STUCK, evidence=evidence, n_rest_frames=n_rest_frames)
+    )
+    assert not on(
+        verdict.remaining_type_can_hide_at_rest, *one(SLOW, evidence=evidence, n_rest_frames=n_rest_frames)
+    )
 
 
 def looked_like_by(kind):

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import small
 
-from beaver_ftc_logs.diagnose import _add_surfaces_of_unknown_effect_to_names, _still_names_all_surfaces
+from beaver_ftc_logs.diagnose import (
+    _add_surfaces_of_unknown_effect_to_names,
+    _would_restore_excluded_surfaces,
+)
 from beaver_ftc_logs.filtering import recent_noise_variance_scale
 from beaver_ftc_logs.identification import with_assumed_law_and_air
 from beaver_ftc_logs.model import FittedRanges
@@ -71,5 +74,5 @@ def test_a_surface_of_unknown_effect_is_named_with_any_other_once_it_moves():
     [("unknown", "left", True), ("right+left", "left", True), ("right", "left", False)],
 )
 def test_a_surface_that_was_excluded_stays_so(now, said, wide):
-    assert _still_names_all_surfaces(now, said, small.model(settings={"one_group": True})) is wide
-    assert not _still_names_all_surfaces(now, said, small.model())
+    assert _would_restore_excluded_surfaces(now, said, small.model(settings={"one_group": True})) is wide
+    assert not _would_restore_excluded_surfaces(now, said, small.model())

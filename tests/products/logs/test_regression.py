@@ -90,7 +90,7 @@ def test_least_squares_and_its_covariance():
     np.testing.assert_allclose(fit.residual_covariance, rest.T @ rest / 36, rtol=1e-9)
     inverse = np.linalg.inv(x.T @ x)
     size = np.sqrt(np.diag(inverse))
-    np.testing.assert_allclose(fit.error_correlation, inverse / np.outer(size, size), rtol=1e-6)
+    np.testing.assert_allclose(fit.coefficient_error_correlation, inverse / np.outer(size, size), rtol=1e-6)
     white = np.outer(size, np.sqrt(np.diag(fit.residual_covariance)))
     np.testing.assert_allclose(fit.standard_error_inflation, fit.standard_errors / white, rtol=1e-6)
 
@@ -121,7 +121,7 @@ def test_what_is_not_excited_gets_no_coefficient():
     np.testing.assert_allclose(fit.coefficients[0] * 2, alone.coefficients[0], rtol=1e-6)
     assert fit.coefficients[4].tolist() == [0.0] * 3
     assert fit.standard_error_inflation[4].tolist() == [1.0] * 3
-    assert np.isfinite(fit.error_correlation).all()
+    assert np.isfinite(fit.coefficient_error_correlation).all()
     few = regression.least_squares(x[:3], y[:3], run[:3], 5)
     assert np.isfinite(few.residual_covariance).all()
 

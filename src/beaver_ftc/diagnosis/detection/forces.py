@@ -55,7 +55,7 @@ FORCE_RECORD = record(
     scaled_force_per_surface_rad=MAX_SURFACES, previous_scaled_force_per_surface_rad=MAX_SURFACES,
     scaled_force_of_surface_at_command=MAX_SURFACES, scaled_force_per_surface_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
-    acceleration_and_force_per_vane_error=2, roll_acceleration_per_vane_error=float,
+    axis_and_force_innovation_per_vane_error=2, roll_innovation_per_vane_error=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
     trim_noise_variance_with_without_vane=2, noise_variance=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
@@ -124,7 +124,7 @@ def fill_readings_without_vanes(forces, air_rotation, y):
             rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
             force.innovation / forces.dynamic_pressure_over_trim + rotation_effect
-        ) / force.acceleration_and_force_per_vane_error[1]
+        ) / force.axis_and_force_innovation_per_vane_error[1]
 
 
 @kernel
@@ -139,7 +139,7 @@ def stop_using_forces(forces, gust, inertial_gust):
 def integrate_inertial_flow_angle(forces, force, f, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     vane_angle = y[BETA if f == SIDE_COMPONENT else ALPHA]
-    innovation_per_rad = force.acceleration_and_force_per_vane_error[1] * forces.dynamic_pressure_over_trim
+    innovation_per_rad = force.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
     force.inertial_flow_angle = (
         force.inertial_flow_angle + dt * forces.flow_angle_rate[f]
         if forces.n_updates_up_to_minimum
@@ -260,11 +260,11 @@ def configure_forces(
             aircraft, FORCE_COEFFICIENT_NAMES[f], trim
         )
         slopes, slipstream_slope = slopes_with_slipstream[:-1], slopes_with_slipstream[-1]
-        force["acceleration_and_force_per_vane_error"] = (
+        force["axis_and_force_innovation_per_vane_error"] = (
             -acceleration_slopes_by_y[axis, vane],
             -slopes[vane],
         )
-        force["roll_acceleration_per_vane_error"] = -acceleration_slopes_by_y[0, vane]
+        force["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane]
         force["innovation_per_air_rotation"] = slopes[3:]
         total_slopes = slopes.copy()
         total_slopes[AIRSPEED] += slipstream_slope * slipstream_per_airspeed

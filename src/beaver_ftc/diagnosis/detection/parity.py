@@ -401,7 +401,7 @@ def column_entry_and_error(view, forces, bound, G, j):
     """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     i, s = view.plane_axes[j], view.orthogonal_to_surface
     if s == VANE_VIEW:
-        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].acceleration_and_force_per_vane_error[j]
+        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].axis_and_force_innovation_per_vane_error[j]
         return entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(entry)
     if i >= SIDE_FORCE:
         force = forces.component[i - SIDE_FORCE]
@@ -442,9 +442,9 @@ def set_direction_across_vane_and_rolling_gust(view, forces, gust):
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
     """
     force = forces.component[0]
-    roll = force.roll_acceleration_per_vane_error
-    yaw = force.acceleration_and_force_per_vane_error[0]
-    side_force = force.acceleration_and_force_per_vane_error[1]
+    roll = force.roll_innovation_per_vane_error
+    yaw = force.axis_and_force_innovation_per_vane_error[0]
+    side_force = force.axis_and_force_innovation_per_vane_error[1]
     roll_gust = project_on_gust_axis(gust.output.rate_damping[ROLL], gust.output.gust_axes_in_body, 0)
     yaw_gust = project_on_gust_axis(gust.output.rate_damping[YAW], gust.output.gust_axes_in_body, 0)
     roll_component = -side_force * yaw_gust

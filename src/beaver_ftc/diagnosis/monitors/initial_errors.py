@@ -92,7 +92,7 @@ MAX_CHORD_OF_ATTITUDE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off
 MAX_DENSITY_DEVIATION_SHARE = (
     0.25  # of the density from the standard atmosphere at a height, as a share of it
 )
-MIN_DENSITY_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
+MIN_TEMPERATURE_OVER_SEA_LEVEL = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
 MIN_REMAINING_COUPLING_EFFECT_SHARE = 0.8
 SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
@@ -133,7 +133,7 @@ def chord_of_angle(angle):
 @kernel
 def standard_air_density(altitude):
     """Return the density of the standard troposphere, kg/m3; altitude m."""
-    temperature_ratio = max(1.0 - 2.25577e-5 * altitude, MIN_DENSITY_TEMPERATURE_RATIO)
+    temperature_ratio = max(1.0 - 2.25577e-5 * altitude, MIN_TEMPERATURE_OVER_SEA_LEVEL)
     return 1.225 * temperature_ratio**4.2559
 
 

@@ -1,8 +1,8 @@
 """The diagnosis as a whole: its record, its configuration, and the kernels of the scheme in charge.
 
-`begin_scheme`, `advance_to_frame`, `update_verdict`, `prepare_next_frame` and `accumulate_substep` call the
-kernel of a scheme by its number (adaptive_estimators.CompiledScheme; state.SCHEME_KERNEL_PATHS). The frame
-(loop/frame.py) calls them.
+`begin_scheme`, `advance_estimators_to_frame`, `update_verdict`, `prepare_next_frame` and
+`accumulate_substep` call the kernel of a scheme by its number (adaptive_estimators.CompiledScheme;
+state.SCHEME_KERNEL_PATHS). The frame (loop/frame.py) calls them.
 
 fdi: of `diagnosis_dtype`; t s.
 """
@@ -136,7 +136,7 @@ def _load_scheme(path: str) -> CompiledScheme:
 SCHEMES = tuple(map(_load_scheme, SCHEME_KERNEL_PATHS))
 
 begin_scheme = one_of([scheme.begin_scheme for scheme in SCHEMES])
-advance_to_frame = one_of([scheme.advance_to_frame for scheme in SCHEMES])
+advance_estimators_to_frame = one_of([scheme.advance_estimators_to_frame for scheme in SCHEMES])
 update_verdict = one_of([scheme.update_verdict for scheme in SCHEMES])
 prepare_next_frame = one_of([scheme.prepare_next_frame for scheme in SCHEMES])
 accumulate_substep = one_of([scheme.accumulate_substep for scheme in SCHEMES])

@@ -39,15 +39,15 @@ class CompiledScheme(NamedTuple):
     the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
     begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
-    advance_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before to frame k
-    at t s.
+    advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before to
+    frame k at t s.
     update_verdict(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
     prepare_next_frame(fdi, prediction, measured, k): prepare the estimators for the next frame.
     accumulate_substep(fdi, prediction, measured): add one JSBSim frame inside the next frame.
     """
 
     begin_scheme: Callable[..., None]
-    advance_to_frame: Callable[..., None]
+    advance_estimators_to_frame: Callable[..., None]
     update_verdict: Callable[..., None]
     prepare_next_frame: Callable[..., None]
     accumulate_substep: Callable[..., None]
@@ -55,7 +55,7 @@ class CompiledScheme(NamedTuple):
 
 @apart
 def skip_advance_to_frame(fdi, prediction, measured, k, t):
-    """The `advance_to_frame` of a scheme without estimators."""
+    """The `advance_estimators_to_frame` of a scheme without estimators."""
 
 
 @apart
@@ -440,7 +440,7 @@ def begin_scheme(fdi, prediction, measured):
 
 
 @apart
-def advance_to_frame(fdi, prediction, measured, k, t):
+def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     conclusion_record, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
     filters.update_bank(
@@ -508,7 +508,7 @@ def accumulate_substep(fdi, prediction, measured):
 
 
 SCHEME = CompiledScheme(
-    begin_scheme, advance_to_frame, update_verdict, prepare_next_frame, accumulate_substep
+    begin_scheme, advance_estimators_to_frame, update_verdict, prepare_next_frame, accumulate_substep
 )
 
 
@@ -523,5 +523,9 @@ def take_plugin_verdict(fdi, prediction, measured, t):
 
 
 PYTHON_PLUGIN = CompiledScheme(
-    begin_without_diagnosis, advance_to_frame, take_plugin_verdict, prepare_next_frame, accumulate_substep
+    begin_without_diagnosis,
+    advance_estimators_to_frame,
+    take_plugin_verdict,
+    prepare_next_frame,
+    accumulate_substep,
 )

@@ -193,7 +193,7 @@ def fdae_alarm_axis(fdae):
 
 
 @apart
-def advance_to_frame(fdi, prediction, measured, k, t):
+def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published, bound, dt = fdi.published, fdi.bound, fdi.config.dt
     filters.update_bank(
@@ -233,7 +233,7 @@ def update_verdict(fdi, prediction, measured, t):
 
 SCHEME = CompiledScheme(
     begin_scheme,
-    advance_to_frame,
+    advance_estimators_to_frame,
     update_verdict,
     adaptive_estimators.skip_prepare_next_frame,
     adaptive_estimators.skip_accumulate_substep,

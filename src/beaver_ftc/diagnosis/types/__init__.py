@@ -290,7 +290,7 @@ OBSERVATION_RECORD = record(
 
 
 @kernel
-def reset_observation(surface):
+def widen_last_position_to_reach(surface):
     """The surface may have been anywhere within reach."""
     surface.last_observation.position_low, surface.last_observation.position_high = (
         surface.actuator.reachable_low,
@@ -400,7 +400,7 @@ def set_is_anomalous(surface, is_anomalous):
 
 
 @kernel
-def clear_anomalies(surface):
+def mark_observations_not_anomalous(surface):
     """Mark all three observations as not anomalous."""
     surface.last_observation.is_anomalous = surface.judged_observation.is_anomalous = (
         surface.earlier_observation.is_anomalous

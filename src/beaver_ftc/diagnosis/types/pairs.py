@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    clear_anomalies,
+    mark_observations_not_anomalous,
     observed_deflection_error,
     registry,
     restore_first_pitch_fault_sets,
@@ -235,7 +235,7 @@ def begin_second_pitch_fault(types, layout):
     registry.restart_fault_types_of_surface(second)
     for surface in (first, second):
         surface.status.may_be_sole_fault, surface.status.can_be_at_fault_basis = 0, verdict.DEDUCED_FAULTY
-        clear_anomalies(surface)
+        mark_observations_not_anomalous(surface)
 
 
 @kernel
@@ -244,7 +244,7 @@ def alternative_types_would_have_shown(config, surface):
     may_be_growing_bias = verdict.can_be_another_type(
         surface, verdict.sole_remaining_constant_type(surface), False
     )
-    undecided = may_be_growing_bias or verdict.type_can_hide_at_rest(config, surface)
+    undecided = may_be_growing_bias or verdict.remaining_type_can_hide_at_rest(config, surface)
     has_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return has_half_cycle and verdict.types_would_have_shown(config, surface) and not undecided
 

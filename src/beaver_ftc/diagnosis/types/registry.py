@@ -43,11 +43,11 @@ from beaver_ftc.diagnosis.types import (
     infer_position,
     intersect_feasible_set,
     reset_feasible_sets,
-    reset_observation,
     set_feasible_set,
     set_is_anomalous,
     shift_observations,
     table,
+    widen_last_position_to_reach,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -242,7 +242,7 @@ FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES)
 # Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
 # rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
 # was in it, rad.
-EVIDENCE_RECORD = record(
+ANOMALY_COUNTS_RECORD = record(
     n_anomalous_frames=int,
     n_rest_frames=int,
     n_anomalous_frames_since_stop_could_hide=int,
@@ -254,7 +254,7 @@ EVIDENCE_RECORD = record(
 # Whether the surface may be the only one at fault; what decides whether it can be at fault:
 # DECIDED_BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
 # whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
-STATUS_RECORD = record(
+SURFACE_FINDING_RECORD = record(
     may_be_sole_fault=int,
     can_be_at_fault_basis=int,
     is_isolated=int,
@@ -311,8 +311,8 @@ def surface_types_dtype() -> np.dtype:
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
-        evidence=EVIDENCE_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD, **own,
-        estimator_excluded=int, status=STATUS_RECORD, accommodation=ACCOMMODATION_RECORD,
+        evidence=ANOMALY_COUNTS_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD, **own,
+        estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
         first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
     )  # fmt: skip
 
@@ -382,7 +382,7 @@ def restart_fault_types_of_surface(surface):
     """Nothing is known of this surface yet."""
     reset_feasible_sets(surface)
     set_parameter_range_each(surface)
-    reset_observation(surface)
+    widen_last_position_to_reach(surface)
     surface.evidence.first_anomalous_frame = -1
     surface.evidence.n_anomalous_frames = surface.evidence.n_rest_frames = (
         surface.evidence.n_anomalous_frames_since_stop_could_hide

@@ -137,7 +137,7 @@ def sole_remaining_type_if_shown(surface):
 
 
 @kernel
-def type_can_hide_at_rest(config, surface):
+def remaining_type_can_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
@@ -251,8 +251,9 @@ def other_surfaces_refuted(types, chosen_surface):
 def fault_type_on_surface(config, surface):
     """The type of the fault on a surface, taken to be at fault; TYPE_UNDECIDED while more than one fits or
     one may yet show itself."""
-    if surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames or type_can_hide_at_rest(
-        config, surface
+    if (
+        surface.evidence.n_anomalous_frames < config.slowest_half_cycle_frames
+        or remaining_type_can_hide_at_rest(config, surface)
     ):
         return TYPE_UNDECIDED
     if config.has_declared_surface_errors:

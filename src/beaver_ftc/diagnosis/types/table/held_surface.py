@@ -221,7 +221,7 @@ def set_return_interval(release, release_slot, type_index, low, high):
 
 
 @kernel
-def held_or_returning_status(config, surface, type_index, held_position_min, held_position_max):
+def update_held_status(config, surface, type_index, held_position_min, held_position_max):
     """Whether a type holds the surface between these positions (rad) in the judged frame: STATUS_HELD; or has
     released it, and the actuator may be bringing it back: STATUS_RETURNING; or neither explains it:
     STATUS_REFUTED."""
@@ -247,7 +247,7 @@ def held_or_returning_set(config, surface, type_index, held_position_min, held_p
     none otherwise."""
     return (
         EMPTY_SET
-        if held_or_returning_status(config, surface, type_index, held_position_min, held_position_max)
+        if update_held_status(config, surface, type_index, held_position_min, held_position_max)
         == STATUS_REFUTED
         else UNLIMITED_SET
     )
@@ -327,7 +327,7 @@ def reset_stuck_memory(surface, type_index):
 @kernel
 def consistent_stuck_interval(config, surface, type_index, k):
     """It stays where it is."""
-    status = held_or_returning_status(
+    status = update_held_status(
         config,
         surface,
         type_index,

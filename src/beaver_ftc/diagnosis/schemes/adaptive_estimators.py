@@ -39,8 +39,8 @@ class CompiledScheme(NamedTuple):
     the scheme: `module`, whose SCHEME it is, or `module:NAME`.
 
     begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
-    advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before to
-    frame k at t s.
+    advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before
+    to frame k at t s.
     update_verdict(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
     prepare_next_frame(fdi, prediction, measured, k): prepare the estimators for the next frame.
     accumulate_substep(fdi, prediction, measured): add one JSBSim frame inside the next frame.

@@ -57,7 +57,10 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
     yield "which law?", f"`{scenario.control.law}`", "control.law"
     yield "which diagnosis?", f"`{fdi.scheme}`, looking for the fault class `{fdi.fault_class}`", "fdi.scheme"
     constant, share = bounds.constant_rad_s2.q, bounds.inertia_coupling.q
-    declared = f"a model error of {constant:g} rad/s² and {share:.0%} of the inertia coupling on each axis"
+    declared = (
+        f"a model error of {constant:g} rad/s² and {100 * share:.0f} % of the inertia coupling (angular "
+        "acceleration from products of two rates) on each axis"
+    )
     yield "which uncertainty is declared?", declared, "fdi.bounds"
     yield "is the statistical detector on?", "no" if fdi.statistical is None else "yes", "fdi.statistical"
     yield "which seed?", f"{scenario.seed}", "seed"

@@ -4,7 +4,7 @@ import json
 import re
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ PLANES = {
 }
 LONGEST_S = 900
 YES, NO = "✓", "✗"
+STUDIES = ("sweep", "compare", "detectability", "power")
 
 
 @dataclass(frozen=True)
@@ -69,13 +70,13 @@ def features() -> str:
 
 
 def features_probe() -> str:
-    """On the aircraft that is built in."""
-    return _table(("beaver",))
+    """On the aircraft that is built in, without the studies of several flights."""
+    return _table(("beaver",), [feature for feature in FEATURES if feature.line.split()[0] not in STUDIES])
 
 
-def _table(planes: Iterable[str]) -> str:
+def _table(planes: Iterable[str], features: Sequence[Feature] = FEATURES) -> str:
     reasons: list[str] = []
-    rows = [[feature.name] for feature in FEATURES] + [
+    rows = [[feature.name] for feature in features] + [
         ["`matrix`"],
         ["`matrix --declared`"],
         ["`live`, changes in flight"],
@@ -83,7 +84,7 @@ def _table(planes: Iterable[str]) -> str:
     for plane in planes:
         if plane.startswith("jsbsim:"):
             derive_if_needed(plane)
-        said = [_tried(feature, plane) for feature in FEATURES]
+        said = [_tried(feature, plane) for feature in features]
         said += [_matrix(plane, declared=told) for told in (False, True)] + [_live(plane)]
         for row, why in zip(rows, said, strict=True):
             if why and why not in reasons:

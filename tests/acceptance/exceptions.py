@@ -32,9 +32,15 @@ TABLE = (
         "in a checkout: sets up from the package index; make test runs this very suite",
     ),
     Exempt(
-        r"beaver-ftc (derive AIRCRAFT|mismatch SCENARIO)\b.*",
+        r"beaver-ftc (?!run SCENARIO --)([a-z]+(?: (?:new|grade|submit|gtm)\b)?)"
+        r".*?(?<!--out) [A-Z]+(?:,[A-Z]+)*(?: .*)?",
         "names the arguments",
-        "beaver-ftc derive --help && beaver-ftc mismatch --help",
+        r"beaver-ftc \1 --help",
+    ),
+    Exempt(
+        r"beaver-ftc evidence flight-controls",
+        "minutes: the flights of a whole plan, which the page prints",
+        "beaver-ftc evidence --help",
     ),
     Exempt(
         r"beaver-ftc mechanisms .*",
@@ -118,7 +124,7 @@ TABLE = (
     ),
     Exempt(
         r"beaver-ftc (run|validate|check|sweep|compare|detectability|evidence|sitl|mismatch|separate"
-        r"|import gtm)",
+        r"|import gtm|identify(?= --check))(?: --check)?",
         "names the command without its arguments",
         r"beaver-ftc \1 --help",
     ),

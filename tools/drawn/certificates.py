@@ -107,7 +107,7 @@ def certified(
             continue
         document, evidence = timed(flight, ms)
         log = Columns()
-        copy_with_columns(flight._kept(), evidence, log)
+        copy_with_columns(flight._log_or_raise(), evidence, log)
         log.close()
         yield drawn.index, json.loads(as_text(document)), dict(log), to_yaml(flight.scenario)
         found += 1
@@ -118,15 +118,15 @@ def certified(
 def timed(flight: bf.Flight, ms: Times) -> tuple[Document, EvidenceColumns]:
     """A flight's certificate and the columns that prove it; ms: of the processor, what keeping its frames
     adds, and to write it."""
-    rows, scenario = logged_columns(flight._kept()), flight.scenario
+    rows, scenario = logged_columns(flight._log_or_raise()), flight.scenario
     if not event_rows(rows):
-        return certificate(scenario, flight._kept())
+        return certificate(scenario, flight._log_or_raise())
     recorder, began = Recorder(scenario), process_time()
     fly(scenario)
     plain = process_time()
     fly(scenario, watch=recorder.watch)
     flown = process_time()
-    found = certificate(scenario, flight._kept(), recorder)
+    found = certificate(scenario, flight._log_or_raise(), recorder)
     ms.append((1e3 * (flown - plain - (plain - began)), 1e3 * (process_time() - flown)))
     return found
 

@@ -25,7 +25,7 @@ class Linearise(StudyCommand):
     prints the handling qualities at the end of the flight.
 
     Examples:
-      beaver-ftc linearise elevator-partial-loss
+      beaver-ftc linearise elevator-loss-in-turbulence
 
     scenario: Scenario file or built-in name from which sensors, actuators and law are read.
     """

@@ -100,10 +100,6 @@ TABLE = (
     ),
     Exempt(r"(sim_vehicle.py|PX4_SIM_MODEL=).*", "needs ArduPilot or PX4"),
     Exempt(
-        r"beaver-ftc compare --flights FOLDER.*",
-        "needs the recorded flights, which are not of this project (tests/products/logs has some of its own)",
-    ),
-    Exempt(
         r"beaver-ftc compare (--tune|.*--tuned|.*learned-network).*",
         "a search of minutes, which tests/studies/compare does on few flights, or what it writes",
         "beaver-ftc compare --help",

@@ -15,11 +15,13 @@ def until(page, condition, wait_s=WAIT_S):
     """Wait for a condition in the page. Not Playwright's own: the page's policy forbids evaluating text."""
     for _ in range(int(wait_s / 0.05)):
         if page.evaluate(condition):
-            return
+            return True
         page.wait_for_timeout(50)
     raise AssertionError(f"not in {wait_s:g} s: {condition}")
 
 
 def shows(page, selector, part):
-    """Wait until an element shows a text: the page draws a frame only when the screen next asks."""
-    until(page, f"document.querySelector({json.dumps(selector)})?.textContent.includes({json.dumps(part)})")
+    """Whether an element comes to show a text: the page draws a frame only when the screen next asks."""
+    return until(
+        page, f"document.querySelector({json.dumps(selector)})?.textContent.includes({json.dumps(part)})"
+    )

@@ -84,13 +84,13 @@ def test_frames_are_drawn_as_the_screen_asks(page):
 
 def test_a_broken_surface_is_detected_named_and_repaired(page):
     break_elevator(page)
-    shows(page, "#verdict", "elevator")
-    shows(page, "#alarm", "ALARM")
-    shows(page, "#candidates", "elevator named")
-    shows(page, "#mode", "reallocated")  # a frame after the name
+    assert shows(page, "#verdict", "elevator")
+    assert shows(page, "#alarm", "ALARM")
+    assert shows(page, "#candidates", "elevator named")
+    assert shows(page, "#mode", "reallocated")  # a frame after the name
     page.locator("#tab-events").click()
     for word in ("broken", "alarm", "named", "supervisor"):
-        shows(page, "#events", word)
+        assert shows(page, "#events", word)
     page.keyboard.press("0")
     until(page, "cockpit.flight.frame.effectiveness.every((x) => x === 1)")
 
@@ -126,7 +126,7 @@ def test_the_game_tells_nothing_before_the_answer(page):
     page.locator("#tab-game").click()
     page.locator("#answers button", has_text="elevator").click()
     until(page, "cockpit.flight.state.game.phase === 'over'")
-    shows(page, "#game-says", "It was the elevator")
+    assert shows(page, "#game-says", "It was the elevator")
 
 
 def test_the_autopilot_is_sent_to_an_altitude(page):
@@ -187,7 +187,7 @@ def test_a_gamepads_stick_steers(page):
     rates = page.evaluate("cockpit.flight.frame.stick")
     assert np.degrees(rates) == pytest.approx([2.5, -5.0, 0.0])
     page.locator("#tab-fly").click()
-    shows(page, "#stick-says", "roll 2.5, pitch -5, yaw 0")
+    assert shows(page, "#stick-says", "roll 2.5, pitch -5, yaw 0")
     until(page, "cockpit.value('p_reference_rad_s') !== null")
     page.evaluate("window.pads = []")
     until(page, "cockpit.flight.frame.stick === null")
@@ -195,18 +195,18 @@ def test_a_gamepads_stick_steers(page):
 
 def test_law_and_diagnosis_are_changed_at_once(page):
     break_elevator(page)
-    shows(page, "#verdict", "elevator")
+    assert shows(page, "#verdict", "elevator")
     page.locator("#tab-flight").click()
     page.locator("[name=law]").select_option("lqr")
     page.locator("[name=scheme]").select_option("none")
     page.locator("#change").click()
     until(page, "cockpit.flight.state.flying.law === 'lqr' && !cockpit.flight.frame.detected")
-    shows(page, "#flying", "law lqr, diagnosis none")
-    shows(page, "#alarm", "no diagnosis ran: fdi.scheme is none")
+    assert shows(page, "#flying", "law lqr, diagnosis none")
+    assert shows(page, "#alarm", "no diagnosis ran: fdi.scheme is none")
     page.locator("[name=scheme]").select_option("adaptive-estimators")
     page.locator("#change").click()
-    shows(page, "#alarm", "ALARM")
-    shows(page, "#candidates", "elevator")  # named it is not: it was broken when the watch began
+    assert shows(page, "#alarm", "ALARM")
+    assert shows(page, "#candidates", "elevator")  # named it is not: it was broken when the watch began
     before = page.evaluate("cockpit.flight.state.flying")
     page.locator("#renew").click()
     until(page, "document.querySelectorAll('#events b').length >= 9")
@@ -217,9 +217,9 @@ def test_law_and_diagnosis_are_changed_at_once(page):
 def test_a_sensor_is_broken_and_named(page):
     page.locator("#sensor").select_option("q")
     page.locator("#sensor-break").click()
-    shows(page, "#verdict", "sensor q")
-    shows(page, "#alarm", "ALARM")
-    shows(page, "#sensors legend", "✕ q")
+    assert shows(page, "#verdict", "sensor q")
+    assert shows(page, "#alarm", "ALARM")
+    assert shows(page, "#sensors legend", "✕ q")
     page.locator("#sensor-repair").click()
     until(page, "cockpit.flight.state.broken.length === 0")
 
@@ -247,7 +247,7 @@ def test_what_is_broken_is_said_without_colour(page):
     assert page.inner_text("#legend") == "click a surface to break it"
     break_elevator(page)
     until(page, "document.querySelector('#legend').textContent === '✕ broken: elevator'")
-    shows(page, "fieldset[data-surface=elevator] legend", "broken")
+    assert shows(page, "fieldset[data-surface=elevator] legend", "broken")
     assert "broken" not in page.inner_text("fieldset[data-surface=rudder] legend")
 
 
@@ -267,7 +267,7 @@ def test_a_fault_of_the_scenario_is_shown_while_it_is_there(page):
     assert page.evaluate("cockpit.value('t_s')") >= 12
     until(page, "document.querySelector('#legend').textContent === '✕ broken: rudder'")
     page.locator("#tab-break").click()
-    shows(page, "fieldset.broken legend", "broken: stuck")
+    assert shows(page, "fieldset.broken legend", "broken: stuck")
     assert [button.get_attribute("aria-label") for button in pressed.all()] == ["rudder: jam"]
     assert page.evaluate("cockpit.flight.frame.effectiveness") == [1, 1, 0, 1]
     page.locator("#repair-all").click()
@@ -285,7 +285,7 @@ def test_the_page_says_which_faults_the_diagnosis_knows(page):
     watched(page)
     page.locator("fieldset[data-surface=elevator] >> text=jam").click()
     until(page, "/^Named: elevator, /.test(document.querySelector('#verdict').textContent)")
-    shows(page, "#verdict", "stuck")
+    assert shows(page, "#verdict", "stuck")
 
 
 def test_everything_that_can_be_pressed_has_a_name(page):

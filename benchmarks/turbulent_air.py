@@ -105,7 +105,7 @@ class Watched:
 
     def __init__(self, loop: Loop) -> None:
         self._statistical = loop.frames["fdi"]["statistical"][0]
-        self._level = float(self._statistical["tests"]["alarm_level"])
+        self._level = float(self._statistical["test_config"]["alarm_level"])
         self._views = self._statistical["views"][: int(self._statistical["n_views"])]
         self.largest = dict.fromkeys(TESTS, 0.0)
 
@@ -119,8 +119,10 @@ class Watched:
             losses = tried["kind"] == LOSS
             for test, of_it in (("loss", tried["score"][losses]), ("step", tried["score"][~losses])):
                 self._note(test, of_it.max(initial=0.0))
-        own = (self._views["surface"] == AXIS_VIEW) & (self._views["inertial"] == 0)
-        self._note("tone of an axis", self._views["tones"]["score"][own].max(initial=0.0))
+        own = (self._views["orthogonal_to_surface"] == AXIS_VIEW) & (
+            self._views["uses_inertial_flow_angle"] == 0
+        )
+        self._note("tone of an axis", self._views["tone_tests"]["score"][own].max(initial=0.0))
         self._note("force", self._forces())
 
     def _forces(self) -> float:

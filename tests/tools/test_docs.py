@@ -64,9 +64,10 @@ def test_property_without_a_meaning_is_refused():
 
 
 HEADLINE = re.compile(
-    r"The paper has (\d+) statements\. (\d+) can be tested: (\d+) hold, (\d+) do not hold, and (\d+) hold "
-    r"with and without .*? (\d+) of the \d+ also hold in every one of (\d+) settings .*? "
-    r"(\d+) follow from .*?; all of these hold .*? (\d+) contain nothing"
+    r"The paper has (\d+) statements\. (\d+) of them can be tested: (\d+) hold, (\d+) do not hold, and "
+    r"(\d+) hold even without .*? (\d+) of the \d+ also hold in each of (\d+) settings .*? "
+    r"(\d+) other statements follow from .*?\. All of these hold .*? The last (\d+) statements contain "
+    r"nothing"
 )
 COUNTED = (
     "all", "statements", "hold", "do not", "unsettled", "elsewhere", "settings", "built", "background",

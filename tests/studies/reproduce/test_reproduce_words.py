@@ -150,10 +150,11 @@ def test_both_schemes_and_both_designs_in_rows():
 
 def test_the_outcome_in_a_sentence():
     assert words.headline(DOCUMENT) == (
-        "The paper has 23 statements. 5 can be tested: 2 hold, 2 do not hold, and 1 hold with and without "
-        "the mechanism that the statement credits. 1 of the 2 also hold in every one of 2 settings that the "
-        "paper did not fly. 7 follow from the construction of the code, so they show nothing about the "
-        "scheme; 6 of these 7 hold in our flights. 11 contain nothing that can be measured."
+        "The paper has 23 statements. 5 of them can be tested: 2 hold, 2 do not hold, and 1 hold even "
+        "without the mechanism that the paper gives as the reason. 1 of the 2 also hold in each of 2 "
+        "settings that the paper did not fly. 7 other statements follow from the construction of the code. "
+        "6 of these 7 hold in our flights, but they show nothing about the scheme. The last 11 statements "
+        "contain nothing that can be measured."
     )
     assert words.summary(DOCUMENT).endswith(
         "10 of 12 flights with a fault have the same alarm, the same name and the same time as with "

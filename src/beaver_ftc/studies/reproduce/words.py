@@ -165,14 +165,15 @@ def headline(document: Document) -> str:
     tested, built = document["testable"], document["construction"]
     settings = len(document["sensitivity"])
     some, count, background = built["hold"], built["statements"], document["background"]
-    holding = "all of these hold" if some == count else f"{some} of these {count} hold"
+    holding = "All of these hold" if some == count else f"{some} of these {count} hold"
     return (
-        f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} can "
-        f"be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and {tested['unsettled']} hold "
-        f"with and without the mechanism that the statement credits. {tested['elsewhere']} of the "
-        f"{tested['hold']} also hold in every one of {settings} settings that the paper did not fly. "
-        f"{count} follow from the construction of the code, so they show nothing about the scheme; {holding} "
-        f"in our flights. {background} contain nothing that can be measured."
+        f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} of "
+        f"them can be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and "
+        f"{tested['unsettled']} hold even without the mechanism that the paper gives as the reason. "
+        f"{tested['elsewhere']} of the {tested['hold']} also hold in each of {settings} settings that the "
+        f"paper did not fly. {count} other statements follow from the construction of the code. {holding} in "
+        f"our flights, but they show nothing about the scheme. The last {background} statements contain "
+        "nothing that can be measured."
     )
 
 
@@ -180,8 +181,9 @@ def adaptation_sentence(document: Document) -> str:
     """What the adaptation of the isolation estimators changes."""
     found = document["adaptation"]
     return (
-        f"Without the adaptation of the isolation estimators (gain 0), {found['same']} of {found['flights']} "
-        "flights with a fault have the same alarm, the same name and the same time as with adaptation."
+        "Each isolation estimator adapts its estimate of the fault in flight. Without this adaptation "
+        f"(gain 0), {found['same']} of {found['flights']} flights with a fault have the same alarm, the same "
+        "name and the same time as with adaptation."
     )
 
 

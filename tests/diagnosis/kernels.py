@@ -115,15 +115,18 @@ def of_stages(fdi, kernel):
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
-        "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"], "bound": fdi["bound"],
+        "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
+        **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(
             ("shared", "shared_by_axes", "axes_share_theta"),
             fdi["isolation"]["config"]["shares_theta_across_axes"],
         ),
-        "abrupt": fdi["config"]["abrupt"], "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
-        "n_substeps": fdi["config"]["n_substeps"], "bank": fdi["bank"], "fdae": fdi["fdae"],
+        **dict.fromkeys(("abrupt", "fault_is_declared_constant"), fdi["config"]["abrupt"]),
+        "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
+        "n_substeps": fdi["config"]["n_substeps"],
+        **dict.fromkeys(("bank", "filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
         "innovation": fdi["bank"]["output"]["innovation"],
-        **dict.fromkeys(("detected", "is_fault_detected"), fdi["verdict"]["detected"]),
+        **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
         "innovation_bound": fdi["bound"]["frame_innovation_bound"],
         **dict.fromkeys(("noise", "gyro_error_change_bound"), fdi["bound"]["gyro_error_change_bound"]), "dt":
         fdi["config"]["dt"], "statistical_alarm": fdi["statistical"]["alarm"],

@@ -246,12 +246,12 @@ def test_what_is_supposed_of_a_frame(memory):
     estimator(fdi, surface=2)
     G, Gu, spread = rng.normal(size=(3, 3, 4))
     fdi["isolation"]["config"]["uses_reach_test"], fdi["verdict"]["detected"] = memory, 0
-    on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_all_fault_effects_and_reach, fdi, G, Gu, np.abs(spread))
     fie = fdi["isolation"]["estimator"][0]
     assert fie["reachable_bank_residual_low"][:3, :3].any() == memory
     assert fie["frame_mean_effect"]["regressor"].any() == memory
     fdi["verdict"]["detected"] = 1
-    on(isolation.update_fault_effects, fdi, G, Gu, np.abs(spread))
+    on(isolation.update_all_fault_effects_and_reach, fdi, G, Gu, np.abs(spread))
     assert fie["frame_mean_effect"]["regressor"] == pytest.approx(Gu[:, 2])
     assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(np.abs(spread[:, 2]))
 
@@ -364,7 +364,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
         1.0,
     )
     fdi["config"]["n_substeps"] = 1
-    on(isolation.update_fault_effect, fdi, fie, G, Gu, np.full((3, 4), 0.1))
+    on(isolation.update_fault_effect_and_reach, fdi, fie, G, Gu, np.full((3, 4), 0.1))
     assert (fie["frame_mean_effect"]["error_bound"] > 0.1).tolist() == [wider] * 3
 
 

@@ -401,7 +401,9 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
 def take(fdi, given, t):
     """A frame's verdict of a plug-in, as the frame of the loop takes it."""
     on(conclusion.record_plugin_verdict, fdi, given, t)
-    isolation.copy_plugin_estimate(fdi["isolation"], fdi["verdict"]["isolated_estimator"], given["theta"])
+    isolation.replace_theta_by_plugin_estimate(
+        fdi["isolation"], fdi["verdict"]["isolated_estimator"], given["theta"]
+    )
 
 
 def test_a_plug_ins_verdict_takes_the_place_of_the_built_in_one():

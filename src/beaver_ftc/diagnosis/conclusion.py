@@ -30,7 +30,7 @@ WITHDRAWN_ISOLATION_RECORD = record(surface=int, from_s=float, to_s=float)
 
 
 @sized
-def conclusion_dtype(n: int) -> np.dtype:
+def conclusion_dtype(n_surfaces: int) -> np.dtype:
     """The conclusion about n surfaces. isolated_estimator: that of the isolated fault, NOT_ISOLATED or
     UNANTICIPATED. fault_type: of the isolated fault, -1 if open. accommodated_surface, accommodation_mode:
     the surface the law acts upon, and its accommodation mode. effectiveness: of every surface, where a
@@ -40,7 +40,7 @@ def conclusion_dtype(n: int) -> np.dtype:
         detected=int, detected_at_s=float, detected_axis=int, isolated_estimator=int, isolated_at_s=float,
         fault_type=int, type_decided_at_s=float, accommodated_surface=int, accommodation_mode=int,
         has_effectiveness=int,
-        effectiveness=n, isolated_from_s=n,
+        effectiveness=n_surfaces, isolated_from_s=n_surfaces,
         n_withdrawn_isolations=int,
         withdrawn_isolations=(WITHDRAWN_ISOLATION_RECORD, MAX_WITHDRAWN_ISOLATIONS),
     )  # fmt: skip
@@ -109,10 +109,14 @@ def update_isolation_interval(conclusion, surface, is_isolated, t):
     if is_isolated and isolated_from_s < 0.0:
         conclusion.isolated_from_s[surface] = t
     elif isolated_from_s >= 0.0 and not is_isolated:
-        withdrawn = conclusion.withdrawn_isolations[
+        withdrawn_isolation = conclusion.withdrawn_isolations[
             min(conclusion.n_withdrawn_isolations, MAX_WITHDRAWN_ISOLATIONS - 1)
         ]
-        withdrawn.surface, withdrawn.from_s, withdrawn.to_s = surface, isolated_from_s, t
+        withdrawn_isolation.surface, withdrawn_isolation.from_s, withdrawn_isolation.to_s = (
+            surface,
+            isolated_from_s,
+            t,
+        )
         conclusion.n_withdrawn_isolations += 1
         conclusion.isolated_from_s[surface] = -1.0
 
@@ -139,7 +143,7 @@ MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY = 400.0
 
 
 @sized
-def assessment_dtype(n: int) -> np.dtype:
+def assessment_dtype(n_surfaces: int) -> np.dtype:
     """The assessment of n surfaces.
 
     detected: a fault; no_surface_to_accommodate: true without a fault as well; isolated_surface: -1 for
@@ -152,8 +156,9 @@ def assessment_dtype(n: int) -> np.dtype:
     return record(
         detected=int, no_surface_to_accommodate=int, diagnoses_all_types=int, isolated_surface=int,
         any_surface_lags=int,
-        accommodation_mode=(int, n),
-        effectiveness=n, apply_immediately=(int, n), deflection_offset=n, deflection_lag=n,
+        accommodation_mode=(int, n_surfaces),
+        effectiveness=n_surfaces, apply_immediately=(int, n_surfaces), deflection_offset=n_surfaces,
+        deflection_lag=n_surfaces,
         unknown_acceleration=3,
         pitch_undecided=int,
     )  # fmt: skip
@@ -163,10 +168,13 @@ def assessment_dtype(n: int) -> np.dtype:
 def assess_surfaces(assessment, config, conclusion, types, layout, estimators, statistical_detector):
     """Fill the assessment of this frame from the outputs of the stages; statistical_detector: of
     `statistical_dtype`."""
-    diagnoses_all_types, isolated = config.diagnoses_all_types, isolated_surface(conclusion, estimators)
+    diagnoses_all_types, isolated_surface_index = (
+        config.diagnoses_all_types,
+        isolated_surface(conclusion, estimators),
+    )
     assessment.detected, assessment.diagnoses_all_types = conclusion.detected, diagnoses_all_types
     assessment.isolated_surface, assessment.any_surface_lags, assessment.no_surface_to_accommodate = (
-        isolated,
+        isolated_surface_index,
         0,
         no_surface_to_accommodate(conclusion),
     )
@@ -178,11 +186,11 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             assessment.effectiveness[s] = conclusion.effectiveness[s]
         elif assessment.accommodation_mode[s] >= 0:
             assess_surface_at_fault(assessment, types, layout, estimators, s)
-        elif s == isolated and not diagnoses_all_types:
+        elif s == isolated_surface_index and not diagnoses_all_types:
             uses_statistics = uses_statistical_estimates(
                 statistical_detector.test_config, config.alarm_authority
             )
-            is_precise = (
+            is_loss_precise = (
                 uses_statistics
                 and statistical.estimate_loss(statistical_detector.block, s)[1]
                 > MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY
@@ -190,7 +198,7 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
             theta = estimated_theta_of_isolated_loss(
                 config, conclusion, layout, estimators, statistical_detector, s
             )
-            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, is_precise
+            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, is_loss_precise
 
 
 @kernel
@@ -221,38 +229,42 @@ def estimated_theta_of_isolated_loss(config, conclusion, layout, estimators, sta
 
 
 @kernel
-def uses_statistical_estimates(tests, alarm_authority):
+def uses_statistical_estimates(test_config, alarm_authority):
     """Whether the estimates of the statistical detector are used."""
-    return tests.enabled and alarm_authority != WORST_CASE_DETECTOR
+    return test_config.enabled and alarm_authority != WORST_CASE_DETECTOR
 
 
 @kernel
 def assess_unknown_acceleration(
-    assessment, config, conclusion, types, layout, statistical_detector, fdae, bound
+    assessment, config, conclusion, types, layout, statistical_detector, fdae, bound_record
 ):
-    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound: what is
-    declared.
+    """Fill unknown_acceleration and pitch_undecided; fdae: its record; bound_record: what
+    is declared.
 
     The lag of a slow surface gives no unknown acceleration: to compensate it would wind up the command.
     """
     unknown_acceleration, diagnoses_all_types = assessment.unknown_acceleration, config.diagnoses_all_types
     unknown_acceleration[:] = 0.0
-    lags = conclusion.accommodated_surface >= 0 and conclusion.accommodation_mode == WAIT_FOR_SURFACE
+    accommodates_lag = (
+        conclusion.accommodated_surface >= 0 and conclusion.accommodation_mode == WAIT_FOR_SURFACE
+    )
     if (
         conclusion.detected
-        and not lags
+        and not accommodates_lag
         and uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority)
     ):
         statistical.fill_statistical_unknown_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration
         )
-    elif conclusion.detected and not lags:
-        filters.fill_fdae_unknown_acceleration(fdae, bound.gyro_error_change_bound, unknown_acceleration)
-    is_undecided = (
+    elif conclusion.detected and not accommodates_lag:
+        filters.fill_fdae_unknown_acceleration(
+            fdae, bound_record.gyro_error_change_bound, unknown_acceleration
+        )
+    fault_is_undecided = (
         diagnoses_all_types and conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED
     )
-    has_half_cycle = (
+    pitch_anomaly_spans_half_cycle = (
         types.surface[layout.main[PITCH]].evidence.n_anomalous_frames
         >= types.config.slowest_half_cycle_frames
     )
-    assessment.pitch_undecided = is_undecided and has_half_cycle
+    assessment.pitch_undecided = fault_is_undecided and pitch_anomaly_spans_half_cycle

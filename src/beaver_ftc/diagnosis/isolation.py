@@ -86,28 +86,30 @@ def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min
     high); low > high if none."""
     if regressor == 0.0:
         return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_SET
-    first_end, other_end = (
+    end_at_lower_effect, end_at_upper_effect = (
         (measured_effect - error_bound) / regressor,
         (measured_effect + error_bound) / regressor,
     )
-    return max(theta_min, min(first_end, other_end)), min(theta_max, max(first_end, other_end))
+    return max(theta_min, min(end_at_lower_effect, end_at_upper_effect)), min(
+        theta_max, max(end_at_lower_effect, end_at_upper_effect)
+    )
 
 
 @kernel
-def consistent_theta_interval_on_axis(innovation, bound, fie, effect, i):
+def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, effect, axis):
     """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
 
-    It is the whole known set if the axis is ignored. bound (3,) rad/s2: on the innovation without a fault;
+    It is the whole known set if the axis is ignored. innovation_bound (3,) rad/s2: without a fault;
     effect: acceleration by the fault, of dtype FAULT_EFFECT_RECORD.
     """
-    if fie.ignored_axes[i]:
+    if fie.ignored_axes[axis]:
         return fie.theta_min, fie.theta_max
     measured_effect, error_bound = (
-        innovation[i] - effect.acceleration_at_zero_theta[i],
-        bound[i] + effect.error_bound[i],
+        innovation[axis] - effect.acceleration_at_zero_theta[axis],
+        innovation_bound[axis] + effect.error_bound[axis],
     )
     return consistent_theta_interval(
-        measured_effect, error_bound, effect.regressor[i], fie.theta_min, fie.theta_max
+        measured_effect, error_bound, effect.regressor[axis], fie.theta_min, fie.theta_max
     )
 
 
@@ -122,7 +124,7 @@ def axis_of_largest_effect(regressor):
 
 
 @kernel
-def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
+def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps):
     """Widen the tolerance of a position by the errors of the surface's own terms at that position.
 
     eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
@@ -132,48 +134,51 @@ def widen_tolerance_by_surface_errors(fie, bound, innovation, n_substeps):
     """
     s, effect = fie.surface, fie.frame_mean_effect
     axis = axis_of_largest_effect(effect.regressor)
-    previous_max_deflection, max_deflection = (
+    previous_max_abs_deflection, max_abs_deflection = (
         fie.max_abs_deflection_in_last_frame,
         max(abs(fie.theta_min), abs(fie.theta_max)),
     )
-    error_bound, error_map, position_range = (
+    effect_error_bound, error_map, position_range = (
         effect.error_bound[axis],
-        bound.model_error_map,
+        bound_record.model_error_map,
         (fie.theta_min, fie.theta_max),
     )
-    map_level = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
+    map_level_index = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
     measured_effect = innovation[axis] - effect.acceleration_at_zero_theta[axis]
-    deflection_at_first_substep = 2.0 * previous_max_deflection / n_substeps if n_substeps > 1 else 0.0
+    first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
-        surface_error = max(
-            bound.surface_error_per_rad[axis, s] * (max_deflection + deflection_at_first_substep)
-            - bound.surface_error_at_command[axis, s],
+        extra_error_bound = max(
+            bound_record.surface_error_per_rad[axis, s] * (max_abs_deflection + first_substep_allowance_rad)
+            - bound_record.surface_error_at_command[axis, s],
             0.0,
         )
-        surface_error += bound.additional_error_by_travel_level[map_level, axis]
-        low, high = consistent_theta_interval(
+        extra_error_bound += bound_record.additional_error_by_travel_level[map_level_index, axis]
+        position_low, position_high = consistent_theta_interval(
             measured_effect,
-            bound.frame_innovation_bound[axis] + error_bound + surface_error,
+            bound_record.frame_innovation_bound[axis] + effect_error_bound + extra_error_bound,
             effect.regressor[axis],
             fie.theta_min,
             fie.theta_max,
         )
-        if low > high:
+        if position_low > position_high:
             break
-        max_deflection, position_range = min(max_deflection, max(abs(low), abs(high))), (low, high)
-        map_level = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
-    fie.max_abs_deflection_in_last_frame = max_deflection
+        max_abs_deflection, position_range = (
+            min(max_abs_deflection, max(abs(position_low), abs(position_high))),
+            (position_low, position_high),
+        )
+        map_level_index = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
+    fie.max_abs_deflection_in_last_frame = max_abs_deflection
     if error_map.one_surface_may_be_anywhere:
         fie.max_travel_share_in_last_frame = max_travel_share_used(
             error_map, s, position_range, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
         effect.error_bound[i] += max(
-            bound.surface_error_per_rad[i, s] * (max_deflection + deflection_at_first_substep)
-            - bound.surface_error_at_command[i, s],
+            bound_record.surface_error_per_rad[i, s] * (max_abs_deflection + first_substep_allowance_rad)
+            - bound_record.surface_error_at_command[i, s],
             0.0,
         )
-        effect.error_bound[i] += bound.additional_error_by_travel_level[map_level, i]
+        effect.error_bound[i] += bound_record.additional_error_by_travel_level[map_level_index, i]
 
 
 @kernel
@@ -198,13 +203,13 @@ def some_theta_explains_innovation(fie, innovation, innovation_bound):
     """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
     if uncertainty_explains_innovation(innovation, innovation_bound):
         return True
-    low, high = fie.theta_min, fie.theta_max
+    theta_low, theta_high = fie.theta_min, fie.theta_max
     for i in range(3):
-        axis_low, axis_high = consistent_theta_interval_on_axis(
+        axis_theta_low, axis_theta_high = consistent_theta_interval_on_axis(
             innovation, innovation_bound, fie, fie.frame_mean_effect, i
         )
-        low, high = max(low, axis_low), min(high, axis_high)
-    return low <= high
+        theta_low, theta_high = max(theta_low, axis_theta_low), min(theta_high, axis_theta_high)
+    return theta_low <= theta_high
 
 
 @kernel
@@ -216,13 +221,13 @@ def reset_feasible_theta_sets(fie, projection_disabled):
 
 
 @kernel
-def intersect_feasible_theta_sets(fie, i, interval, shared_by_axes):
+def intersect_feasible_theta_sets(fie, axis, interval, shared_by_axes):
     """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `interval`."""
-    low, high = interval
+    theta_low, theta_high = interval
     for j in range(3):
-        if shared_by_axes or j == i:
-            fie.feasible_theta_min[j] = max(fie.feasible_theta_min[j], low)
-            fie.feasible_theta_max[j] = min(fie.feasible_theta_max[j], high)
+        if shared_by_axes or j == axis:
+            fie.feasible_theta_min[j] = max(fie.feasible_theta_min[j], theta_low)
+            fie.feasible_theta_max[j] = min(fie.feasible_theta_max[j], theta_high)
 
 
 @kernel
@@ -232,16 +237,16 @@ def narrow_feasible_theta_sets(fie, innovation, innovation_bound, shared_by_axes
     Filtered: eps + Omega thetahat = Omega theta + filtered uncertainty, for any course of the estimate.
     """
     for i in range(3):
-        consistent_in_frame = consistent_theta_interval_on_axis(
+        frame_theta_interval = consistent_theta_interval_on_axis(
             innovation, innovation_bound, fie, fie.frame_mean_effect, i
         )
-        intersect_feasible_theta_sets(fie, i, consistent_in_frame, shared_by_axes)
-        filtered_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
+        intersect_feasible_theta_sets(fie, i, frame_theta_interval, shared_by_axes)
+        filtered_measured_effect = fie.residual[i] + fie.filtered_regressor[i] * fie.theta[i]
         intersect_feasible_theta_sets(
             fie,
             i,
             consistent_theta_interval(
-                filtered_effect,
+                filtered_measured_effect,
                 fie.filtered_uncertainty_bound[i],
                 fie.filtered_regressor[i],
                 fie.theta_min,
@@ -263,18 +268,24 @@ def set_effect_error_bound(effect, effect_error_bound, surface):
 
 
 @kernel
-def clear_mean_effect(mean):
+def clear_mean_effect(mean_effect):
     """Begin the mean of a fault's effect over a block of frames (dtype FAULT_EFFECT_RECORD)."""
-    mean.acceleration_at_zero_theta[:], mean.regressor[:], mean.error_bound[:] = 0.0, 0.0, 0.0
+    mean_effect.acceleration_at_zero_theta[:], mean_effect.regressor[:], mean_effect.error_bound[:] = (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 @kernel
-def add_to_mean_effect(mean, effect, frame_share):
-    """Add the effect of a frame, a `frame_share` of the block, to the mean over the block."""
+def add_to_mean_effect(mean_effect, effect, block_share_of_frame):
+    """Add the effect of a frame, a `block_share_of_frame` of the block, to the mean over the block."""
     for i in range(3):
-        mean.acceleration_at_zero_theta[i] += frame_share * effect.acceleration_at_zero_theta[i]
-        mean.regressor[i] += frame_share * effect.regressor[i]
-        mean.error_bound[i] += frame_share * effect.error_bound[i]
+        mean_effect.acceleration_at_zero_theta[i] += (
+            block_share_of_frame * effect.acceleration_at_zero_theta[i]
+        )
+        mean_effect.regressor[i] += block_share_of_frame * effect.regressor[i]
+        mean_effect.error_bound[i] += block_share_of_frame * effect.error_bound[i]
 
 
 # Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
@@ -332,10 +343,12 @@ def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[Est
     loss_entries = tuple((name, LOSS, surface_index[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
         return loss_entries
-    further_losses = tuple((name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index[name]])
+    further_loss_entries = tuple(
+        (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index[name]]
+    )
     return (
         *loss_entries,
-        *further_losses,
+        *further_loss_entries,
         *((f"{name}_position", POSITION, s) for name, s in surface_index.items()),
     )
 
@@ -346,32 +359,35 @@ def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
 
 
 def configure_isolation(
-    isolation: np.void, scenario: Scenario, entries: tuple[EstimatorNameKindSurface, ...], travel: np.ndarray
+    isolation: np.void,
+    scenario: Scenario,
+    estimator_entries: tuple[EstimatorNameKindSurface, ...],
+    travel: np.ndarray,
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = scenario.fdi, scenario.airframe, 1.0 / scenario.rate_hz
-    sharpening = config.sharpen
+    sharpening_switches = config.sharpen
     isolation["config"]["threshold_kind"] = _THRESHOLD_KIND_OF_NAME[config.thresholds]
     isolation["config"]["forgetting_factor"] = exp(-dt / config.forgetting_time_s)
     isolation["config"]["filter_decay"] = exp(-config.isolation_pole_per_s * dt)
     isolation["config"]["uses_reach_test"], isolation["config"]["shares_theta_across_axes"] = (
-        sharpening.memory,
-        sharpening.shared_effectiveness,
+        sharpening_switches.memory,
+        sharpening_switches.shared_effectiveness,
     )
     isolation["config"]["narrows_theta_sets"], isolation["config"]["n_estimators"] = (
-        sharpening.set_membership,
-        len(entries),
+        sharpening_switches.set_membership,
+        len(estimator_entries),
     )
-    reachable_travel = np.array(
+    travel_including_neutral = np.array(
         [np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)]
     )  # a share of it can be left
-    for fie, (_, kind, surface) in zip(isolation["estimator"], entries, strict=False):
-        fie["hypothesis_kind"], fie["surface"] = kind, surface
+    for fie, (_, kind, surface_index) in zip(isolation["estimator"], estimator_entries, strict=False):
+        fie["hypothesis_kind"], fie["surface"] = kind, surface_index
         fie["theta_min"], fie["theta_max"] = (
-            LOSS_THETA_RANGE if kind == LOSS else reachable_travel[:, surface]
+            LOSS_THETA_RANGE if kind == LOSS else travel_including_neutral[:, surface_index]
         )
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
-            fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface] == PITCH else (0, 1, 0)
+            fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface_index] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
     weakly_excluded = WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED if config.weighs_chance and aircraft.damage else 0
@@ -379,9 +395,11 @@ def configure_isolation(
     isolation["config"]["isolation_hold_off_s"] = (
         ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S if aircraft.damage else 0.0
     )
-    losable_surfaces = {surface for damage_case in aircraft.damage.values() for surface in damage_case.takes}
+    surfaces_lost_by_some_damage = {
+        surface_name for damage_case in aircraft.damage.values() for surface_name in damage_case.takes
+    }
     isolation["config"]["can_be_lost_by_damage"] = [
-        surface in losable_surfaces for surface in aircraft.surfaces
+        surface_name in surfaces_lost_by_some_damage for surface_name in aircraft.surfaces
     ]
 
 
@@ -399,7 +417,9 @@ def fill_effect_of_hypothesis(hypothesis_kind, surface, G, Gu, acceleration_at_z
 
 
 @kernel
-def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error_bound):
+def update_fault_effect_and_reach(
+    isolation, fie, filter_bank, bound_record, config, G, Gu, effect_error_bound
+):
     """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
 
     G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame.
@@ -411,19 +431,23 @@ def update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error
     )
     set_effect_error_bound(effect, effect_error_bound, fie.surface)
     if (
-        bound.has_declared_surface_errors or bound.model_error_map.one_surface_may_be_anywhere
+        bound_record.has_declared_surface_errors or bound_record.model_error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
-        widen_tolerance_by_surface_errors(fie, bound, bank.output.innovation, config.n_substeps)
+        widen_tolerance_by_surface_errors(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
-        advance_reachable_residuals(bank, fie, config.dt)
+        advance_reachable_residuals(filter_bank, fie, config.dt)
 
 
 @kernel
-def update_fault_effects(isolation, bank, bound, config, detected, G, Gu, effect_error_bound):
-    """Call `update_fault_effect` for every estimator, if a later stage reads the effects."""
-    if isolation.config.uses_reach_test or config.diagnoses_all_types or detected:
+def update_all_fault_effects_and_reach(
+    isolation, filter_bank, bound_record, config, is_detected, G, Gu, effect_error_bound
+):
+    """Call `update_fault_effect_and_reach` for every estimator, if a later stage reads the effects."""
+    if isolation.config.uses_reach_test or config.diagnoses_all_types or is_detected:
         for fie in isolation.estimator[: isolation.config.n_estimators]:
-            update_fault_effect(isolation, fie, bank, bound, config, G, Gu, effect_error_bound)
+            update_fault_effect_and_reach(
+                isolation, fie, filter_bank, bound_record, config, G, Gu, effect_error_bound
+            )
 
 
 @kernel
@@ -444,7 +468,7 @@ def update_residual_and_thresholds(fie, threshold_kind, x):
     is_within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        theta_min, theta_max, filtered_regressor, theta, uncertainty_bound = (
+        theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound = (
             fie.theta_min,
             fie.theta_max,
             fie.filtered_regressor[i],
@@ -459,13 +483,13 @@ def update_residual_and_thresholds(fie, threshold_kind, x):
                 fie.filtered_negative_regressor[i],
                 filtered_regressor,
                 theta,
-                uncertainty_bound,
+                filtered_uncertainty_bound,
             )
         elif threshold_kind == CONSTANT_THRESHOLD:
-            threshold_interval = -uncertainty_bound, uncertainty_bound
+            threshold_interval = -filtered_uncertainty_bound, filtered_uncertainty_bound
         else:
             threshold_interval = published_threshold_interval(
-                theta_min, theta_max, filtered_regressor, theta, uncertainty_bound
+                theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound
             )
         fie.lower_threshold[i], fie.upper_threshold[i] = threshold_interval
         is_within = is_within and (
@@ -475,26 +499,34 @@ def update_residual_and_thresholds(fie, threshold_kind, x):
 
 
 @kernel
-def update_and_test_if_fault_possible(isolation, fie, bank, innovation_bound, abrupt, x, isolation_has_run):
+def update_and_test_if_fault_possible(
+    isolation, fie, filter_bank, innovation_bound, fault_is_declared_constant, x, isolation_started_earlier
+):
     """True if no test that is switched on excludes the fault of estimator fie.
 
-    innovation_bound (3,) rad/s2: on the innovation of a healthy frame; abrupt: a fault is declared to stay as
-    it is; x (3,) rad/s: measured; isolation_has_run: it started a frame or more ago.
+    innovation_bound (3,) rad/s2: on the innovation of a healthy frame; fault_is_declared_constant: a fault is
+    declared to stay as it is; x (3,) rad/s: measured; isolation_started_earlier: it started a frame or more
+    ago.
     """
     is_possible = update_residual_and_thresholds(fie, isolation.config.threshold_kind, x)
     if isolation.config.uses_reach_test:
         is_possible = is_possible and are_residuals_reachable(
-            bank, fie, isolation.config.shares_theta_across_axes
+            filter_bank, fie, isolation.config.shares_theta_across_axes
         )
     if (isolation.config.shares_theta_across_axes or fie.hypothesis_kind == POSITION) and (
-        isolation_has_run or isolation.config.uses_reach_test
+        isolation_started_earlier or isolation.config.uses_reach_test
     ):
         is_possible = is_possible and some_theta_explains_innovation(
-            fie, bank.output.innovation, innovation_bound
+            fie, filter_bank.output.innovation, innovation_bound
         )
-    if isolation.config.narrows_theta_sets and abrupt and isolation_has_run and fie.hypothesis_kind == LOSS:
+    if (
+        isolation.config.narrows_theta_sets
+        and fault_is_declared_constant
+        and isolation_started_earlier
+        and fie.hypothesis_kind == LOSS
+    ):
         is_possible = is_possible and narrow_feasible_theta_sets(
-            fie, bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
+            fie, filter_bank.output.innovation, innovation_bound, isolation.config.shares_theta_across_axes
         )
     return is_possible
 
@@ -521,56 +553,62 @@ def decide_isolation(isolation, t):
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
     one that has been the only one left for less than `isolation_hold_off_s`.
     """
-    n_not_excluded, remaining, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
+    n_not_excluded, remaining_estimator, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
     for estimator_index, fie in enumerate(isolation.estimator[: isolation.config.n_estimators]):
         if fie.excluded:
             last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
         else:
             n_not_excluded += 1
-            remaining = (
+            remaining_estimator = (
                 NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed_by_likelihood else estimator_index
             )
     if t - last_exclusion_s < isolation.config.isolation_hold_off_s:
-        remaining = NOT_ISOLATED
-    return NOT_ISOLATED if n_not_excluded > 1 else (remaining if n_not_excluded == 1 else UNANTICIPATED)
+        remaining_estimator = NOT_ISOLATED
+    return (
+        NOT_ISOLATED
+        if n_not_excluded > 1
+        else (remaining_estimator if n_not_excluded == 1 else UNANTICIPATED)
+    )
 
 
 @kernel
-def copy_plugin_estimate(isolation, isolated_estimator, theta):
+def replace_theta_by_plugin_estimate(isolation, isolated_estimator, theta):
     """Replace theta of the isolated estimator, where there is one, by the estimate of a plug-in."""
     if isolated_estimator >= 0:
         isolation.estimator[isolated_estimator].theta[:] = theta
 
 
 @kernel
-def least_squares_step(fie, i, residual, forgetting_factor, theta_min, theta_max):
+def least_squares_step(fie, axis, residual, forgetting_factor, theta_min, theta_max):
     """One least-squares step of thetahat_i on a residual, projected onto [theta_min, theta_max]; returns the
     step.
 
     The gain is covariance Omega / (noise + Omega^2 covariance). The noise is the square of the bound on the
     filtered uncertainty, so the estimate changes no faster than its information allows.
     """
-    noise_variance = fie.filtered_uncertainty_bound[i] ** 2
-    gain = fie.theta_variance[i] * fie.filtered_regressor[i]
-    innovation_variance = noise_variance + fie.filtered_regressor[i] * gain
+    noise_variance = fie.filtered_uncertainty_bound[axis] ** 2
+    variance_times_regressor = fie.theta_variance[axis] * fie.filtered_regressor[axis]
+    innovation_variance = noise_variance + fie.filtered_regressor[axis] * variance_times_regressor
     if innovation_variance <= 0.0:
         return 0.0
-    previous_theta = fie.theta[i]
-    fie.theta[i] = min(max(previous_theta + gain / innovation_variance * residual, theta_min), theta_max)
-    prior_variance = (fie.theta_max - fie.theta_min) ** 2 / 12.0
-    fie.theta_variance[i] = min(
-        fie.theta_variance[i] * noise_variance / innovation_variance / forgetting_factor, prior_variance
+    previous_theta = fie.theta[axis]
+    fie.theta[axis] = min(
+        max(previous_theta + variance_times_regressor / innovation_variance * residual, theta_min), theta_max
     )
-    return fie.theta[i] - previous_theta
+    prior_variance = (fie.theta_max - fie.theta_min) ** 2 / 12.0
+    fie.theta_variance[axis] = min(
+        fie.theta_variance[axis] * noise_variance / innovation_variance / forgetting_factor, prior_variance
+    )
+    return fie.theta[axis] - previous_theta
 
 
 @kernel
-def gradient_step(fie, i, gain, dt):
+def gradient_step(fie, axis, gain, dt):
     """thetahat' = P{gain Omega eps}, by a step of dt s [Zhang2005, sec. IV]; returns the step."""
-    previous_theta = fie.theta[i]
-    unlimited_theta = previous_theta + dt * gain * fie.filtered_regressor[i] * fie.residual[i]
-    fie.theta[i] = min(max(unlimited_theta, fie.feasible_theta_min[i]), fie.feasible_theta_max[i])
-    return fie.theta[i] - previous_theta
+    previous_theta = fie.theta[axis]
+    unprojected_theta = previous_theta + dt * gain * fie.filtered_regressor[axis] * fie.residual[axis]
+    fie.theta[axis] = min(max(unprojected_theta, fie.feasible_theta_min[axis]), fie.feasible_theta_max[axis])
+    return fie.theta[axis] - previous_theta
 
 
 @kernel
@@ -597,7 +635,7 @@ def joint_least_squares_step(fie, forgetting_factor):
 
 
 @kernel
-def advance_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
+def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered regressor and bounds.
 
     x (3,) rad/s: at the start of the frame; predicted_acceleration (3,) rad/s2: mean of f + G u over
@@ -625,13 +663,15 @@ def advance_estimator(isolation, fie, bound, x, predicted_acceleration, dt):
             regressor, 0.0
         )
         fie.filtered_eta_bar[i] = advance_residual_bound(
-            fie.filtered_eta_bar[i], bound.eta_bar[i] + fie.frame_mean_effect.error_bound[i], decay, dt
+            fie.filtered_eta_bar[i], bound_record.eta_bar[i] + fie.frame_mean_effect.error_bound[i], decay, dt
         )
         fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
-            fie.filtered_gyro_error_bound[i], bound.gyro_error_change_bound_before[i], decay
+            fie.filtered_gyro_error_bound[i], bound_record.gyro_error_change_bound_before[i], decay
         )
         fie.filtered_uncertainty_bound[i] = (
-            fie.filtered_eta_bar[i] + fie.filtered_gyro_error_bound[i] + bound.gyro_error_change_bound[i]
+            fie.filtered_eta_bar[i]
+            + fie.filtered_gyro_error_bound[i]
+            + bound_record.gyro_error_change_bound[i]
         )
 
 
@@ -666,37 +706,55 @@ def adapt_estimate(isolation, fie, dt):
 
 
 @kernel
-def advance_estimators(isolation, bound, x, predicted_acceleration, dt):
+def advance_estimators(isolation, bound_record, x, predicted_acceleration, dt):
     """Advance the estimators by a frame; arguments as in `advance_estimator`."""
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        advance_estimator(isolation, fie, bound, x, predicted_acceleration, dt)
+        advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, dt)
 
 
 @kernel
 def update_likelihood_exclusion(
-    fie, tests, statistical_blocks, isolation, loss_estimator, abrupt, vane_error_can_hide
+    fie,
+    test_config,
+    statistical_blocks,
+    isolation,
+    loss_estimator_of_surface,
+    fault_is_declared_constant,
+    gust_can_hide_vane_error,
 ):
     """Fill `excluded_by_likelihood` of estimator fie; update its `confirmed_by_likelihood` and
     `weakly_excluded`.
 
-    vane_error_can_hide: a gust may hide an error of a vane from the sensor monitor. An exclusion may then be
-    the effect of that error, so all estimators become weakly excluded. loss_estimator (n,): of each surface;
-    abrupt: a fault is declared to stay as it is.
+    gust_can_hide_vane_error: a gust may hide an error of a vane from the sensor monitor. An exclusion may
+    then be the effect of that error, so all estimators become weakly excluded. loss_estimator_of_surface
+    (n,): index of the estimator; fault_is_declared_constant: a fault is declared to stay as it is.
     """
     all_estimators, s = isolation.estimator, fie.surface
     fie.excluded_by_likelihood = 0
-    if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not abrupt):
+    if not fie.confirmed_by_likelihood and (fie.weakly_excluded or not fault_is_declared_constant):
         fie.confirmed_by_likelihood = statistical.confirms_loss(
-            tests, statistical_blocks, all_estimators, loss_estimator, s
+            test_config, statistical_blocks, all_estimators, loss_estimator_of_surface, s
         )  # what follows later may be its end
     if fie.confirmed_by_likelihood or not statistical.excludes_loss(
-        tests, statistical_blocks, all_estimators, loss_estimator, s, False, abrupt
+        test_config,
+        statistical_blocks,
+        all_estimators,
+        loss_estimator_of_surface,
+        s,
+        False,
+        fault_is_declared_constant,
     ):
         return
     fie.excluded_by_likelihood = statistical.excludes_loss(
-        tests, statistical_blocks, all_estimators, loss_estimator, s, True, abrupt
+        test_config,
+        statistical_blocks,
+        all_estimators,
+        loss_estimator_of_surface,
+        s,
+        True,
+        fault_is_declared_constant,
     )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
-    if fie.excluded_by_likelihood and vane_error_can_hide:
-        for other in all_estimators[: isolation.config.n_estimators]:
-            other.weakly_excluded = max(other.weakly_excluded, 1)
+    if fie.excluded_by_likelihood and gust_can_hide_vane_error:
+        for other_estimator in all_estimators[: isolation.config.n_estimators]:
+            other_estimator.weakly_excluded = max(other_estimator.weakly_excluded, 1)

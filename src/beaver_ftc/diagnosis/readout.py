@@ -288,16 +288,20 @@ class DiagnosisReadout:
     @cached_property
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        gust = self._fdi["statistical"]["gust"]["output"]
+        gust_output = self._fdi["statistical"]["gust"]["output"]
         return GustReadout(
-            bool(gust["accounts_for_gusts"]), bool(gust["is_gust_measured"]), gust["gust_acceleration"].copy()
+            bool(gust_output["accounts_for_gusts"]),
+            bool(gust_output["is_gust_measured"]),
+            gust_output["gust_acceleration"].copy(),
         )
 
     @cached_property
     def mapped_error(self) -> MappedModelError:
         """The design model's error here, where the aircraft maps it."""
-        error = self._fdi["bound"]["model_error_map"]
-        return MappedModelError(not error["is_outside_all_boxes"], error["error_now"].copy())
+        model_error_map = self._fdi["bound"]["model_error_map"]
+        return MappedModelError(
+            not model_error_map["is_outside_all_boxes"], model_error_map["error_now"].copy()
+        )
 
     @cached_property
     def acceleration_variance_by_input_noise(self) -> np.ndarray:
@@ -349,7 +353,7 @@ def certificate_arrays_of_every_frame(
     each surface, and position of a healthy one, rad.
     """
     estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
-    views = {
+    array_by_name = {
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
         "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
         "slope": estimators["frame_mean_effect"]["regressor"],
@@ -358,9 +362,12 @@ def certificate_arrays_of_every_frame(
     }  # fmt: skip
     if diagnoses_all_types:
         commands = surfaces["commands"]
-        views |= {"command_low": commands["min_command"], "command_high": commands["max_command"]}
-        views |= {"least": commands["min_healthy_position"], "greatest": commands["max_healthy_position"]}
-    return views
+        array_by_name |= {"command_low": commands["min_command"], "command_high": commands["max_command"]}
+        array_by_name |= {
+            "least": commands["min_healthy_position"],
+            "greatest": commands["max_healthy_position"],
+        }
+    return array_by_name
 
 
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
@@ -382,20 +389,23 @@ def certificate_arrays_until_alarm(
     besides, and the gust as the vanes see it.
     """
     estimators = fdi["isolation"]["estimator"][:n_estimators]
-    views = {
+    array_by_name = {
         "reach_low": estimators["reachable_bank_residual_low"],
         "reach_high": estimators["reachable_bank_residual_high"],
     }
     if has_statistical_detector:
         detector = fdi["statistical"]
         blocks, gust = detector["block"], detector["gust"]["output"]
-        views |= {name: blocks[name] for name in RECORDED_BLOCK_FIELDS}
-        views |= {
+        array_by_name |= {name: blocks[name] for name in RECORDED_BLOCK_FIELDS}
+        array_by_name |= {
             "signature": blocks["hypothesis"]["signature"],
             "bounded": detector["noise"]["uncertainty_bound"],
         }
-        views |= {"air": gust["mean_gust_acceleration"], "leap": gust["acceleration_variance_by_axes_turn"]}
-    return views
+        array_by_name |= {
+            "air": gust["mean_gust_acceleration"],
+            "leap": gust["acceleration_variance_by_axes_turn"],
+        }
+    return array_by_name
 
 
 def surface_and_sensor_alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
@@ -416,14 +426,14 @@ def _read_estimator(fie: np.void) -> IsolationEstimator:
 
 
 def _read_surface(surface: np.void) -> SurfaceFaultTypes:
-    field_names = (
+    actuator_field_names = (
         "travel_low",
         "travel_high",
         "min_runaway_rate",
         "min_rate_limited_motion_per_substep",
         "approach_share_per_substep",
     )
-    actuator = Actuator(*(float(surface["actuator"][name]) for name in field_names))
+    actuator = Actuator(*(float(surface["actuator"][name]) for name in actuator_field_names))
     return SurfaceFaultTypes(actuator, surface["feasible_sets"]["excluded"].astype(bool))
 
 

@@ -470,7 +470,7 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     monitor = new_watch(start_stage=1, substep=0, apparent_gyro_error=(first, -first, 2.0 * first))
     for substep in (0, 1, 2, 3):
         monitor["memory"]["substep"] = substep
-        watching.widen_bound_by_initial_gyro_error(monitor)
+        watching.advance_start_stage_and_widen_W_bound(monitor)
     assert monitor["memory"]["start_stage"] == 2
     assert monitor["memory"]["gyro_error_estimate_bound"].tolist() == [first, first, 2.0 * first], (
         "once, at the first look of the frame"

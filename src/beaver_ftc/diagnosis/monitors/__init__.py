@@ -51,13 +51,20 @@ ENGINE_MONITOR_RECORD = record(
 
 def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
     """a: the yawing moment of the thrust with all levers alike, per CT."""
-    return -sum(of.share * of.right_m for of in aircraft.effectors.values()) / aircraft.geometry.span_m
+    return (
+        -sum(effector.share * effector.right_m for effector in aircraft.effectors.values())
+        / aircraft.geometry.span_m
+    )
 
 
 def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
-    known, signals = aircraft.file.model_error_map, list(aircraft.signals)
-    if known is None or not known.knows_engines or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals):
+    error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    if (
+        error_map is None
+        or not error_map.knows_engines
+        or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals)
+    ):
         return
     config["n_engines"], config["mean_thrust_arm_over_span"] = (
         len(aircraft.effectors),
@@ -70,23 +77,23 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
 
 
 @kernel
-def disable_if_differential_thrust(engines, levers):
-    """Disable the monitor once a law has moved an engine apart; levers (n and more,): of each, in addition
-    to the common one."""
-    for e in range(engines.config.n_engines):
-        if levers[e] != 0.0:
-            engines.memory.disabled_by_differential_thrust = 1
+def disable_if_differential_thrust(engine_monitor, lever_offsets):
+    """Disable the monitor once a law has moved an engine apart; lever_offsets (n and more,): of each, in
+    addition to the common one."""
+    for engine in range(engine_monitor.config.n_engines):
+        if lever_offsets[engine] != 0.0:
+            engine_monitor.memory.disabled_by_differential_thrust = 1
 
 
 @kernel
-def detect_engine_failure(engines, yawing_moment_bound, y):
+def detect_engine_failure(engine_monitor, yawing_moment_bound, y):
     """Whether an engine has failed, by these signals y or before; yawing_moment_bound: on |Cn - a CT|
     here."""
-    config = engines.config
-    if config.n_engines > 0 and not engines.memory.disabled_by_differential_thrust:
-        thrust = y[config.thrust_index]
+    config = engine_monitor.config
+    if config.n_engines > 0 and not engine_monitor.memory.disabled_by_differential_thrust:
+        thrust_coefficient = y[config.thrust_index]
         if abs(
-            y[config.yawing_moment_index] - config.mean_thrust_arm_over_span * thrust
-        ) > yawing_moment_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust):
-            engines.output.engine_failed = 1
-    return engines.output.engine_failed == 1
+            y[config.yawing_moment_index] - config.mean_thrust_arm_over_span * thrust_coefficient
+        ) > yawing_moment_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust_coefficient):
+            engine_monitor.output.engine_failed = 1
+    return engine_monitor.output.engine_failed == 1

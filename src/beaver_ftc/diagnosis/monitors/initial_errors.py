@@ -11,8 +11,8 @@ The error x of the sensor is counted as
 The record of the hypotheses (INITIAL_ERRORS_RECORD) holds for each hypothesis, with h the time between two
 samples, s; test t; and filter pole m
 
-    effect_per_unit_error           W_t: bound on |effect on residual t in one sample| / |x|
-    filtered_effect_per_unit_error  W_tm: the same through the filter, W_tm <- decay_m W_tm + W_t
+    max_effect_per_unit_error           W_t: bound on |effect on residual t in one sample| / |x|
+    filtered_max_effect_per_unit_error  W_tm: the same through the filter, W_tm <- decay_m W_tm + W_t
     error_bound                     b: bound on |x|. At the first sample it is as large as an aircraft can fly
                                     (error_bound_at_start). Then, at each sample,
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
@@ -140,22 +140,25 @@ def standard_air_density(altitude):
 @kernel
 def set_error_bounds_at_start(initial_errors, signal):
     """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
-    at_start = initial_errors.error_bound_at_start
-    at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(signal[ALPHA]) + MAX_FLOW_ANGLE_RAD)
-    at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(signal[BETA]) + MAX_FLOW_ANGLE_RAD)
+    bound_at_start = initial_errors.error_bound_at_start
+    bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(signal[ALPHA]) + MAX_FLOW_ANGLE_RAD)
+    bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(signal[BETA]) + MAX_FLOW_ANGLE_RAD)
     V = max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
-    expected_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
+    standard_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
         2.0 * max(signal[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(signal[ALTITUDE])
     )
-    max_ratio, min_ratio = (  # of reading and truth, in the thickest and in the thinnest air
-        V / expected_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
-        V / expected_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
+    (
+        max_reading_over_truth,
+        min_reading_over_truth,
+    ) = (  # of reading and truth, in the thickest and in the thinnest air
+        V / standard_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
+        V / standard_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
     )
-    at_start[AIRSPEED_HYPOTHESIS] = min(
-        max(max_ratio - 1.0, 1.0 - min_ratio), MAX_AIRSPEED_READING_RATIO - 1.0
+    bound_at_start[AIRSPEED_HYPOTHESIS] = min(
+        max(max_reading_over_truth - 1.0, 1.0 - min_reading_over_truth), MAX_AIRSPEED_READING_RATIO - 1.0
     )
-    at_start[PHI_HYPOTHESIS] = at_start[THETA_HYPOTHESIS] = MAX_CHORD_OF_ATTITUDE_ERROR
-    initial_errors.error_bound[:] = at_start
+    bound_at_start[PHI_HYPOTHESIS] = bound_at_start[THETA_HYPOTHESIS] = MAX_CHORD_OF_ATTITUDE_ERROR
+    initial_errors.error_bound[:] = bound_at_start
 
 
 @kernel
@@ -170,24 +173,27 @@ def update_error_change_bounds(redundancy, initial_errors):
     part of it that this filter forgets in a sample."""
     forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        test_index, at_start = index_of_test_showing_error_change(i), initial_errors.error_bound_at_start[i]
-        change = (
+        test_index, bound_at_start = (
+            index_of_test_showing_error_change(i),
+            initial_errors.error_bound_at_start[i],
+        )
+        change_bound = (
             max_effect_of_any_error(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
-            * initial_errors.filtered_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
+            * initial_errors.filtered_max_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
         )
         if i == AIRSPEED_HYPOTHESIS:  # from m/s to a share of the truth, which is at least V / (1 + b)
-            change *= (1.0 + initial_errors.error_bound[i]) / max(
+            change_bound *= (1.0 + initial_errors.error_bound[i]) / max(
                 redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS
             )
-        initial_errors.error_change_bound[i] = min(change, at_start)
-        widened = initial_errors.error_bound[i] + forgotten_share * initial_errors.error_change_bound[i]
-        initial_errors.error_bound[i] = min(widened, at_start)
+        initial_errors.error_change_bound[i] = min(change_bound, bound_at_start)
+        widened_bound = initial_errors.error_bound[i] + forgotten_share * initial_errors.error_change_bound[i]
+        initial_errors.error_bound[i] = min(widened_bound, bound_at_start)
 
 
 @kernel
 def fill_effects_per_unit_error(redundancy, initial_errors, signal):
-    """Fill `effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
+    """Fill `max_effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
     `coupling_effect_per_unit_error` (N_COUPLINGS,).
 
     Both are taken at the sample before, from which this sample, signal (N_SENSORS,), is predicted.
@@ -195,37 +201,41 @@ def fill_effects_per_unit_error(redundancy, initial_errors, signal):
     reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
     p, q, r = reading[0], reading[1], reading[2]
     V, phi, theta = max(reading[AIRSPEED], MIN_AIRSPEED_MPS), reading[PHI], reading[THETA]
-    effect, signed_effect = (
-        initial_errors.effect_per_unit_error,
+    max_effect, coupling_effect = (
+        initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
     )
-    effect[:] = 0.0
+    max_effect[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
-    true_secant = 1.0 / np.cos(
+    theta_secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
+    max_theta_secant = 1.0 / np.cos(
         min(abs(theta) + angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]), MAX_PITCH_RAD)
     )
-    second_order = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
+    second_order_turn_rad2 = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
     pitch_yaw_turn = h * np.hypot(q, r)
-    heading_turn = h * abs(q * np.sin(phi) + r * np.cos(phi)) * true_secant
+    max_heading_turn = h * abs(q * np.sin(phi) + r * np.cos(phi)) * max_theta_secant
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
-        effect[PHI_HYPOTHESIS, TURN_TEST + i] = second_order + (pitch_yaw_turn if i > 0 else 0.0)
-        effect[THETA_HYPOTHESIS, TURN_TEST + i] = second_order + heading_turn
+        max_effect[PHI_HYPOTHESIS, TURN_TEST + i] = second_order_turn_rad2 + (
+            pitch_yaw_turn if i > 0 else 0.0
+        )
+        max_effect[THETA_HYPOTHESIS, TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
         # Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by e:
         # phi' = p + m tan(theta), psi' = m / cos(theta), with m = q sin(phi) + r cos(phi). The tangents, or
         # secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
         # theta' = q cos(phi) - r sin(phi) there is no theta.
-        effect[PHI_HYPOTHESIS, ANGLE_TEST + i] = secant * (pitch_yaw_turn + secant * second_order)
-        effect[THETA_HYPOTHESIS, ANGLE_TEST + i] = secant * (
-            (heading_turn if i != 1 else 0.0) + true_secant * second_order
+        max_effect[PHI_HYPOTHESIS, ANGLE_TEST + i] = theta_secant * (
+            pitch_yaw_turn + theta_secant * second_order_turn_rad2
+        )
+        max_effect[THETA_HYPOTHESIS, ANGLE_TEST + i] = theta_secant * (
+            (max_heading_turn if i != 1 else 0.0) + max_theta_secant * second_order_turn_rad2
         )
     (
-        signed_effect[PHI_PITCH_RATE_COUPLING],
-        signed_effect[PHI_YAW_RATE_COUPLING],
-        signed_effect[THETA_HEADING_RATE_COUPLING],
+        coupling_effect[PHI_PITCH_RATE_COUPLING],
+        coupling_effect[PHI_YAW_RATE_COUPLING],
+        coupling_effect[THETA_HEADING_RATE_COUPLING],
     ) = (
         h * q,
         h * r,
@@ -234,14 +244,14 @@ def fill_effects_per_unit_error(redundancy, initial_errors, signal):
     fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
-    log_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
-    effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_change)
-    signed_effect[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_change
+    log_airspeed_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    max_effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
+    coupling_effect[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_airspeed_change
 
 
 @kernel
 def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
-    """Fill `effect_per_unit_error` and `coupling_effect_per_unit_error` for the tests of speed, flow and
+    """Fill `max_effect_per_unit_error` and `coupling_effect_per_unit_error` for the tests of speed, flow and
     climb, and by gravity.
 
     V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
@@ -249,8 +259,8 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
     reading, a = memory.previous_reading, memory.body_acceleration
-    effect, signed_effect = (
-        initial_errors.effect_per_unit_error,
+    max_effect, coupling_effect = (
+        initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
     )
     sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
@@ -258,94 +268,113 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
     sin_theta, cos_theta = np.sin(reading[THETA]), np.cos(reading[THETA])
     # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    sideslip = abs(reading[BETA])
+    sideslip_magnitude = abs(reading[BETA])
     max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
-    secant = 1.0 / np.cos(min(sideslip, MAX_PITCH_RAD))
-    true_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
+    max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
-    normal = a[2] * cos_alpha - a[0] * sin_alpha
-    side = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
-    size = max(memory.acceleration_magnitude, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
+    normal_acceleration = a[2] * cos_alpha - a[0] * sin_alpha
+    side_acceleration = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
+    max_acceleration = max(memory.acceleration_magnitude, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
     # rad/s: rates about the flow's projection on the plane of symmetry, and across it
-    roll, yaw = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
-    step = h * (1.0 + h * (size / V + abs(p) + abs(q) + abs(r)))
-    roll_yaw_rate, predicted_climb = np.hypot(p, r), memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
+    flow_roll_rate, flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
+    widened_step_s = h * (1.0 + h * (max_acceleration / V + abs(p) + abs(q) + abs(r)))
+    roll_yaw_rate, predicted_climb_m = np.hypot(p, r), memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    effect[ALPHA_HYPOTHESIS, SPEED_TEST] = effect[BETA_HYPOTHESIS, SPEED_TEST] = step * size
+    max_effect[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect[BETA_HYPOTHESIS, SPEED_TEST] = (
+        widened_step_s * max_acceleration
+    )
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    effect[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * (size / V + roll_yaw_rate * abs(sin_beta))
+    max_effect[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+        widened_step_s * beta_secant * (max_acceleration / V + roll_yaw_rate * abs(sin_beta))
+    )
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    effect[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = step * (roll_yaw_rate + size * abs(sin_beta) / V)
+    max_effect[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
+        roll_yaw_rate + max_acceleration * abs(sin_beta) / V
+    )
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    effect[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * true_secant * (abs(roll) + size / V)
+    max_effect[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+        widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + max_acceleration / V)
+    )
     # beta' with beta off: a turned by beta
-    effect[BETA_HYPOTHESIS, BETA_FLOW_TEST] = step * size / V
+    max_effect[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * max_acceleration / V
     # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    effect[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = effect[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
-        step * secant * size / V
+    max_effect[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
+        widened_step_s * beta_secant * max_acceleration / V
     )
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
     # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    effect[PHI_HYPOTHESIS, SPEED_TEST] = step * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
-    effect[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = effect[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
-        step * g * cos_theta * secant / V
+    max_effect[PHI_HYPOTHESIS, SPEED_TEST] = (
+        widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    )
+    max_effect[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
+        widened_step_s * g * cos_theta * beta_secant / V
     )
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
     # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    effect[THETA_HYPOTHESIS, SPEED_TEST] = step * g
-    effect[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step * secant * g / V
-    effect[THETA_HYPOTHESIS, BETA_FLOW_TEST] = step * g * (abs(sin_phi) + abs(sin_beta)) / V
+    max_effect[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
+    max_effect[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
+    max_effect[THETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
     # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
     # (sin(theta), -cos(phi) cos(theta))
-    vertical_size = np.hypot(sin_theta, cos_phi * cos_theta)
-    effect[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_size
+    vertical_projection_length = np.hypot(sin_theta, cos_phi * cos_theta)
+    max_effect[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
     # with beta off: (cos(beta), -sin(beta)) turned, times V
-    effect[BETA_HYPOTHESIS, CLIMB_TEST] = (
+    max_effect[BETA_HYPOTHESIS, CLIMB_TEST] = (
         h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
     )
     # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    effect[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb) / (
+    max_effect[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
         1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
     )
     # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    effect[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    max_effect[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
     # with theta off: the vertical is turned, against v
-    effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
+    max_effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
     # is turned by the error
-    signed_effect[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
-    signed_effect[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
+    coupling_effect[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
+    coupling_effect[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
-    pitch = abs(reading[THETA])
-    signed_effect[THETA_GRAVITY_COUPLING] = (
+    pitch_magnitude = abs(reading[THETA])
+    coupling_effect[THETA_GRAVITY_COUPLING] = (
         h
         * g
         * np.cos(
             min(
-                pitch + 0.5 * angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]),
-                0.5 * pitch + 0.25 * np.pi,
+                pitch_magnitude + 0.5 * angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]),
+                0.5 * pitch_magnitude + 0.25 * np.pi,
             )
         )
     )
-    # alpha: altitude' = V cos(beta) vertical_size sin(gamma - alpha) + ..., where tan(gamma) =
+    # alpha: altitude' = V cos(beta) vertical_projection_length sin(gamma - alpha) + ..., where tan(gamma) =
     # tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma - alpha)
     max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    signed_effect[ALPHA_CLIMB_COUPLING] = (
-        h * V * cos_beta * vertical_size * np.cos(min(max_mean_angle, 0.5 * np.pi))
+    coupling_effect[ALPHA_CLIMB_COUPLING] = (
+        h * V * cos_beta * vertical_projection_length * np.cos(min(max_mean_angle, 0.5 * np.pi))
     )
-    # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
-    # x cos(e / 2) roll over both cosines. The part of the force, of either sign, is an uncertainty of both
-    signed_effect[VANE_ROLL_RATE_COUPLING], signed_effect[VANE_YAW_RATE_COUPLING] = h * roll, h * yaw
-    signed_effect[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * size / V
-    signed_effect[BETA_FORCE_UNCERTAINTY] = (
-        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * secant * true_secant * abs(normal) / V
+    # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + flow_yaw_rate sin(e / 2)). beta off by
+    # e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of either
+    # sign, is an uncertainty of both
+    coupling_effect[VANE_ROLL_RATE_COUPLING], coupling_effect[VANE_YAW_RATE_COUPLING] = (
+        h * flow_roll_rate,
+        h * flow_yaw_rate,
+    )
+    coupling_effect[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * max_acceleration / V
+    coupling_effect[BETA_FORCE_UNCERTAINTY] = (
+        h
+        * np.sin(min(max_sideslip, 0.5 * np.pi))
+        * beta_secant
+        * max_beta_secant
+        * abs(normal_acceleration)
+        / V
     )
     # V: a across the flow, over the airspeed
-    signed_effect[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal * secant / V
-    signed_effect[AIRSPEED_SIDE_FORCE_COUPLING] = h * side / V
+    coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal_acceleration * beta_secant / V
+    coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING] = h * side_acceleration / V
 
 
 @kernel
@@ -353,11 +382,11 @@ def filter_effects_per_unit_error(redundancy, initial_errors):
     """Pass effects per unit error and couplings through the filters of the tests."""
     decay = redundancy.config.filter_decay
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        for t in range(RPM_TEST):
+        for test_index in range(RPM_TEST):
             for m in range(decay.size):
-                initial_errors.filtered_effect_per_unit_error[i, t, m] = (
-                    decay[m] * initial_errors.filtered_effect_per_unit_error[i, t, m]
-                    + initial_errors.effect_per_unit_error[i, t]
+                initial_errors.filtered_max_effect_per_unit_error[i, test_index, m] = (
+                    decay[m] * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
+                    + initial_errors.max_effect_per_unit_error[i, test_index]
                 )
     for j in range(initial_errors.coupling_effect_per_unit_error.size):
         for m in range(decay.size):
@@ -382,7 +411,7 @@ def max_current_error_effect(redundancy, initial_errors, hypothesis, test_index,
         max_effect_of_any_error(redundancy, test_index, pole_index)
         + 2.0
         * initial_errors.error_change_bound[hypothesis]
-        * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
+        * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, pole_index]
     )
 
 
@@ -401,13 +430,13 @@ def tighten_error_bound(initial_errors, hypothesis, max_effect, min_effect_per_u
 def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis, pole_index):
     """The bound of `max_current_error_effect` on the velocity, m/s, in any direction."""
     V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
-    flow_angle = np.hypot(
+    max_flow_angle_effect = np.hypot(
         max_current_error_effect(redundancy, initial_errors, hypothesis, ALPHA_FLOW_TEST, pole_index),
         max_current_error_effect(redundancy, initial_errors, hypothesis, BETA_FLOW_TEST, pole_index),
     )
     return np.hypot(
         max_current_error_effect(redundancy, initial_errors, hypothesis, SPEED_TEST, pole_index),
-        V * flow_angle,
+        V * max_flow_angle_effect,
     )
 
 
@@ -424,31 +453,40 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis, p
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
+        filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(signed_effect[PHI_PITCH_RATE_COUPLING], signed_effect[PHI_YAW_RATE_COUPLING]),
+            np.hypot(
+                filtered_coupling_effect[PHI_PITCH_RATE_COUPLING],
+                filtered_coupling_effect[PHI_YAW_RATE_COUPLING],
+            ),
         )
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
-            np.hypot(signed_effect[PHI_GRAVITY_DOWN_COUPLING], signed_effect[PHI_GRAVITY_SIDE_COUPLING]),
+            np.hypot(
+                filtered_coupling_effect[PHI_GRAVITY_DOWN_COUPLING],
+                filtered_coupling_effect[PHI_GRAVITY_SIDE_COUPLING],
+            ),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            signed_effect[THETA_GRAVITY_COUPLING],
+            filtered_coupling_effect[THETA_GRAVITY_COUPLING],
         )
-        rotation = np.hypot(
+        max_rotation_effect = np.hypot(
             max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, TURN_TEST, m),
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, THETA_HYPOTHESIS, m),
         )
         tighten_error_bound(
-            initial_errors, THETA_HYPOTHESIS, rotation, abs(signed_effect[THETA_HEADING_RATE_COUPLING])
+            initial_errors,
+            THETA_HYPOTHESIS,
+            max_rotation_effect,
+            abs(filtered_coupling_effect[THETA_HEADING_RATE_COUPLING]),
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -457,18 +495,18 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
-    half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
+    filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    max_half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
-        np.cos(half_error) * abs(signed_effect[VANE_ROLL_RATE_COUPLING])
-        - np.sin(half_error) * abs(signed_effect[VANE_YAW_RATE_COUPLING])
-        - signed_effect[ALPHA_FORCE_UNCERTAINTY]
+        np.cos(max_half_error) * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING])
+        - np.sin(max_half_error) * abs(filtered_coupling_effect[VANE_YAW_RATE_COUPLING])
+        - filtered_coupling_effect[ALPHA_FORCE_UNCERTAINTY]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        signed_effect[ALPHA_CLIMB_COUPLING],
+        filtered_coupling_effect[ALPHA_CLIMB_COUPLING],
     )
     tighten_error_bound(
         initial_errors,
@@ -478,8 +516,8 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(signed_effect[VANE_ROLL_RATE_COUPLING])
-        - signed_effect[BETA_FORCE_UNCERTAINTY]
+        * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING])
+        - filtered_coupling_effect[BETA_FORCE_UNCERTAINTY]
     )
     tighten_error_bound(
         initial_errors,
@@ -496,29 +534,29 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    signed_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
-    max_ratio = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]  # of reading and truth
+    filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    max_reading_over_truth = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]
     tighten_error_bound(
         initial_errors,
         AIRSPEED_HYPOTHESIS,
-        max_ratio
+        max_reading_over_truth
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(signed_effect[AIRSPEED_NORMAL_FORCE_COUPLING]),
+        abs(filtered_coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING]),
     )
     tighten_error_bound(
         initial_errors,
         AIRSPEED_HYPOTHESIS,
-        max_ratio
+        max_reading_over_truth
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(signed_effect[AIRSPEED_SIDE_FORCE_COUPLING]),
+        abs(filtered_coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING]),
     )
-    change_effect = (
+    max_change_effect = (
         2.0
-        * max_ratio
+        * max_reading_over_truth
         * max_effect_of_any_error(redundancy, SPEED_TEST, pole_index)
         / max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     )
@@ -526,8 +564,8 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         initial_errors,
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
-        + change_effect,
-        abs(signed_effect[AIRSPEED_DENSITY_COUPLING]),
+        + max_change_effect,
+        abs(filtered_coupling_effect[AIRSPEED_DENSITY_COUPLING]),
     )
 
 
@@ -555,8 +593,10 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis, tes
         error_bound if hypothesis == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST else 0.0
     )
     for m in range(redundancy.config.filter_decay.size):
-        effect = error_bound * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, m]
-        if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + effect:
+        max_error_effect = (
+            error_bound * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, m]
+        )
+        if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + max_error_effect:
             return True
     return False
 
@@ -573,22 +613,22 @@ def max_error_effect_at_alarm(initial_errors, hypothesis, test_index, pole_index
     the alarm: b W_tm, in the unit of the residual."""
     return (
         initial_errors.error_bound_at_alarm[hypothesis]
-        * initial_errors.filtered_effect_per_unit_error[hypothesis, test_index, pole_index]
+        * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, pole_index]
     )
 
 
 @kernel
 def record_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
     """Record by which of `tests_exceeded_since_alarm` (N_TESTS,) each hypothesis is refuted."""
-    refuted = initial_errors.is_refuted_by_test
+    is_refuted_by_test = initial_errors.is_refuted_by_test
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        for t in range(tests_exceeded_since_alarm.size):
+        for test_index in range(tests_exceeded_since_alarm.size):
             if (
-                tests_exceeded_since_alarm[t]
-                and not refuted[i, t]
-                and exceeds_bound_with_initial_error(redundancy, initial_errors, i, t)
+                tests_exceeded_since_alarm[test_index]
+                and not is_refuted_by_test[i, test_index]
+                and exceeds_bound_with_initial_error(redundancy, initial_errors, i, test_index)
             ):
-                refuted[i, t] = 1
+                is_refuted_by_test[i, test_index] = 1
 
 
 @kernel
@@ -609,10 +649,10 @@ def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test_index):
     If the test that raised the alarm reacts at once to such a change, sensor_monitor.py judges changes: here
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
-    for t in range(initial_errors.is_refuted_by_test.shape[1]):
-        if initial_errors.is_refuted_by_test[hypothesis, t] and (
+    for test_index in range(initial_errors.is_refuted_by_test.shape[1]):
+        if initial_errors.is_refuted_by_test[hypothesis, test_index] and (
             test_reacts_to_error_change(hypothesis, alarm_test_index)
-            or not test_reacts_to_error_change(hypothesis, t)
+            or not test_reacts_to_error_change(hypothesis, test_index)
         ):
             return False
     return True

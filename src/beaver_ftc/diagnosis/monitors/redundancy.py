@@ -90,8 +90,9 @@ GYRO_ERROR_UNDECIDED, GYRO_ERROR_CONFIRMED, GYRO_ERROR_REFUTED = 0, 1, 2  # of `
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # at which the attitude corrects a replaced rate, if its noise is declared
 REPLACED_RATE_CORRECTION_PER_S = 3.0
-FROZEN_SAMPLES_WITHOUT_ROUNDING = 3  # samples of the sensor: so many are never identical without resolution
-FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
+# Number of samples of a sensor that are never identical without resolution
+MIN_FROZEN_SAMPLES_WITHOUT_ROUNDING = 3
+MIN_FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quarter of the resolution
 UNREACHABLE_FROZEN_SAMPLES = (
     1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 )
@@ -150,8 +151,8 @@ INITIAL_ERRORS_RECORD = record(
     error_bound_at_start=N_INITIAL_ERROR_HYPOTHESES, error_bound=N_INITIAL_ERROR_HYPOTHESES,
     error_bound_at_alarm=N_INITIAL_ERROR_HYPOTHESES, error_change_bound=N_INITIAL_ERROR_HYPOTHESES,
     # bound on the effect of a unit of the error on a residual: in one sample, and through the filters
-    effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
-    filtered_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
+    max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
+    filtered_max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
     # effects of a unit with their sign
     coupling_effect_per_unit_error=N_COUPLINGS,
     filtered_coupling_effect_per_unit_error=(N_COUPLINGS, N_POLES),
@@ -212,9 +213,9 @@ SENSOR_MONITOR_RECORD = record(
 
 
 def configure_sensor_monitor(
-    monitor: np.void, scenario: Scenario, design: np.void, y: np.ndarray, enabled: bool
+    monitor: np.void, scenario: Scenario, design_record: np.void, y: np.ndarray, enabled: bool
 ) -> None:
-    """Fill the monitor's record at the trim: y, the measured signals there; design: the designer's record.
+    """Fill the monitor's record at the trim: y, the measured signals there; design_record: of the designer.
 
     A monitor that is not `enabled` has found nothing, and its record holds no more than that.
     """
@@ -223,18 +224,21 @@ def configure_sensor_monitor(
     config["enabled"] = enabled
     if not enabled:
         return
-    declared, initial = Declared.of(scenario), cast("Any", scenario.initial)  # whose keys the aircraft names
+    declared = Declared.of(scenario)
+    initial_state = cast("Any", scenario.initial)  # whose keys the aircraft names
     config["substeps"], config["has_engine_sensors"] = (
         scenario.substeps,
         scenario.airframe.has_engine_instruments,
     )
     config["trim_reading"][3:7] = y[:4]
-    config["rate_damping_per_s"] = acceleration_per_air_rotation(DesignFunctions(np.array([design])), y)
+    config["rate_damping_per_s"] = acceleration_per_air_rotation(
+        DesignFunctions(np.array([design_record])), y
+    )
     monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine_sensors"]:
         monitor["redundancy"]["memory"]["commanded_engine_readings"] = (
-            initial.engine_rpm,
-            initial.manifold_pressure_inhg,
+            initial_state.engine_rpm,
+            initial_state.manifold_pressure_inhg,
         )
     configure_redundancy_tests(monitor["redundancy"]["config"], declared, scenario)
     configure_declared_errors(monitor, declared, monitor["redundancy"]["config"]["sample_time_s"])
@@ -242,36 +246,47 @@ def configure_sensor_monitor(
 
 def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Scenario) -> None:
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
-    initial, sample_time_s = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
+    initial_state, sample_time_s = scenario.initial, 1.0 / scenario.rate_hz / scenario.substeps
     config["sample_time_s"] = sample_time_s
     config["filter_decay"] = [exp(-pole * sample_time_s) for pole in FILTER_POLES_PER_S]
-    config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    config["gravity_m_s2"] = GRAVITY_MPS2 * (1.0 + initial_state.altitude_m / EARTH_RADIUS_M) ** -2
     config["max_gust_speed_mps"], config["gust_change_bound_mps"] = gust_speed_and_change_bounds(
-        declared.air, initial.airspeed_mps, sample_time_s
+        declared.air, initial_state.airspeed_mps, sample_time_s
     )
-    config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
+    config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial_state.airspeed_mps
     config["low_altitude_limit_m"] = declared.air.low_m
     config["max_vertical_wind_mps"] = declared.vertical_wind_mps
 
 
 def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_s: float) -> None:
     """Fill the declared errors of the readings; a sample is a JSBSim frame."""
-    bounds, config, errors = monitor["redundancy"]["config"], monitor["config"], declared.sensors
+    redundancy_config, config, sensor_errors = (
+        monitor["redundancy"]["config"],
+        monitor["config"],
+        declared.sensors,
+    )
     for i, name in enumerate(SENSORS):
-        error = errors[name]
-        bounds["error_offset"][i], bounds["error_slope"][i], bounds["constant_error"][i] = (
-            error.worst,
-            error.slope,
-            error.steady,
+        sensor_error = sensor_errors[name]
+        (
+            redundancy_config["error_offset"][i],
+            redundancy_config["error_slope"][i],
+            redundancy_config["constant_error"][i],
+        ) = (
+            sensor_error.worst,
+            sensor_error.slope,
+            sensor_error.steady,
         )
-        config["min_frozen_samples"][i] = min_frozen_samples(error.noise, error.resolution) * frames_apart(
-            i, sample_time_s
+        config["min_frozen_samples"][i] = min_frozen_samples(
+            sensor_error.noise, sensor_error.resolution
+        ) * frames_apart(i, sample_time_s)
+        drift_rad_s = getattr(getattr(sensor_errors.declared, name), "drift_rad_s", 0.0)
+        redundancy_config["attitude_drift_rad_s"] = max(
+            redundancy_config["attitude_drift_rad_s"], abs(drift_rad_s)
         )
-        drift_rad_s = getattr(getattr(errors.declared, name), "drift_rad_s", 0.0)
-        bounds["attitude_drift_rad_s"] = max(bounds["attitude_drift_rad_s"], abs(drift_rad_s))
-    attitude = slice(PHI, PHI + 3)
+    attitude_indices = slice(PHI, PHI + 3)
     config["attitude_is_noisy"] = np.any(
-        bounds["error_offset"][attitude] > bounds["constant_error"][attitude]
+        redundancy_config["error_offset"][attitude_indices]
+        > redundancy_config["constant_error"][attitude_indices]
     )
     config["replaced_rate_correction_share"] = (
         min(1.0, sample_time_s * REPLACED_RATE_CORRECTION_PER_S) if config["attitude_is_noisy"] else 1.0
@@ -281,8 +296,8 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
 def min_frozen_samples(noise_std: float, resolution: float) -> int:
     """Number of identical samples that a sound sensor of this noise and resolution does not give."""
     if resolution == 0.0:
-        return FROZEN_SAMPLES_WITHOUT_ROUNDING
-    return FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else UNREACHABLE_FROZEN_SAMPLES
+        return MIN_FROZEN_SAMPLES_WITHOUT_ROUNDING
+    return MIN_FROZEN_SAMPLES_WITH_ROUNDING if noise_std > resolution / 4.0 else UNREACHABLE_FROZEN_SAMPLES
 
 
 def gust_speed_and_change_bounds(
@@ -293,9 +308,16 @@ def gust_speed_and_change_bounds(
     The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
     keeps 1 / 2 lam of its intensity.
     """
-    sigma_mps, intensity = air.sigma_mps, air.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM)
-    kept_s = [sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S]
-    return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(intensity * np.array(kept_s))
+    sigma_mps, velocity_walk_intensity = (
+        air.sigma_mps,
+        air.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
+    )
+    variance_per_intensity_s = [
+        sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S
+    ]
+    return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(
+        velocity_walk_intensity * np.array(variance_per_intensity_s)
+    )
 
 
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
@@ -314,8 +336,10 @@ def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | Non
         finding["isolated"] = finding["isolation_type"] = "unanticipated"
         finding["isolation_time_s"] = finding["detection_time_s"] + ISOLATION_TIME_LIMIT_S
     else:
-        suspects = zip(SENSORS, output["is_suspect"], strict=True)
-        finding["candidates"] = tuple(sensor_words(name) for name, suspected in suspects if suspected)
+        suspicion_by_sensor = zip(SENSORS, output["is_suspect"], strict=True)
+        finding["candidates"] = tuple(
+            sensor_words(name) for name, is_suspected in suspicion_by_sensor if is_suspected
+        )
     return finding
 
 
@@ -353,27 +377,31 @@ def fill_quaternion(phi, theta, psi, out):
 @kernel
 def advance_quaternion(quaternion, rates, duration_s, out):
     """Fill out (4,): the unit quaternion (4,) after duration_s at body rates (3,) rad/s, one Euler step."""
-    x, y, z = 0.5 * duration_s * rates[0], 0.5 * duration_s * rates[1], 0.5 * duration_s * rates[2]
-    q, length = quaternion, np.sqrt(1.0 + x * x + y * y + z * z)
-    out[0] = (q[0] - q[1] * x - q[2] * y - q[3] * z) / length
-    out[1] = (q[1] + q[0] * x + q[2] * z - q[3] * y) / length
-    out[2] = (q[2] + q[0] * y + q[3] * x - q[1] * z) / length
-    out[3] = (q[3] + q[0] * z + q[1] * y - q[2] * x) / length
+    half_x, half_y, half_z = (
+        0.5 * duration_s * rates[0],
+        0.5 * duration_s * rates[1],
+        0.5 * duration_s * rates[2],
+    )
+    q, norm = quaternion, np.sqrt(1.0 + half_x * half_x + half_y * half_y + half_z * half_z)
+    out[0] = (q[0] - q[1] * half_x - q[2] * half_y - q[3] * half_z) / norm
+    out[1] = (q[1] + q[0] * half_x + q[2] * half_z - q[3] * half_y) / norm
+    out[2] = (q[2] + q[0] * half_y + q[3] * half_x - q[1] * half_z) / norm
+    out[3] = (q[3] + q[0] * half_z + q[1] * half_y - q[2] * half_x) / norm
 
 
 @kernel
 def small_rotation_angle(from_quaternion, to_quaternion, component):
     """Component (1, 2, 3) in body axes of the small rotation from one attitude (4,) to the other, rad."""
-    one, other, a, b, c = (
+    q_from, q_to, i, j, k = (
         from_quaternion,
         to_quaternion,
         component,
         component % 3 + 1,
         (component + 1) % 3 + 1,
     )
-    half_angle = one[0] * other[a] - one[a] * other[0] - one[b] * other[c] + one[c] * other[b]
-    scalar = one[0] * other[0] + one[1] * other[1] + one[2] * other[2] + one[3] * other[3]
-    return 2.0 * half_angle if scalar >= 0.0 else -2.0 * half_angle
+    half_angle = q_from[0] * q_to[i] - q_from[i] * q_to[0] - q_from[j] * q_to[k] + q_from[k] * q_to[j]
+    scalar_part = q_from[0] * q_to[0] + q_from[1] * q_to[1] + q_from[2] * q_to[2] + q_from[3] * q_to[3]
+    return 2.0 * half_angle if scalar_part >= 0.0 else -2.0 * half_angle
 
 
 @kernel
@@ -392,10 +420,10 @@ def body_turn_per_euler_angle(redundancy, axis, angle_index):
 def rotate_to_turned_axes(rates, duration_s, vector, out):
     """Fill out (3,): the components of a constant vector (3,) in body axes that have turned at rates (3,)
     rad/s for duration_s."""
-    rate = np.sqrt(rates[0] ** 2 + rates[1] ** 2 + rates[2] ** 2)
-    angle = 2.0 * np.arctan(0.5 * duration_s * rate)
-    sine_per_rate = np.sin(angle) / rate if rate > 0.0 else 0.0
-    versine_per_rate_squared = (1.0 - np.cos(angle)) / rate**2 if rate > 0.0 else 0.0
+    total_rate = np.sqrt(rates[0] ** 2 + rates[1] ** 2 + rates[2] ** 2)
+    angle = 2.0 * np.arctan(0.5 * duration_s * total_rate)
+    sine_per_rate = np.sin(angle) / total_rate if total_rate > 0.0 else 0.0
+    versine_per_rate_squared = (1.0 - np.cos(angle)) / total_rate**2 if total_rate > 0.0 else 0.0
     dot = rates[0] * vector[0] + rates[1] * vector[1] + rates[2] * vector[2]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -403,7 +431,7 @@ def rotate_to_turned_axes(rates, duration_s, vector, out):
         out[i] = (
             vector[i]
             - sine_per_rate * cross
-            + versine_per_rate_squared * (rates[i] * dot - rate**2 * vector[i])
+            + versine_per_rate_squared * (rates[i] * dot - total_rate**2 * vector[i])
         )
 
 
@@ -412,11 +440,13 @@ def fill_reading_error_bounds(redundancy, signal):
     """Fill the bounds on the error of each reading in signal (N_SENSORS,), and on the part that changes."""
     config, memory = redundancy.config, redundancy.memory
     for i in range(N_SENSORS):
-        size = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
-        whole = (config.error_offset[i] + config.error_slope[i] * size) / (1.0 - config.error_slope[i])
-        memory.reading_error_bound[i] = whole
+        reading_magnitude = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
+        total_error_bound = (config.error_offset[i] + config.error_slope[i] * reading_magnitude) / (
+            1.0 - config.error_slope[i]
+        )
+        memory.reading_error_bound[i] = total_error_bound
         memory.reading_error_change_bound[i] = (
-            whole - config.constant_error[i] + READING_ROUNDING_SHARE * abs(signal[i])
+            total_error_bound - config.constant_error[i] + READING_ROUNDING_SHARE * abs(signal[i])
         )
     for i in range(PHI, PHI + 3):
         memory.reading_error_bound[i] += memory.attitude_drift_bound_rad
@@ -452,7 +482,11 @@ def predict_readings(redundancy):
     the present body axes.
     """
     memory, h = redundancy.memory, redundancy.config.sample_time_s
-    rates, predicted, moved = memory.previous_reading[:3], memory.predicted_reading, memory.scratch[:3]
+    rates, predicted_reading, scratch_vector = (
+        memory.previous_reading[:3],
+        memory.predicted_reading,
+        memory.scratch[:3],
+    )
     advance_quaternion(memory.previous_quaternion, rates, h, memory.predicted_quaternion)
     q0, q1, q2, q3 = (
         memory.predicted_quaternion[0],
@@ -460,48 +494,48 @@ def predict_readings(redundancy):
         memory.predicted_quaternion[2],
         memory.predicted_quaternion[3],
     )
-    predicted[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
-    predicted[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
-    predicted[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
+    predicted_reading[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
+    predicted_reading[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
+    predicted_reading[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
     theta, phi, v = memory.previous_reading[THETA], memory.previous_reading[PHI], memory.body_velocity
     climb_rate = (
         v[0] * np.sin(theta) - v[1] * np.sin(phi) * np.cos(theta) - v[2] * np.cos(phi) * np.cos(theta)
     )
-    predicted[ALTITUDE] = memory.previous_reading[ALTITUDE] + h * climb_rate
+    predicted_reading[ALTITUDE] = memory.previous_reading[ALTITUDE] + h * climb_rate
     memory.earlier_acceleration_magnitudes[1], memory.earlier_acceleration_magnitudes[0] = (
         memory.earlier_acceleration_magnitudes[0],
         memory.acceleration_magnitude,
     )
     memory.previous_acceleration_magnitude = vector_length(memory.previous_body_acceleration)
     for i in range(3):
-        moved[i] = (
+        scratch_vector[i] = (
             INTEGRATION_WEIGHT * memory.body_acceleration[i]
             - PREVIOUS_INTEGRATION_WEIGHT * memory.previous_body_acceleration[i]
         )
-    memory.acceleration_magnitude = vector_length(moved)
+    memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
-        moved[i] = v[i] + h * moved[i]
-    rotate_to_turned_axes(rates, h, moved, v)
+        scratch_vector[i] = v[i] + h * scratch_vector[i]
+    rotate_to_turned_axes(rates, h, scratch_vector, v)
     rotate_to_turned_axes(rates, h, memory.body_acceleration, memory.previous_body_acceleration)
     speed = vector_length(v)
-    predicted[AIRSPEED] = speed
-    predicted[ALPHA] = np.arctan2(v[2], v[0])
-    predicted[BETA] = np.arcsin(v[1] / max(speed, MIN_PREDICTED_SPEED_MPS))
+    predicted_reading[AIRSPEED] = speed
+    predicted_reading[ALPHA] = np.arctan2(v[2], v[0])
+    predicted_reading[BETA] = np.arcsin(v[1] / max(speed, MIN_PREDICTED_SPEED_MPS))
 
 
 @kernel
 def fill_residuals(redundancy, signal):
     """Fill the residual of each test: readings (N_SENSORS,) minus their prediction."""
-    test, memory, predicted = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
+    test, memory, predicted_reading = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
     fill_quaternion(signal[PHI], signal[THETA], signal[PSI], memory.scratch)
     for i in range(3):
         test[TURN_TEST + i].residual = small_rotation_angle(
             memory.predicted_quaternion, memory.scratch, i + 1
         )
-        test[ANGLE_TEST + i].residual = wrapped(signal[PHI + i] - predicted[PHI + i])
-    test[SPEED_TEST].residual = signal[AIRSPEED] - predicted[AIRSPEED]
-    test[ALPHA_FLOW_TEST].residual = signal[ALPHA] - predicted[ALPHA]
-    test[BETA_FLOW_TEST].residual = signal[BETA] - predicted[BETA]
+        test[ANGLE_TEST + i].residual = wrapped(signal[PHI + i] - predicted_reading[PHI + i])
+    test[SPEED_TEST].residual = signal[AIRSPEED] - predicted_reading[AIRSPEED]
+    test[ALPHA_FLOW_TEST].residual = signal[ALPHA] - predicted_reading[ALPHA]
+    test[BETA_FLOW_TEST].residual = signal[BETA] - predicted_reading[BETA]
     half_density, previous_half_density = (
         signal[QDYN] / signal[AIRSPEED] ** 2,
         memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2,
@@ -510,7 +544,7 @@ def fill_residuals(redundancy, signal):
         max(half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
         / max(previous_half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
     )
-    test[CLIMB_TEST].residual = signal[ALTITUDE] - predicted[ALTITUDE]
+    test[CLIMB_TEST].residual = signal[ALTITUDE] - predicted_reading[ALTITUDE]
 
 
 @kernel
@@ -535,187 +569,215 @@ def extrapolated_error_bound(redundancy, sensor):
 
 
 @kernel
-def acceleration_error_bound(redundancy, turn_rate, gyro_error):
+def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
     """Bound the error of the acceleration of the elapsed step, m/s2.
 
     Its parts: errors of the accelerometers; gravity in the direction that the attitude gives it; turning the
-    previous acceleration into the present axes. turn_rate, gyro_error: see bound_residuals, rad/s.
+    previous acceleration into the present axes. max_turn_rate, gyro_error_bound_sum, rad/s: see
+    bound_residuals.
     """
     config, memory = redundancy.config, redundancy.memory
-    tilt_error = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
+    tilt_error_bound = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
     gravity = config.gravity_m_s2
-    force_error_squared = 0.0
-    constant = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
+    force_error_bound_squared = 0.0
+    constant_acceleration_error = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
     for i in range(AX, AX + 3):
-        force_error_squared += extrapolated_error_bound(redundancy, i) ** 2
-        constant += config.constant_error[i]
-    turning_error = config.sample_time_s * (
-        turn_rate * constant
-        + PREVIOUS_INTEGRATION_WEIGHT * gyro_error * memory.previous_acceleration_magnitude
+        force_error_bound_squared += extrapolated_error_bound(redundancy, i) ** 2
+        constant_acceleration_error += config.constant_error[i]
+    axis_turning_error_bound = config.sample_time_s * (
+        max_turn_rate * constant_acceleration_error
+        + PREVIOUS_INTEGRATION_WEIGHT * gyro_error_bound_sum * memory.previous_acceleration_magnitude
     )
     return (
         EARTH_ACCELERATION_BOUND_M_S2
         + memory.first_acceleration_error_bound
-        + gravity * tilt_error
-        + np.sqrt(force_error_squared)
-        + turning_error
+        + gravity * tilt_error_bound
+        + np.sqrt(force_error_bound_squared)
+        + axis_turning_error_bound
     )
 
 
 @kernel
-def bound_attitude_tests(redundancy, signal, turn_rate, gyro_error):
+def bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
     """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
     test, config, memory = redundancy.test, redundancy.config, redundancy.memory
-    previous_error, error_change = memory.previous_error_bound, memory.reading_error_change_bound
-    secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, signal), MAX_PITCH_RAD))
-    attitude_error = previous_error[PHI] + previous_error[THETA] + previous_error[PSI]
-    turn = config.sample_time_s * turn_rate
-    tilt_change = abs(signal[PHI] - memory.previous_reading[PHI]) + abs(
+    previous_error_bound, error_change_bound = memory.previous_error_bound, memory.reading_error_change_bound
+    max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, signal), MAX_PITCH_RAD))
+    attitude_error_bound = previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
+    max_turn = config.sample_time_s * max_turn_rate
+    tilt_reading_change = abs(signal[PHI] - memory.previous_reading[PHI]) + abs(
         signal[THETA] - memory.previous_reading[THETA]
     )
-    momentary_error = (
-        previous_error[THETA]
+    momentary_error_bound = (
+        previous_error_bound[THETA]
         - config.constant_error[THETA]
-        + previous_error[PSI]
+        + previous_error_bound[PSI]
         - config.constant_error[PSI]
-        + error_change[THETA]
-        + error_change[PSI]
+        + error_change_bound[THETA]
+        + error_change_bound[PSI]
     )
     for i in range(3):
-        by_attitude = (
-            turn_rate * (attitude_error + secant * previous_error[THETA])
-            + tilt_change * momentary_error / config.sample_time_s
+        rate_error_by_attitude = (
+            max_turn_rate * (attitude_error_bound + max_pitch_secant * previous_error_bound[THETA])
+            + tilt_reading_change * momentary_error_bound / config.sample_time_s
         )
         test[TURN_TEST + i].bound_per_s = (
             EARTH_RATE_BOUND_RAD_S
             + 2.0 * config.attitude_drift_rad_s
-            + previous_error[P + i]
-            + turn * gyro_error
-            + by_attitude
+            + previous_error_bound[P + i]
+            + max_turn * gyro_error_bound_sum
+            + rate_error_by_attitude
         )
-        by_attitude = 2.0 * secant * turn_rate * (previous_error[PHI] + previous_error[THETA])
-        rate_error = EARTH_RATE_BOUND_RAD_S + (1.0 + secant * turn) * gyro_error + by_attitude
+        rate_error_by_attitude = (
+            2.0 * max_pitch_secant * max_turn_rate * (previous_error_bound[PHI] + previous_error_bound[THETA])
+        )
+        rate_error_bound = (
+            EARTH_RATE_BOUND_RAD_S
+            + (1.0 + max_pitch_secant * max_turn) * gyro_error_bound_sum
+            + rate_error_by_attitude
+        )
         test[ANGLE_TEST + i].bound_per_s, test[ANGLE_TEST + i].bound_per_sample = (
-            secant * rate_error + config.attitude_drift_rad_s,
-            error_change[PHI + i],
+            max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
+            error_change_bound[PHI + i],
         )
-    sine_theta = abs(np.sin(signal[THETA])) + error_change[THETA]
-    sine_phi = abs(np.sin(signal[PHI])) + error_change[PHI]
-    test[TURN_TEST].bound_per_sample = error_change[PHI] + sine_theta * error_change[PSI]
-    test[TURN_TEST + 1].bound_per_sample = error_change[THETA] + sine_phi * error_change[PSI]
-    test[TURN_TEST + 2].bound_per_sample = error_change[PSI] + sine_phi * error_change[THETA]
+    max_sin_theta = abs(np.sin(signal[THETA])) + error_change_bound[THETA]
+    max_sin_phi = abs(np.sin(signal[PHI])) + error_change_bound[PHI]
+    test[TURN_TEST].bound_per_sample = error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
+    test[TURN_TEST + 1].bound_per_sample = error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
+    test[TURN_TEST + 2].bound_per_sample = error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
 
 
 @kernel
-def min_sample_height(redundancy, signal):
+def min_height_of_two_samples(redundancy, signal):
     """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
     memory = redundancy.memory
-    height, previous_height = (
+    min_height, previous_min_height = (
         signal[ALTITUDE] - memory.reading_error_bound[ALTITUDE],
         memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE],
     )
-    return max(min(height, previous_height), LEAST_HEIGHT_M)
+    return max(min(min_height, previous_min_height), LEAST_HEIGHT_M)
 
 
 @kernel
-def bound_flow_tests(redundancy, signal, turn_rate, gyro_error):
+def bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
     """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
     kinematics with respect to each reading, times the bound on the reading's error."""
     test, config, memory = redundancy.test, redundancy.config, redundancy.memory
-    error, previous_error = memory.reading_error_bound, memory.previous_error_bound
-    error_change, previous_reading = memory.reading_error_change_bound, memory.previous_reading
+    error_bound, previous_error_bound = memory.reading_error_bound, memory.previous_error_bound
+    error_change_bound, previous_reading = memory.reading_error_change_bound, memory.previous_reading
     min_airspeed = max(
-        min(signal[AIRSPEED] - error[AIRSPEED], previous_reading[AIRSPEED] - previous_error[AIRSPEED]),
+        min(
+            signal[AIRSPEED] - error_bound[AIRSPEED],
+            previous_reading[AIRSPEED] - previous_error_bound[AIRSPEED],
+        ),
         MIN_AIRSPEED_MPS,
     )
-    max_sideslip = max(abs(signal[BETA]) + error[BETA], abs(previous_reading[BETA]) + previous_error[BETA])
-    secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
-    vane_error = previous_error[ALPHA] + previous_error[BETA]
-    acceleration_error = acceleration_error_bound(redundancy, turn_rate, gyro_error)
-    max_acceleration = memory.acceleration_magnitude + acceleration_error
-    second_order = 1.0 + config.sample_time_s * (
-        2.0 * memory.acceleration_magnitude / min_airspeed + turn_rate
+    max_sideslip = max(
+        abs(signal[BETA]) + error_bound[BETA], abs(previous_reading[BETA]) + previous_error_bound[BETA]
     )
-    gust_factor = np.sqrt(
+    max_sideslip_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    vane_error_bound = previous_error_bound[ALPHA] + previous_error_bound[BETA]
+    max_acceleration_error = acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum)
+    max_acceleration = memory.acceleration_magnitude + max_acceleration_error
+    second_order_factor = 1.0 + config.sample_time_s * (
+        2.0 * memory.acceleration_magnitude / min_airspeed + max_turn_rate
+    )
+    gust_change_factor = np.sqrt(
         max(signal[AIRSPEED] / config.max_airspeed_mps, 1.0)
-        * max(config.low_altitude_limit_m / min_sample_height(redundancy, signal), 1.0)
+        * max(config.low_altitude_limit_m / min_height_of_two_samples(redundancy, signal), 1.0)
     )
-    flow_rate_error = (
-        secant**2
+    flow_rate_error_bound = (
+        max_sideslip_secant**2
         * (
-            (acceleration_error + max_acceleration * (vane_error + previous_error[AIRSPEED] / min_airspeed))
+            (
+                max_acceleration_error
+                + max_acceleration * (vane_error_bound + previous_error_bound[AIRSPEED] / min_airspeed)
+            )
             / min_airspeed
-            + turn_rate * vane_error
+            + max_turn_rate * vane_error_bound
         )
-        + secant * gyro_error
+        + max_sideslip_secant * gyro_error_bound_sum
     )
     test[SPEED_TEST].residual_per_gust_speed, test[SPEED_TEST].bound_per_sample = (
-        gust_factor,
-        error_change[AIRSPEED],
+        gust_change_factor,
+        error_change_bound[AIRSPEED],
     )
     test[SPEED_TEST].bound_per_s = (
-        acceleration_error
-        + second_order * max_acceleration * vane_error
-        + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error[AIRSPEED]
+        max_acceleration_error
+        + second_order_factor * max_acceleration * vane_error_bound
+        + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error_bound[AIRSPEED]
     )
-    for c, vane in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
-        test[c].residual_per_gust_speed, test[c].bound_per_sample, test[c].bound_per_s = (
-            gust_factor * secant / min_airspeed,
-            error_change[vane],
-            second_order * flow_rate_error,
+    for test_index, vane in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
+        (
+            test[test_index].residual_per_gust_speed,
+            test[test_index].bound_per_sample,
+            test[test_index].bound_per_s,
+        ) = (
+            gust_change_factor * max_sideslip_secant / min_airspeed,
+            error_change_bound[vane],
+            second_order_factor * flow_rate_error_bound,
         )
-    tilt_error, largest_acceleration = (
-        previous_error[PHI] + previous_error[THETA],
+    tilt_error_bound, max_recent_acceleration = (
+        previous_error_bound[PHI] + previous_error_bound[THETA],
         max(
             max_acceleration,
             memory.earlier_acceleration_magnitudes[0],
             memory.earlier_acceleration_magnitudes[1],
         ),
     )
-    climb_rate_error = (previous_reading[AIRSPEED] + previous_error[AIRSPEED]) * (
-        tilt_error + vane_error
-    ) + previous_error[AIRSPEED]
+    climb_rate_error_bound = (previous_reading[AIRSPEED] + previous_error_bound[AIRSPEED]) * (
+        tilt_error_bound + vane_error_bound
+    ) + previous_error_bound[AIRSPEED]
     test[CLIMB_TEST].bound_per_s = (
         config.max_vertical_wind_mps
         + config.max_gust_speed_mps
-        + climb_rate_error
-        + POSITION_INTEGRATION_ERROR_FACTOR * config.sample_time_s * largest_acceleration
+        + climb_rate_error_bound
+        + POSITION_INTEGRATION_ERROR_FACTOR * config.sample_time_s * max_recent_acceleration
     )
-    test[CLIMB_TEST].bound_per_sample = error_change[ALTITUDE]
+    test[CLIMB_TEST].bound_per_sample = error_change_bound[ALTITUDE]
 
 
 @kernel
 def log_change_error_bound(redundancy, signal, sensor):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
-    constant, previous = redundancy.config.constant_error[sensor], redundancy.memory.previous_reading[sensor]
-    smallest = max(min(signal[sensor], previous), 1.0)
-    change = constant * abs(1.0 / max(signal[sensor], 1.0) - 1.0 / max(previous, 1.0))
-    return change / max(1.0 - constant / smallest, MIN_READING_SHARE_IN_LOGARITHM)
+    constant_error, previous_reading = (
+        redundancy.config.constant_error[sensor],
+        redundancy.memory.previous_reading[sensor],
+    )
+    smaller_reading = max(min(signal[sensor], previous_reading), 1.0)
+    first_order_bound = constant_error * abs(
+        1.0 / max(signal[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
+    )
+    return first_order_bound / max(1.0 - constant_error / smaller_reading, MIN_READING_SHARE_IN_LOGARITHM)
 
 
 @kernel
 def bound_density_test(redundancy, signal):
     """Fill the bounds of `bound_residuals` for the logarithm of the density."""
     test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
-    error, error_change = memory.reading_error_bound, memory.reading_error_change_bound
+    error_bound, error_change_bound = memory.reading_error_bound, memory.reading_error_change_bound
     max_climb_rate = (
         memory.previous_reading[AIRSPEED]
         + memory.previous_error_bound[AIRSPEED]
         + config.max_vertical_wind_mps
         + config.max_gust_speed_mps
     )
-    apparent_change = log_change_error_bound(redundancy, signal, QDYN) + 2.0 * log_change_error_bound(
-        redundancy, signal, AIRSPEED
+    apparent_log_change_bound = log_change_error_bound(
+        redundancy, signal, QDYN
+    ) + 2.0 * log_change_error_bound(redundancy, signal, AIRSPEED)
+    test.bound_per_s = (
+        max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_log_change_bound / config.sample_time_s
     )
-    test.bound_per_s = max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_change / config.sample_time_s
-    test.bound_per_sample = error_change[QDYN] / max(signal[QDYN] - error[QDYN], MIN_DYNAMIC_PRESSURE_PA)
+    test.bound_per_sample = error_change_bound[QDYN] / max(
+        signal[QDYN] - error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
+    )
     test.bound_per_sample += (
-        2.0 * error_change[AIRSPEED] / max(signal[AIRSPEED] - error[AIRSPEED], MIN_AIRSPEED_MPS)
+        2.0 * error_change_bound[AIRSPEED] / max(signal[AIRSPEED] - error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
     )
 
 
@@ -725,14 +787,16 @@ def bound_residuals(redundancy, signal):
     declared errors.
 
     The errors of the previous sample act through the prediction, those of this sample, signal (N_SENSORS,),
-    through the reading that is compared with it. gyro_error: sum of the bounds of the three gyros;
-    turn_rate: bound on |p| + |q| + |r|; rad/s.
+    through the reading that is compared with it. gyro_error_bound_sum: sum of the bounds of the three gyros;
+    max_turn_rate: bound on |p| + |q| + |r|; rad/s.
     """
-    error, reading = redundancy.memory.previous_error_bound, redundancy.memory.previous_reading
-    gyro_error = error[P] + error[Q] + error[R]
-    turn_rate = abs(reading[P]) + abs(reading[Q]) + abs(reading[R]) + gyro_error
-    bound_attitude_tests(redundancy, signal, turn_rate, gyro_error)
-    bound_flow_tests(redundancy, signal, turn_rate, gyro_error)
+    error_bound, previous_reading = redundancy.memory.previous_error_bound, redundancy.memory.previous_reading
+    gyro_error_bound_sum = error_bound[P] + error_bound[Q] + error_bound[R]
+    max_turn_rate = (
+        abs(previous_reading[P]) + abs(previous_reading[Q]) + abs(previous_reading[R]) + gyro_error_bound_sum
+    )
+    bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum)
+    bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum)
     bound_density_test(redundancy, signal)
 
 
@@ -749,10 +813,10 @@ def filter_residual(redundancy, test):
         test.filtered_bound_per_sample_part[m] = advance_gyro_error_bound(
             test.filtered_bound_per_sample_part[m], test.previous_bound_per_sample, decay
         )
-        sample_bound = test.filtered_bound_per_sample_part[m] + test.bound_per_sample
+        per_sample_part = test.filtered_bound_per_sample_part[m] + test.bound_per_sample
         test.filtered_bound[m] = (
             test.filtered_bound_per_s_part[m]
-            + sample_bound
+            + per_sample_part
             + test.residual_per_gust_speed * config.gust_change_bound_mps[m]
         )
         test.residual_bound_ratio = max(
@@ -777,30 +841,30 @@ def compare_engine_sensors(redundancy, signal):
     redundancy.test[RPM_TEST].residual = signal[ENGINE_SPEED] - memory.commanded_engine_readings[0]
     redundancy.test[RPM_TEST + 1].residual = signal[MANIFOLD] - memory.commanded_engine_readings[1]
     for i in range(2):
-        bound = memory.reading_error_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
+        residual_bound = memory.reading_error_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
         redundancy.test[RPM_TEST + i].residual_bound_ratio = (
-            abs(redundancy.test[RPM_TEST + i].residual) / bound
+            abs(redundancy.test[RPM_TEST + i].residual) / residual_bound
         )
 
 
 @kernel
-def compare_duplicate_sensors(redundancy, signal, fresh):
+def compare_duplicate_sensors(redundancy, signal, is_fresh):
     """Compare each sensor that should equal another reading with that reading, in the samples in which it is
-    `fresh` (sampled sensors,). If they differ by more than the errors of both and the tolerance of the two
+    `is_fresh` (sampled sensors,). If they differ by more than the errors of both and the tolerance of the two
     quantities, one of the two is broken."""
     memory = redundancy.memory
     for k in range(DUPLICATE_SENSOR_INDEX.size):
-        sensor, reading = DUPLICATE_SENSOR_INDEX[k], DUPLICATED_READING_INDEX[k]
+        sensor_index, reading_index = DUPLICATE_SENSOR_INDEX[k], DUPLICATED_READING_INDEX[k]
         test = redundancy.test[N_COMPUTED_TESTS + k]
         test.residual_bound_ratio = 0.0
-        if fresh[sensor - N_IN_EQUATIONS]:
-            test.residual = signal[sensor] - signal[reading]
-            if PHI <= reading <= PSI:
+        if is_fresh[sensor_index - N_IN_EQUATIONS]:
+            test.residual = signal[sensor_index] - signal[reading_index]
+            if PHI <= reading_index <= PSI:
                 test.residual = wrapped(test.residual)
             test.filtered_bound[0] = (
                 DUPLICATE_TOLERANCE[k]
-                + memory.reading_error_bound[sensor]
-                + memory.reading_error_bound[reading]
+                + memory.reading_error_bound[sensor_index]
+                + memory.reading_error_bound[reading_index]
                 + COMPARISON_ROUNDING
             )
             test.residual_bound_ratio = abs(test.residual) / test.filtered_bound[0]
@@ -822,8 +886,8 @@ def start_redundancy_tests(redundancy, signal, specific_force):
     )
     memory.first_acceleration_error_bound = PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
     bound_residuals(redundancy, signal)
-    for c in range(RPM_TEST):
-        restart_test(redundancy.test[c])
+    for test_index in range(RPM_TEST):
+        restart_test(redundancy.test[test_index])
 
 
 @kernel
@@ -837,11 +901,11 @@ def run_redundancy_tests(redundancy, signal, has_engine_sensors):
     bound_residuals(redundancy, signal)
     memory.first_acceleration_error_bound = 0.0
     too_steep = max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD
-    for c in range(RPM_TEST):
-        if too_steep and c < SPEED_TEST:
-            restart_test(redundancy.test[c])
+    for test_index in range(RPM_TEST):
+        if too_steep and test_index < SPEED_TEST:
+            restart_test(redundancy.test[test_index])
         else:
-            filter_residual(redundancy, redundancy.test[c])
+            filter_residual(redundancy, redundancy.test[test_index])
     if has_engine_sensors:
         compare_engine_sensors(redundancy, signal)
 

@@ -149,18 +149,20 @@ def is_flow_test(test_index):
 
 
 @kernel
-def count_identical_samples(monitor, signal):
+def count_identical_samples_and_find_jump(monitor, signal):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within ACCELEROMETER_JUMP_MEMORY_S."""
-    memory, previous = monitor.memory, monitor.redundancy.memory.previous_reading
+    memory, previous_reading = monitor.memory, monitor.redundancy.memory.previous_reading
     memory.fading_max_accelerometer_jump *= (
         1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_MEMORY_S
     )
     for i in range(N_SENSORS):
-        memory.n_identical_samples[i] = memory.n_identical_samples[i] + 1 if signal[i] == previous[i] else 0
+        memory.n_identical_samples[i] = (
+            memory.n_identical_samples[i] + 1 if signal[i] == previous_reading[i] else 0
+        )
         if AX <= i < N_IN_EQUATIONS:
             memory.fading_max_accelerometer_jump = max(
-                memory.fading_max_accelerometer_jump, abs(signal[i] - previous[i])
+                memory.fading_max_accelerometer_jump, abs(signal[i] - previous_reading[i])
             )
 
 
@@ -177,8 +179,8 @@ def update_cleared_sensors(monitor, signal):
     if not is_flow_test(alarm_test_index):
         return
     since_alarm_s = memory.n_samples_since_alarm * monitor.redundancy.config.sample_time_s
-    is_soon_enough = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
-    if is_soon_enough and flow_reading_jumped(monitor, signal):
+    is_within_jump_window = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
+    if is_within_jump_window and flow_reading_jumped(monitor, signal):
         clear_accelerometers(monitor)
     sum_flow_residuals(monitor, signal)
     flow_sensor = flow_sensor_of_test(alarm_test_index)
@@ -208,22 +210,27 @@ def flow_reading_jumped(monitor, signal):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
     alarm_test_index, redundancy, memory = monitor.output.alarm_test_index, monitor.redundancy, monitor.memory
-    sensor, previous, test = (
+    flow_sensor, previous_reading, alarm_test = (
         flow_sensor_of_test(alarm_test_index),
         redundancy.memory.previous_reading,
         redundancy.test[alarm_test_index],
     )
     # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
     residual_per_m_s = (
-        1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous[AIRSPEED], MIN_AIRSPEED_MPS)
+        1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     )
     residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
-    second_difference = signal[sensor] - 2.0 * previous[sensor] + memory.reading_two_samples_ago[sensor]
-    min_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(test.residual)
-    accelerometer_effect = INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_m_s2
+    reading_second_difference = (
+        signal[flow_sensor]
+        - 2.0 * previous_reading[flow_sensor]
+        + memory.reading_two_samples_ago[flow_sensor]
+    )
+    min_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
+    max_accelerometer_effect = INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_m_s2
     return (
-        abs(test.residual) > test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
-        and abs(second_difference) >= min_jump > accelerometer_effect
+        abs(alarm_test.residual)
+        > alarm_test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
+        and abs(reading_second_difference) >= min_jump > max_accelerometer_effect
     )
 
 
@@ -234,9 +241,9 @@ def sum_flow_residuals(monitor, signal):
     redundancy, memory, initial_errors = monitor.redundancy, monitor.memory, monitor.initial_errors
     config = redundancy.config
     for j in range(3):
-        reading, test = signal[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
+        flow_reading, test = signal[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
         if memory.n_samples_since_alarm == 0:
-            memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = reading
+            memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = flow_reading
             memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample
                 2.0 * test.bound_per_sample + test.residual_per_gust_speed * config.max_gust_speed_mps
             )
@@ -246,24 +253,28 @@ def sum_flow_residuals(monitor, signal):
         memory.flow_bound_sum_since_alarm[j] += config.sample_time_s * test.bound_per_s
         memory.initial_error_effect_sum_since_alarm[j] += (
             initial_errors.error_bound_at_alarm[hypothesis]
-            * initial_errors.effect_per_unit_error[hypothesis, SPEED_TEST + j]
+            * initial_errors.max_effect_per_unit_error[hypothesis, SPEED_TEST + j]
         )
         memory.min_flow_reading_since_alarm[j], memory.max_flow_reading_since_alarm[j] = (
-            min(memory.min_flow_reading_since_alarm[j], reading),
-            max(memory.max_flow_reading_since_alarm[j], reading),
+            min(memory.min_flow_reading_since_alarm[j], flow_reading),
+            max(memory.max_flow_reading_since_alarm[j], flow_reading),
         )
-    alpha_error = np.sign(memory.flow_residual_sum_since_alarm[1]) * max(
+    unexplained_alpha_error = np.sign(memory.flow_residual_sum_since_alarm[1]) * max(
         abs(memory.flow_residual_sum_since_alarm[1])
         - memory.flow_bound_sum_since_alarm[1]
         - memory.initial_error_effect_sum_since_alarm[1],
         0.0,
     )
-    climb_error = (
-        config.sample_time_s * signal[AIRSPEED] * alpha_error * np.cos(signal[PHI]) * np.cos(signal[THETA])
+    climb_error_in_sample_m = (
+        config.sample_time_s
+        * signal[AIRSPEED]
+        * unexplained_alpha_error
+        * np.cos(signal[PHI])
+        * np.cos(signal[THETA])
     )
     for m in range(config.filter_decay.size):
         memory.filtered_climb_error_m[m] = (
-            config.filter_decay[m] * memory.filtered_climb_error_m[m] + climb_error
+            config.filter_decay[m] * memory.filtered_climb_error_m[m] + climb_error_in_sample_m
         )
     memory.n_samples_since_alarm += 1
 
@@ -273,11 +284,14 @@ def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     memory, j = monitor.memory, monitor.output.alarm_test_index - SPEED_TEST
     reading_range = memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
-    explained = memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
+    explained_residual_sum = (
+        memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
+    )
     return (
         reading_range > 0.0
         and abs(memory.flow_residual_sum_since_alarm[j])
-        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range + MIN_EFFECT_OVER_BOUND_TO_CLEAR * explained
+        > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range
+        + MIN_EFFECT_OVER_BOUND_TO_CLEAR * explained_residual_sum
     )
 
 
@@ -287,68 +301,76 @@ def flow_sensor_error_would_exceed_other_test(monitor, signal):
     climb, while that test is within its bound."""
     redundancy, initial_errors = monitor.redundancy, monitor.initial_errors
     alarm_test_index = monitor.output.alarm_test_index
-    other_test = DENSITY_TEST if alarm_test_index == SPEED_TEST else CLIMB_TEST
-    if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test]:
+    other_test_index = DENSITY_TEST if alarm_test_index == SPEED_TEST else CLIMB_TEST
+    if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test_index]:
         return False
     hypothesis = initial_error_hypothesis_of_test(alarm_test_index)
     for m in range(redundancy.config.filter_decay.size):
-        expected, speed = abs(monitor.memory.filtered_climb_error_m[m]), redundancy.test[SPEED_TEST]
+        expected_residual, speed_test = (
+            abs(monitor.memory.filtered_climb_error_m[m]),
+            redundancy.test[SPEED_TEST],
+        )
         if (
             alarm_test_index == SPEED_TEST
         ):  # log(density) changes by twice the relative change of the airspeed
-            expected = (
+            expected_residual = (
                 2.0
-                * (abs(speed.filtered_residual[m]) - speed.filtered_bound[m])
+                * (abs(speed_test.filtered_residual[m]) - speed_test.filtered_bound[m])
                 / max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
             )
-            expected *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
-        if expected > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
-            redundancy.test[other_test].filtered_bound[m]
-            + max_error_effect_at_alarm(initial_errors, hypothesis, other_test, m)
+            expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
+        if expected_residual > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
+            redundancy.test[other_test_index].filtered_bound[m]
+            + max_error_effect_at_alarm(initial_errors, hypothesis, other_test_index, m)
         ):
             return True
     return False
 
 
 @kernel
-def suspect_accelerometers(monitor, gyro_explains_it):
+def suspect_accelerometers(monitor, gyro_explains_residual):
     """Suspect the accelerometers along whose axis most of the spurious velocity is, unless a gyro explains
     it."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    reading, flow_residual_sum_since_alarm, flow_bound_sum_since_alarm = (
+    previous_reading, flow_residual_sum_since_alarm, flow_bound_sum_since_alarm = (
         monitor.redundancy.memory.previous_reading,
         memory.flow_residual_sum_since_alarm,
         memory.flow_bound_sum_since_alarm,
     )
-    alpha, beta, V = reading[ALPHA], reading[BETA], max(reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    alpha, beta, V = (
+        previous_reading[ALPHA],
+        previous_reading[BETA],
+        max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS),
+    )
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
-    along_flow, down, side = (
+    velocity_along_flow, velocity_down, velocity_sideways = (
         flow_residual_sum_since_alarm[0],
         V * np.cos(beta) * flow_residual_sum_since_alarm[1],
         V * flow_residual_sum_since_alarm[2],
     )
-    velocity, largest, ahead = (
+    spurious_velocity, largest_component, velocity_ahead = (
         memory.spurious_velocity,
         0.0,
-        np.cos(beta) * along_flow - np.sin(beta) * side,
+        np.cos(beta) * velocity_along_flow - np.sin(beta) * velocity_sideways,
     )
-    velocity[0] = np.cos(alpha) * ahead - np.sin(alpha) * down
-    velocity[1] = np.sin(beta) * along_flow + np.cos(beta) * side
-    velocity[2] = np.sin(alpha) * ahead + np.cos(alpha) * down
-    velocity_bound = flow_bound_sum_since_alarm[0] + V * (
+    spurious_velocity[0] = np.cos(alpha) * velocity_ahead - np.sin(alpha) * velocity_down
+    spurious_velocity[1] = np.sin(beta) * velocity_along_flow + np.cos(beta) * velocity_sideways
+    spurious_velocity[2] = np.sin(alpha) * velocity_ahead + np.cos(alpha) * velocity_down
+    velocity_bound_if_healthy = flow_bound_sum_since_alarm[0] + V * (
         flow_bound_sum_since_alarm[1] + flow_bound_sum_since_alarm[2]
     )  # m/s, of sound sensors
     frozen_sensor = NO_SENSOR
     for i in range(3):
-        largest = max(largest, abs(velocity[i]))
+        largest_component = max(largest_component, abs(spurious_velocity[i]))
         frozen_sensor = AX + i if is_frozen(monitor, AX + i) else frozen_sensor
     for i in range(AX, N_IN_EQUATIONS):
-        explains = frozen_sensor == i or (
+        may_be_cause = frozen_sensor == i or (
             frozen_sensor < 0
-            and abs(velocity[i - AX]) + velocity_bound >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest
+            and abs(spurious_velocity[i - AX]) + velocity_bound_if_healthy
+            >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest_component
         )
-        is_suspect[i] = explains and not gyro_explains_it and not memory.is_cleared[i]
+        is_suspect[i] = may_be_cause and not gyro_explains_residual and not memory.is_cleared[i]
 
 
 @kernel
@@ -390,11 +412,11 @@ FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 
 @kernel
-def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, t):
+def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, bound_record, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
-    bank: detection filters, with the innovation of the elapsed frame, of dt s; bound: on that innovation.
-    conclusion: about the surfaces, so far.
+    filter_bank: detection filters, with the innovation of the elapsed frame, of dt s; bound_record: with the
+    bound on that innovation. conclusion: about the surfaces, so far.
     """
     redundancy, initial_errors, signal = monitor.redundancy, monitor.initial_errors, measured.signal
     memory = monitor.memory
@@ -402,13 +424,13 @@ def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, 
         begin_monitor(monitor, measured, t)
         return
     if memory.substep == 0:
-        update_gyro_error_estimate(monitor, bank.output.innovation, bound.eta_bar, dt)
+        update_gyro_error_estimate(monitor, filter_bank.output.innovation, bound_record.eta_bar, dt)
     run_redundancy_tests(redundancy, signal, monitor.config.has_engine_sensors)
     if N_TESTS > N_COMPUTED_TESTS:
         compare_duplicate_sensors(redundancy, signal, measured.fresh)
         record_agreeing_duplicates(monitor, measured.fresh)
     update_initial_error_bounds(redundancy, initial_errors, signal)
-    count_identical_samples(monitor, signal)
+    count_identical_samples_and_find_jump(monitor, signal)
     if memory.substep == 0:
         memory.previous_apparent_gyro_error[:], memory.earlier_substep_gyro_error_peak[:] = (
             memory.apparent_gyro_error,
@@ -417,16 +439,18 @@ def monitor_sensors(monitor, prediction, measured, conclusion, bank, bound, dt, 
         memory.previous_substep_gyro_error_peak[:] = memory.substep_gyro_error_peak
         memory.substep_gyro_error_peak[:] = 0.0
     for i in range(3):
-        gyro_error = -redundancy.test[TURN_TEST + i].residual / redundancy.config.sample_time_s
+        apparent_gyro_error = -redundancy.test[TURN_TEST + i].residual / redundancy.config.sample_time_s
         if memory.substep == 0:
-            memory.apparent_gyro_error[i] = gyro_error
+            memory.apparent_gyro_error[i] = apparent_gyro_error
         else:
-            memory.substep_gyro_error_peak[i] = max(memory.substep_gyro_error_peak[i], abs(gyro_error))
+            memory.substep_gyro_error_peak[i] = max(
+                memory.substep_gyro_error_peak[i], abs(apparent_gyro_error)
+            )
     if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
-        widen_bound_by_initial_gyro_error(monitor)
+        advance_start_stage_and_widen_W_bound(monitor)
     if monitor.config.attitude_is_noisy:
         exclude_gyros_if_attitude_disagrees(monitor)
-    isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t)
+    isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_record, dt, t)
     replace_isolated_readings(monitor, prediction, measured)
     mark_accelerometers_unusable(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
@@ -453,7 +477,7 @@ def begin_monitor(monitor, measured, t):
 
 
 @kernel
-def widen_bound_by_initial_gyro_error(monitor):
+def advance_start_stage_and_widen_W_bound(monitor):
     """Widen the bound on W by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error."""
     memory = monitor.memory
@@ -468,21 +492,21 @@ def widen_bound_by_initial_gyro_error(monitor):
 def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
     """Advance W (3,) rad/s and its bound by the frame of dt s with innovation and eta_bar (3,) rad/s2."""
     memory, D = monitor.memory, monitor.config.rate_damping_per_s
-    W, bound, previous_W, previous_bound = (
+    W, W_bound, previous_W, previous_W_bound = (
         memory.gyro_error_estimate,
         memory.gyro_error_estimate_bound,
         memory.previous_gyro_error_estimate,
         memory.previous_gyro_error_estimate_bound,
     )
-    previous_bound[:] = bound
+    previous_W_bound[:] = W_bound
     previous_W[:] = W
     for i in range(3):
-        damping, bound_change = 0.0, 0.0
+        damping_acceleration, bound_growth_rate = 0.0, 0.0
         for j in range(3):
-            damping += D[i, j] * previous_W[j]
-            bound_change += (-D[i, j] if i == j else abs(D[i, j])) * previous_bound[j]
-        W[i] += dt * (innovation[i] - damping)
-        bound[i] = max(previous_bound[i] + dt * (eta_bar[i] + bound_change), 0.0)
+            damping_acceleration += D[i, j] * previous_W[j]
+            bound_growth_rate += (-D[i, j] if i == j else abs(D[i, j])) * previous_W_bound[j]
+        W[i] += dt * (innovation[i] - damping_acceleration)
+        W_bound[i] = max(previous_W_bound[i] + dt * (eta_bar[i] + bound_growth_rate), 0.0)
 
 
 @kernel
@@ -514,7 +538,7 @@ def exclude_gyros_if_attitude_disagrees(monitor):
 
 
 @kernel
-def isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t):
+def isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_record, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
     output, memory = monitor.output, monitor.memory
     find_worst_test(monitor)
@@ -532,7 +556,7 @@ def isolate_broken_sensor(monitor, measured, conclusion, bank, bound, dt, t):
         store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
         if memory.substep == 0 and memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
-            judge_gyro_errors(monitor, bank, bound, dt)
+            judge_gyro_errors(monitor, filter_bank, bound_record, dt)
         record_exceeded_tests(monitor)
         update_cleared_sensors(monitor, measured.signal)
         find_suspects(monitor)
@@ -550,11 +574,11 @@ def find_worst_test(monitor):
     output = monitor.output
     if monitor.memory.substep == 0:
         output.worst_test_index, output.worst_residual_bound_ratio = 0, 0.0
-    for c in range(N_TESTS):
-        if monitor.redundancy.test[c].residual_bound_ratio > output.worst_residual_bound_ratio:
+    for test_index in range(N_TESTS):
+        if monitor.redundancy.test[test_index].residual_bound_ratio > output.worst_residual_bound_ratio:
             output.worst_test_index, output.worst_residual_bound_ratio = (
-                c,
-                monitor.redundancy.test[c].residual_bound_ratio,
+                test_index,
+                monitor.redundancy.test[test_index].residual_bound_ratio,
             )
 
 
@@ -582,7 +606,7 @@ def isolate_sensor(monitor, sensor, t):
 
 
 @kernel
-def judge_gyro_errors(monitor, bank, bound, dt):
+def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
     """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
 
         the innovation changes as by this jump of the gyro   the dynamics show an error   verdict
@@ -594,60 +618,67 @@ def judge_gyro_errors(monitor, bank, bound, dt):
     A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
     a gyro stays, and one that varies is not as small in every sample.
     """
-    memory, innovation = monitor.memory, bank.output.innovation
-    alarm_axis = bank_alarm_axis(bank)
+    memory, innovation = monitor.memory, filter_bank.output.innovation
+    alarm_axis = bank_alarm_axis(filter_bank)
     for i in range(3):
         if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
-        gyro_error, previous_gyro_error = (
+        apparent_error, previous_apparent_error = (
             memory.apparent_gyro_error[i],
             memory.previous_apparent_gyro_error[i],
         )
-        jump = (gyro_error - previous_gyro_error) / dt  # rad/s2
-        jump_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
-            abs(gyro_error), abs(previous_gyro_error)
-        ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump)
-        noise_bound = (  # of gyro_error, rad/s, by the attitude's noise
+        jump_acceleration = (apparent_error - previous_apparent_error) / dt  # rad/s2
+        jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
+            abs(apparent_error), abs(previous_apparent_error)
+        ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
+        attitude_noise_bound = (  # of apparent_error, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
         )
-        max_innovation = bound.frame_innovation_bound[i] + RATE_ROUNDING
+        max_innovation = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
         dynamics_show_error = (
             abs(innovation[i]) > max_innovation
             or alarm_axis >= 0
             or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
         )
-        transient, remaining = (
+        transient_peak, remaining_peak = (
             memory.earlier_substep_gyro_error_peak[i],
-            max(abs(previous_gyro_error), memory.previous_substep_gyro_error_peak[i], abs(gyro_error)),
+            max(
+                abs(previous_apparent_error), memory.previous_substep_gyro_error_peak[i], abs(apparent_error)
+            ),
         )
         is_transient = (
-            remaining < MAX_REMAINING_TRANSIENT_SHARE * transient
-            and transient > MIN_TRANSIENT_NOISE_RATIO * noise_bound
+            remaining_peak < MAX_REMAINING_TRANSIENT_SHARE * transient_peak
+            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * attitude_noise_bound
         )
-        innovation_fits = abs(innovation[i] - jump) <= max_innovation + jump_tolerance + noise_bound / dt
-        W_fits = (
-            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(gyro_error)
-            <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + noise_bound
+        innovation_fits = (
+            abs(innovation[i] - jump_acceleration)
+            <= max_innovation + jump_acceleration_tolerance + attitude_noise_bound / dt
         )
-        if not innovation_fits or (not dynamics_show_error and (is_transient or not W_fits)):
+        W_follows_error = (
+            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_error)
+            <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + attitude_noise_bound
+        )
+        if not innovation_fits or (not dynamics_show_error and (is_transient or not W_follows_error)):
             memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
         elif dynamics_show_error:
             memory.gyro_error_verdict[i] = GYRO_ERROR_CONFIRMED
 
 
 @kernel
-def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_of_three):
-    """Whether a test, one of the three from first_test_of_three on, exceeds its bound by more than an error
+def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_index):
+    """Whether a test, one of the three from first_test_index on, exceeds its bound by more than an error
     on one of the other two axes explains."""
-    largest = 0.0
+    largest_residual = 0.0
     for i in range(3):
-        largest = max(largest, abs(monitor.redundancy.test[first_test_of_three + i].filtered_residual[0]))
+        largest_residual = max(
+            largest_residual, abs(monitor.redundancy.test[first_test_index + i].filtered_residual[0])
+        )
     test = monitor.redundancy.test[test_index]
     return (
         test.residual_bound_ratio > 1.0
-        and abs(test.filtered_residual[0]) > MIN_SHARE_OF_LARGEST_RESIDUAL * largest
+        and abs(test.filtered_residual[0]) > MIN_SHARE_OF_LARGEST_RESIDUAL * largest_residual
     )
 
 
@@ -655,15 +686,15 @@ def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_of_three
 def record_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
     redundancy, tests_exceeded_since_alarm = monitor.redundancy, monitor.memory.tests_exceeded_since_alarm
-    for c in range(N_TESTS):
-        first_test_of_three = TURN_TEST if c < ANGLE_TEST else ANGLE_TEST
-        exceeded = (
-            exceeds_bound_beyond_cross_coupling(monitor, c, first_test_of_three)
-            if c < SPEED_TEST
-            else redundancy.test[c].residual_bound_ratio > 1.0
+    for test_index in range(N_TESTS):
+        first_test_index = TURN_TEST if test_index < ANGLE_TEST else ANGLE_TEST
+        is_exceeded = (
+            exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_index)
+            if test_index < SPEED_TEST
+            else redundancy.test[test_index].residual_bound_ratio > 1.0
         )
-        if exceeded:
-            tests_exceeded_since_alarm[c] = 1
+        if is_exceeded:
+            tests_exceeded_since_alarm[test_index] = 1
     record_refuted_hypotheses(redundancy, monitor.initial_errors, tests_exceeded_since_alarm)
 
 
@@ -682,13 +713,13 @@ def find_suspects(monitor):
         suspect_accelerometers(monitor, False)
         is_suspect[AIRSPEED] = not monitor.memory.is_cleared[AIRSPEED]
     elif alarm_test_index == DENSITY_TEST:
-        may_be_frozen = (
+        airspeed_may_be_frozen = (
             monitor.memory.n_identical_samples[AIRSPEED] > 0
         )  # its test need not show an error then
         is_suspect[AIRSPEED] = (
             tests_exceeded_since_alarm[SPEED_TEST] == 1
             or not airspeed_error_would_exceed_own_test(monitor)
-            or may_be_frozen
+            or airspeed_may_be_frozen
         )
     is_suspect[QDYN] = alarm_test_index == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
     find_suspects_of_flow_test(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
@@ -696,7 +727,7 @@ def find_suspects(monitor):
     is_suspect[ALTITUDE] = alarm_test_index == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
     is_suspect[ENGINE_SPEED] = alarm_test_index == RPM_TEST
     is_suspect[MANIFOLD] = alarm_test_index == MANIFOLD_PRESSURE_TEST
-    suspect_is_frozen = any_suspect_frozen(monitor)
+    suspect_is_frozen = any_suspect_is_frozen(monitor)
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         if not suspect_is_frozen and initial_error_explains_alarm(
             monitor.initial_errors, i, alarm_test_index
@@ -705,11 +736,11 @@ def find_suspects(monitor):
 
 
 @kernel
-def record_agreeing_duplicates(monitor, fresh):
+def record_agreeing_duplicates(monitor, is_fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
     for k in range(DUPLICATE_SENSOR_INDEX.size):
         agrees = monitor.redundancy.test[N_COMPUTED_TESTS + k].residual_bound_ratio <= 1.0
-        if fresh[DUPLICATE_SENSOR_INDEX[k] - N_IN_EQUATIONS] and agrees and not monitor.output.alarmed:
+        if is_fresh[DUPLICATE_SENSOR_INDEX[k] - N_IN_EQUATIONS] and agrees and not monitor.output.alarmed:
             monitor.memory.has_duplicate_agreed[k] = 1
 
 
@@ -723,22 +754,26 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
     redundancy, memory = monitor.redundancy, monitor.memory
-    reading, test_of_reading = (
+    reading_index, reading_test_index = (
         DUPLICATED_READING_INDEX[duplicate_index],
         DUPLICATED_READING_TEST_INDEX[duplicate_index],
     )
-    own_test, test = redundancy.test[test_of_reading], redundancy.test[N_COMPUTED_TESTS + duplicate_index]
-    min_error = abs(test.residual) - test.filtered_bound[0]  # of the reading, if it is the broken one
-    may_be_hidden = min_error <= MAX_HIDDEN_ERROR_PER_BOUND * max(
-        own_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading]
+    reading_test, duplicate_test = (
+        redundancy.test[reading_test_index],
+        redundancy.test[N_COMPUTED_TESTS + duplicate_index],
     )
-    reading_is_frozen = is_frozen(monitor, reading)
+    # of the reading, if it is the broken one
+    min_reading_error = abs(duplicate_test.residual) - duplicate_test.filtered_bound[0]
+    error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_BOUND * max(
+        reading_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading_index]
+    )
+    reading_is_frozen = is_frozen(monitor, reading_index)
     monitor.output.is_suspect[
         DUPLICATE_SENSOR_INDEX[duplicate_index]
-    ] = not memory.tests_exceeded_since_alarm[test_of_reading]
-    monitor.output.is_suspect[reading] = (
-        memory.tests_exceeded_since_alarm[test_of_reading] == 1
-        or may_be_hidden
+    ] = not memory.tests_exceeded_since_alarm[reading_test_index]
+    monitor.output.is_suspect[reading_index] = (
+        memory.tests_exceeded_since_alarm[reading_test_index] == 1
+        or error_may_be_hidden
         or reading_is_frozen
         or not memory.has_duplicate_agreed[duplicate_index]
     )
@@ -747,14 +782,14 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
 @kernel
 def is_only_exceeded_test(monitor, test_index):
     """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
-    for c in range(RPM_TEST):
-        if c != test_index and monitor.memory.tests_exceeded_since_alarm[c]:
+    for other_index in range(RPM_TEST):
+        if other_index != test_index and monitor.memory.tests_exceeded_since_alarm[other_index]:
             return False
     return True
 
 
 @kernel
-def any_suspect_frozen(monitor):
+def any_suspect_is_frozen(monitor):
     """Whether a suspect is frozen, which an error of another sensor from the start does not explain. A sound
     sensor may read zero."""
     for i in range(N_SENSORS):
@@ -768,58 +803,69 @@ def any_suspect_frozen(monitor):
 
 
 @kernel
-def find_suspects_of_flow_test(monitor, vane, flow_test, fully_acting_gyro):
+def find_suspects_of_flow_test(monitor, vane_index, flow_test_index, fully_acting_gyro_index):
     """Suspect a vane, an accelerometer, or a gyro whose error may be hidden in the tests of the attitude; all
-    of fully_acting_gyro's error turns the flow. No flow sensor moves the attitude's tests."""
-    if monitor.output.alarm_test_index != flow_test:
+    of fully_acting_gyro_index's error turns the flow. No flow sensor moves the attitude's tests."""
+    if monitor.output.alarm_test_index != flow_test_index:
         return
-    exceeded, is_suspect = monitor.memory.tests_exceeded_since_alarm, monitor.output.is_suspect
-    n_turn_tests = exceeded[TURN_TEST] + exceeded[TURN_TEST + 1] + exceeded[TURN_TEST + 2]
-    suspect_accelerometers(monitor, n_turn_tests > 0)
-    is_suspect[vane] = not (n_turn_tests > 0 or monitor.memory.is_cleared[vane])
+    is_exceeded, is_suspect = monitor.memory.tests_exceeded_since_alarm, monitor.output.is_suspect
+    n_exceeded_turn_tests = is_exceeded[TURN_TEST] + is_exceeded[TURN_TEST + 1] + is_exceeded[TURN_TEST + 2]
+    suspect_accelerometers(monitor, n_exceeded_turn_tests > 0)
+    is_suspect[vane_index] = not (n_exceeded_turn_tests > 0 or monitor.memory.is_cleared[vane_index])
     for i in range(3):
-        is_shown = n_turn_tests == 1 and exceeded[TURN_TEST + i] == 1
-        is_suspect[i] = is_shown or (
-            n_turn_tests == 0 and gyro_error_may_be_hidden(monitor, flow_test, i, i == fully_acting_gyro)
+        turn_test_shows_gyro = n_exceeded_turn_tests == 1 and is_exceeded[TURN_TEST + i] == 1
+        is_suspect[i] = turn_test_shows_gyro or (
+            n_exceeded_turn_tests == 0
+            and gyro_error_may_be_hidden(monitor, flow_test_index, i, i == fully_acting_gyro_index)
         )
 
 
 @kernel
-def gyro_error_may_be_hidden(monitor, flow_test, gyro, acts_fully_on_flow):
+def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on_flow):
     """Whether an error of a gyro explains the test of the flow, and stays within the bound of the test of its
     axis; acts_fully_on_flow: all of its error turns the flow. Of another gyro's error a share does, by
     kinematics."""
-    redundancy, reading = monitor.redundancy, monitor.redundancy.memory.previous_reading
-    alpha = reading[ALPHA]
-    roll_share = np.cos(alpha) if gyro == 0 else np.sin(alpha)
-    share = abs(np.tan(reading[BETA]) * roll_share) if flow_test == ALPHA_FLOW_TEST else abs(np.sin(alpha))
-    test, turn = redundancy.test[flow_test], redundancy.test[TURN_TEST + gyro]
-    for m in range(test.filtered_residual.size):
-        flow_bound = (
-            FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO * test.filtered_bound[m]
+    redundancy, previous_reading = monitor.redundancy, monitor.redundancy.memory.previous_reading
+    alpha = previous_reading[ALPHA]
+    stability_roll_share = np.cos(alpha) if gyro_index == 0 else np.sin(alpha)
+    acting_share = (
+        abs(np.tan(previous_reading[BETA]) * stability_roll_share)
+        if flow_test_index == ALPHA_FLOW_TEST
+        else abs(np.sin(alpha))
+    )
+    flow_test_record, turn_test = redundancy.test[flow_test_index], redundancy.test[TURN_TEST + gyro_index]
+    for m in range(flow_test_record.filtered_residual.size):
+        flow_residual_bound = (
+            FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO * flow_test_record.filtered_bound[m]
             if acts_fully_on_flow
-            else test.filtered_bound[m]
+            else flow_test_record.filtered_bound[m]
         )
-        hidden_turn = (
-            MAX_HIDDEN_ERROR_PER_BOUND * (1.0 if acts_fully_on_flow else share) * turn.filtered_bound[m]
+        max_hidden_turn = (
+            MAX_HIDDEN_ERROR_PER_BOUND
+            * (1.0 if acts_fully_on_flow else acting_share)
+            * turn_test.filtered_bound[m]
         )
-        if abs(test.filtered_residual[m]) > hidden_turn + flow_bound:
+        if abs(flow_test_record.filtered_residual[m]) > max_hidden_turn + flow_residual_bound:
             return False
-    return acts_fully_on_flow or gyro == 0 or flow_test == ALPHA_FLOW_TEST  # q does not act on the sideslip
+    # q does not act on the sideslip
+    return acts_fully_on_flow or gyro_index == 0 or flow_test_index == ALPHA_FLOW_TEST
 
 
 @kernel
 def airspeed_error_would_exceed_own_test(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
-    density, speed = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
-    max_ratio = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]  # of reading and truth
-    for m in range(density.filtered_residual.size):
-        unexplained = abs(density.filtered_residual[m]) - max_error_effect_at_alarm(
+    density_test, speed_test = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
+    max_reading_over_truth = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
+    for m in range(density_test.filtered_residual.size):
+        unexplained_residual = abs(density_test.filtered_residual[m]) - max_error_effect_at_alarm(
             monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m
         )
         # a relative change of the airspeed changes log(density) by twice as much
-        airspeed_error = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained
-        if airspeed_error > MAX_HIDDEN_ERROR_PER_BOUND * max_ratio * speed.filtered_bound[m]:
+        airspeed_error_mps = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained_residual
+        if (
+            airspeed_error_mps
+            > MAX_HIDDEN_ERROR_PER_BOUND * max_reading_over_truth * speed_test.filtered_bound[m]
+        ):
             return True
     return False
 
@@ -829,25 +875,33 @@ def suspect_gyros_and_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    exceeded, verdict = memory.tests_exceeded_since_alarm, memory.gyro_error_verdict
-    n_turn_tests, angle_is_frozen = 0, False
+    is_exceeded, gyro_error_verdict = memory.tests_exceeded_since_alarm, memory.gyro_error_verdict
+    n_exceeded_turn_tests, angle_is_frozen = 0, False
     for i in range(3):
-        n_turn_tests += exceeded[TURN_TEST + i]
+        n_exceeded_turn_tests += is_exceeded[TURN_TEST + i]
         angle_is_frozen = angle_is_frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
-        only_axis = n_turn_tests == 0 or (exceeded[TURN_TEST + i] == 1 and n_turn_tests == 1)
-        is_suspect[i] = only_axis and verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
-        explains_turning = angle_error_explains_turn_tests(monitor, i)
-        only_angle = no_other_angle_test_exceeded(monitor, i) and (
-            exceeded[ANGLE_TEST + i] == 1 or explains_turning
+        no_other_axis_exceeded = n_exceeded_turn_tests == 0 or (
+            is_exceeded[TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
         )
-        is_wrong = only_angle and verdict[axis_of_largest_turn_residual(monitor, i)] != GYRO_ERROR_CONFIRMED
-        n_identical, min_frozen = (
+        is_suspect[i] = (
+            no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
+        )
+        angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
+        may_be_only_this_angle = no_other_angle_test_exceeded(monitor, i) and (
+            is_exceeded[ANGLE_TEST + i] == 1 or angle_explains_turning
+        )
+        angle_may_be_wrong = (
+            may_be_only_this_angle
+            and gyro_error_verdict[axis_of_largest_turn_residual(monitor, i)] != GYRO_ERROR_CONFIRMED
+        )
+        n_identical_samples, min_frozen_samples = (
             memory.n_identical_samples[PHI + i],
             monitor.config.min_frozen_samples[PHI + i],
         )
-        may_be_frozen = 0 < n_identical < min_frozen < UNREACHABLE_FROZEN_SAMPLES  # too early to say
-        is_suspect[PHI + i] = is_wrong or (explains_turning and may_be_frozen)
+        # too early to say
+        may_be_frozen = 0 < n_identical_samples < min_frozen_samples < UNREACHABLE_FROZEN_SAMPLES
+        is_suspect[PHI + i] = angle_may_be_wrong or (angle_explains_turning and may_be_frozen)
 
 
 @kernel
@@ -855,12 +909,12 @@ def no_other_angle_test_exceeded(monitor, angle_index):
     """Whether no test of another angle (0, 1, 2: phi, theta, psi) shows an error that one of this angle from
     the start does not explain."""
     for j in range(3):
-        exceeded = (
+        is_exceeded = (
             monitor.memory.tests_exceeded_since_alarm[ANGLE_TEST + j]
             if angle_index == 2
             else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, ANGLE_TEST + j]
         )
-        if j != angle_index and exceeded:
+        if j != angle_index and is_exceeded:
             return False
     return True
 
@@ -870,14 +924,14 @@ def angle_error_explains_turn_tests(monitor, angle_index):
     """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
     the residual of the angle's own test allows."""
     redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[ANGLE_TEST + angle_index]
-    error_bound = redundancy.memory.reading_error_bound
-    tilt_error_bound = error_bound[PHI] + error_bound[THETA]
+    reading_error_bound = redundancy.memory.reading_error_bound
+    tilt_error_bound = reading_error_bound[PHI] + reading_error_bound[THETA]
     for j in range(3):
-        turn = redundancy.test[TURN_TEST + j]
-        turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
+        turn_test = redundancy.test[TURN_TEST + j]
+        max_turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
         for m in range(redundancy.config.filter_decay.size):
             max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
-            initial_error_effect = (
+            max_initial_error_effect = (
                 max_error_effect_at_alarm(
                     monitor.initial_errors, PHI_HYPOTHESIS + angle_index, TURN_TEST + j, m
                 )
@@ -886,8 +940,10 @@ def angle_error_explains_turn_tests(monitor, angle_index):
             )
             if (
                 monitor.memory.tests_exceeded_since_alarm[TURN_TEST + j]
-                and abs(turn.filtered_residual[m])
-                > turn_per_angle * max_angle_error + turn.filtered_bound[m] + initial_error_effect
+                and abs(turn_test.filtered_residual[m])
+                > max_turn_per_angle * max_angle_error
+                + turn_test.filtered_bound[m]
+                + max_initial_error_effect
             ):
                 return False
     return True
@@ -905,12 +961,12 @@ def axis_of_largest_turn_residual(monitor, default_axis):
 
 
 @kernel
-def allows_surface_isolation(monitor, alarm_is_old):
-    """Whether a surface may be isolated; alarm_is_old: the alarm was a frame or more ago."""
+def allows_surface_isolation(monitor, alarm_is_from_earlier_frame):
+    """Whether a surface may be isolated; alarm_is_from_earlier_frame: the alarm was a frame or more ago."""
     if not monitor.config.enabled:
         return True
     return (
-        alarm_is_old == 1
+        alarm_is_from_earlier_frame == 1
         and (monitor.memory.gyros_excluded == 1 or not monitor.config.attitude_is_noisy)
         and not flow_sensor_is_frozen(monitor)
     )
@@ -943,17 +999,22 @@ def has_alarm(monitor):
 def replace_isolated_readings(monitor, prediction, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: then none of them is used."""
-    signal, any_replaced, slipstream_changes = measured.signal, False, False
+    signal, any_replaced, slipstream_input_replaced = measured.signal, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
             monitor.output.is_replaced[i] = 1
         if monitor.output.is_replaced[i] and i < AX:
             signal[i] = estimate_reading(monitor, prediction, signal, i)
             any_replaced = True
-            slipstream_changes = slipstream_changes or i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD)
+            slipstream_input_replaced = slipstream_input_replaced or i in (
+                AIRSPEED,
+                QDYN,
+                ENGINE_SPEED,
+                MANIFOLD,
+            )
     if any_replaced:
         share_out(measured)
-    if slipstream_changes and monitor.config.has_engine_sensors:
+    if slipstream_input_replaced and monitor.config.has_engine_sensors:
         note_slipstream(measured)
 
 
@@ -969,11 +1030,11 @@ def estimate_reading(monitor, prediction, signal, sensor):
         ] + monitor.redundancy.config.sample_time_s / VANE_ESTIMATE_TIME_CONSTANT_S * (
             monitor.config.trim_reading[sensor] - memory.predicted_reading[sensor]
         )
-    density = 2.0 * memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
+    previous_density = 2.0 * memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
     if sensor == AIRSPEED:
-        return np.sqrt(max(2.0 * signal[QDYN] / density, MIN_AIRSPEED_MPS**2))
+        return np.sqrt(max(2.0 * signal[QDYN] / previous_density, MIN_AIRSPEED_MPS**2))
     if sensor == QDYN:
-        return 0.5 * density * signal[AIRSPEED] ** 2
+        return 0.5 * previous_density * signal[AIRSPEED] ** 2
     if sensor >= ENGINE_SPEED:
         return memory.commanded_engine_readings[sensor - ENGINE_SPEED]
     return memory.predicted_reading[sensor]
@@ -995,13 +1056,13 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     acceleration = prediction.f[axis]
     for s in range(u.size):
         acceleration += prediction.G[axis, s] * u[s]
-    correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
+    angle_correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
-        correction = (
+        angle_correction = (
             config.sample_time_s
             * FILTER_POLES_PER_S[FAST_POLE_INDEX]
             * test.filtered_residual[FAST_POLE_INDEX]
         )
     monitor.memory.is_rate_replaced[axis] = 1
-    previous_rate = memory.previous_reading[axis] + correction / config.sample_time_s
-    return previous_rate + config.sample_time_s * acceleration
+    corrected_previous_rate = memory.previous_reading[axis] + angle_correction / config.sample_time_s
+    return corrected_previous_rate + config.sample_time_s * acceleration

@@ -90,7 +90,7 @@ def update_isolation_estimators(fdi, prediction):
         prediction.frame_means,
     )
     is_detected = fdi.verdict.detected
-    isolation.update_fault_effects(
+    isolation.update_all_fault_effects_and_reach(
         isolation_record,
         fdi.bank,
         bound,
@@ -123,8 +123,8 @@ class IsolationVariant(NamedTuple):
 
     begin(fdi): start, at the alarm, with no knowledge of any fault.
     record_commands(fdi, prediction): record what each surface was commanded in the elapsed frame.
-    isolate(fdi, measured, t, isolation_has_run): exclude faults at t s, and decide; isolation_has_run: it
-    started a frame or more ago.
+    isolate(fdi, measured, t, isolation_started_earlier): exclude faults at t s, and decide;
+    isolation_started_earlier: it started a frame or more ago.
     """
 
     begin: Callable[..., None]
@@ -155,7 +155,7 @@ def isolate_fault(fdi, measured, t, was_detected_before):
 
 
 @kernel
-def update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_has_run):
+def update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_earlier):
     """Whether the fault of estimator fie is possible in the worst case; x (3,) rad/s: measured."""
     return isolation.update_and_test_if_fault_possible(
         fdi.isolation,
@@ -164,7 +164,7 @@ def update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_has_run):
         fdi.bound.frame_innovation_bound,
         fdi.config.abrupt,
         x,
-        isolation_has_run,
+        isolation_started_earlier,
     )
 
 
@@ -174,7 +174,7 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
     detector, config = fdi.statistical, fdi.config
     if detector.alarm.detected_at_s < 0.0:
         return False
-    vane_error_can_hide = fdi.sensor_monitor.config.enabled and detector.gust.output.accounts_for_gusts
+    gust_can_hide_vane_error = fdi.sensor_monitor.config.enabled and detector.gust.output.accounts_for_gusts
     isolation.update_likelihood_exclusion(
         fie,
         detector.test_config,
@@ -182,7 +182,7 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
         fdi.isolation,
         fdi.layout.loss_estimator,
         config.abrupt,
-        vane_error_can_hide,
+        gust_can_hide_vane_error,
     )
     return fie.excluded_by_likelihood == 1
 
@@ -201,10 +201,10 @@ def parity_excludes(fdi, fie):
 
 
 @kernel
-def exclude_by_worst_case(fdi, x, t, isolation_has_run):
+def exclude_by_worst_case(fdi, x, t, isolation_started_earlier):
     """Exclude the faults that are not possible in the worst case."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        if not update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_has_run):
+        if not update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_earlier):
             isolation.exclude_fault(fie, t)
 
 
@@ -215,53 +215,53 @@ def decide_isolated_loss(fdi, t):
 
 
 @apart
-def isolate_loss(fdi, measured, t, isolation_has_run):
+def isolate_loss(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case alone (IsolationVariant)."""
-    exclude_by_worst_case(fdi, measured.x, t, isolation_has_run)
+    exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
     decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_loss_by_either_detector(fdi, measured, t, isolation_has_run):
+def isolate_loss_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case and the statistical detector (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         if not update_and_test_if_possible_in_worst_case(
-            fdi, fie, measured.x, isolation_has_run
+            fdi, fie, measured.x, isolation_started_earlier
         ) or update_and_test_if_likelihood_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
     decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_loss_by_statistics(fdi, measured, t, isolation_has_run):
+def isolate_loss_by_statistics(fdi, measured, t, isolation_started_earlier):
     """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        update_and_test_if_possible_in_worst_case(fdi, fie, measured.x, isolation_has_run)
+        update_and_test_if_possible_in_worst_case(fdi, fie, measured.x, isolation_started_earlier)
         if update_and_test_if_likelihood_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
     decide_isolated_loss(fdi, t)
 
 
 @apart
-def isolate_fault_type(fdi, measured, t, isolation_has_run):
+def isolate_fault_type(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
-    exclude_by_worst_case(fdi, measured.x, t, isolation_has_run)
-    decide_fault_type(fdi, t, isolation_has_run)
+    exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
+    decide_fault_type(fdi, t, isolation_started_earlier)
 
 
 @apart
-def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_has_run):
+def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
     for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
         if not update_and_test_if_possible_in_worst_case(
-            fdi, fie, measured.x, isolation_has_run
+            fdi, fie, measured.x, isolation_started_earlier
         ) or parity_excludes(fdi, fie):
             isolation.exclude_fault(fie, t)
-    decide_fault_type(fdi, t, isolation_has_run)
+    decide_fault_type(fdi, t, isolation_started_earlier)
 
 
 @kernel
-def decide_fault_type(fdi, t, isolation_has_run):
+def decide_fault_type(fdi, t, isolation_started_earlier):
     """Decide which fault of every type, alone or two at a time, is there."""
     types, conclusion_record, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     estimators, bound = fdi.isolation.estimator, fdi.bound
@@ -272,7 +272,7 @@ def decide_fault_type(fdi, t, isolation_has_run):
             conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
         )
         return
-    if isolation_has_run or fdi.isolation.config.uses_reach_test:
+    if isolation_started_earlier or fdi.isolation.config.uses_reach_test:
         registry.observe_and_judge_frame(types, layout, estimators, bank.output.innovation, bound)
     conclusion.record_fault_type_finding(
         conclusion_record, verdict.decide_surface_and_type(types, conclusion_record, layout, estimators, t)
@@ -517,7 +517,9 @@ def take_plugin_verdict(fdi, prediction, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
     filters.form_fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
-    isolation.copy_plugin_estimate(fdi.isolation, fdi.verdict.isolated_estimator, fdi.plugin_verdict.theta)
+    isolation.replace_theta_by_plugin_estimate(
+        fdi.isolation, fdi.verdict.isolated_estimator, fdi.plugin_verdict.theta
+    )
     if fdi.verdict.detected:
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 

@@ -51,7 +51,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     },
     # the isolation estimators, and the decision among them
     "fies": {
-        "diagnosis.isolation.update_fault_effects": nothing,
+        "diagnosis.isolation.update_all_fault_effects_and_reach": nothing,
         "diagnosis.isolation.advance_estimators": nothing,
         "diagnosis.isolation.start_estimators": nothing,
         "diagnosis.schemes.adaptive_estimators.isolate_fault": nothing,

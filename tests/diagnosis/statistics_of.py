@@ -44,7 +44,7 @@ class Statistical:
 
     @staticmethod
     def unknown_acceleration(record, out):
-        statistical.fill_statistical_unknown_acceleration(record["block"], record["gust"], out)
+        statistical.fill_statistical_unmodelled_acceleration(record["block"], record["gust"], out)
 
     @staticmethod
     def drifts(record, fdi, design, x, y):

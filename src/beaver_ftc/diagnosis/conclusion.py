@@ -253,11 +253,11 @@ def assess_unknown_acceleration(
         and not accommodates_lag
         and uses_statistical_estimates(statistical_detector.test_config, config.alarm_authority)
     ):
-        statistical.fill_statistical_unknown_acceleration(
+        statistical.fill_statistical_unmodelled_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration
         )
     elif conclusion.detected and not accommodates_lag:
-        filters.fill_fdae_unknown_acceleration(
+        filters.fill_fdae_unmodelled_acceleration(
             fdae, bound_record.gyro_error_change_bound, unknown_acceleration
         )
     fault_is_undecided = (

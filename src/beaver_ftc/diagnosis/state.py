@@ -83,8 +83,9 @@ def configure_layout(
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
     for group_surfaces in aircraft.groups.values():
         if len(group_surfaces) == 2:
-            first, second = (surface_index[name] for name in group_surfaces)
-            layout["partner"][first], layout["partner"][second] = second, first
+            first_surface, second_surface = (surface_index[name] for name in group_surfaces)
+            layout["partner"][first_surface] = second_surface
+            layout["partner"][second_surface] = first_surface
     for estimator_index, (_, kind, surface) in enumerate(estimator_entries):
         layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = estimator_index
 

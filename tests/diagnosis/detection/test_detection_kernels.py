@@ -150,7 +150,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
     record["memory"]["threshold_gyro_error_part"], fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2
-    on(detection_filters.fill_fdae_unknown_acceleration, fdi, out)
+    on(detection_filters.fill_fdae_unmodelled_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 

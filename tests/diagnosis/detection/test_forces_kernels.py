@@ -79,7 +79,7 @@ def per_coefficient(y=Y):
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates_up_to_minimum"] = rate, 1
+    record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates_capped_at_minimum"] = rate, 1
     update_all_force_innovations(record, fdi["statistical"]["gust"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
@@ -620,7 +620,7 @@ def test_a_force_is_weighed_once_the_rate_of_sideslip_of_the_run_before_is_known
     swinging["force"][1] += 20.0
     for looks in (1, 2):
         update_all_force_innovations(statistical["forces"], statistical["gust"], swinging, U, DT)
-        assert statistical["forces"]["n_updates_up_to_minimum"] == looks
+        assert statistical["forces"]["n_updates_capped_at_minimum"] == looks
         Across.observe(fdi, np.zeros(3), np.ones((3, 4)), np.zeros((3, 4)), Y, looks, False)
         active = [
             v for v in statistical["views"] if parity.uses_force(v) and parity.max_test_score_of_view(v) > 0.0

@@ -52,13 +52,13 @@ def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
 
 
 @kernel
-def advance_gyro_error_bound(filtered_gyro_bound, gyro_error_change_bound, decay_factor):
+def advance_gyro_error_bound(filtered_gyro_error_bound, gyro_error_change_bound, decay_factor):
     """Advance the filtered bound on a gyro's changing error, rad/s, by one frame.
 
     gyro_error_change_bound: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds at
     most the filtered bound plus the present nbar to a residual.
     """
-    return decay_factor * filtered_gyro_bound + (1.0 - decay_factor) * gyro_error_change_bound
+    return decay_factor * filtered_gyro_error_bound + (1.0 - decay_factor) * gyro_error_change_bound
 
 
 @kernel
@@ -98,11 +98,11 @@ def published_threshold_interval(theta_min, theta_max, filtered_regressor, theta
     """The norm bound mu = k |Omega| + bound, rad/s, symmetric; k bounds |theta - thetahat| [Zhang2005, via
     Zhang2002].
     """
-    mu = (
+    published_threshold = (
         max(theta_estimate - theta_min, theta_max - theta_estimate) * abs(filtered_regressor)
         + uncertainty_bound
     )
-    return -mu, mu
+    return -published_threshold, published_threshold
 
 
 # The bank of detection filters; filter 0 is the published one. decay_factor: a_m; residual, threshold and its
@@ -123,16 +123,16 @@ BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, outpu
 
 def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
     """The filters' poles, 1/s, the published one first."""
-    poles_for_noise = detection_poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
-    further_poles = (*config.pole_bank_per_s, *poles_for_noise) if config.sharpen.pole_bank else ()
-    return (config.detection_pole_per_s, *further_poles)[:MAX_POLES]
+    poles_for_noise_per_s = detection_poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
+    added_poles_per_s = (*config.pole_bank_per_s, *poles_for_noise_per_s) if config.sharpen.pole_bank else ()
+    return (config.detection_pole_per_s, *added_poles_per_s)[:MAX_POLES]
 
 
 def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
-    poles = filter_poles_per_s(config, declared)
-    bank["config"]["n_filters"] = len(poles)
-    bank["config"]["decay_factor"][: len(poles)] = [exp(-pole * dt) for pole in poles]
+    poles_per_s = filter_poles_per_s(config, declared)
+    bank["config"]["n_filters"] = len(poles_per_s)
+    bank["config"]["decay_factor"][: len(poles_per_s)] = [exp(-pole_per_s * dt) for pole_per_s in poles_per_s]
 
 
 @kernel
@@ -156,11 +156,11 @@ def set_parity_directions(isolation, G):
     depends on alpha alone, and weakly.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        roll_effect, yaw_effect = G[0, fie.surface], G[2, fie.surface]
-        column_length = np.hypot(roll_effect, yaw_effect)
-        if column_length > 0.0:
-            fie.parity_direction[0] = yaw_effect / column_length
-            fie.parity_direction[2] = -roll_effect / column_length
+        roll_acceleration_per_rad, yaw_acceleration_per_rad = G[0, fie.surface], G[2, fie.surface]
+        roll_yaw_column_norm = np.hypot(roll_acceleration_per_rad, yaw_acceleration_per_rad)
+        if roll_yaw_column_norm > 0.0:
+            fie.parity_direction[0] = yaw_acceleration_per_rad / roll_yaw_column_norm
+            fie.parity_direction[2] = -roll_acceleration_per_rad / roll_yaw_column_norm
 
 
 @kernel
@@ -248,41 +248,50 @@ def fault_acceleration_range(fie, i):
     """Least and greatest acceleration (rad/s2) of axis i: theta anywhere in its set, or no fault at all."""
     acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
     acceleration_per_theta = fie.frame_mean_effect.regressor[i]
-    spread = fie.frame_mean_effect.error_bound[i]
-    at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
-    at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
-    return min(0.0, at_theta_min, at_theta_max) - spread, max(0.0, at_theta_min, at_theta_max) + spread
+    error_bound = fie.frame_mean_effect.error_bound[i]
+    acceleration_at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
+    acceleration_at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
+    acceleration_low = min(0.0, acceleration_at_theta_min, acceleration_at_theta_max) - error_bound
+    acceleration_high = max(0.0, acceleration_at_theta_min, acceleration_at_theta_max) + error_bound
+    return acceleration_low, acceleration_high
 
 
 @kernel
 def fault_acceleration_range_along_parity(fie):
     """Least and greatest acceleration, rad/s2, along `fie.parity_direction` (3,); else as
     `fault_acceleration_range`."""
-    effect, acceleration_at_zero_theta, acceleration_per_theta, spread = fie.frame_mean_effect, 0.0, 0.0, 0.0
+    frame_mean_effect = fie.frame_mean_effect
+    acceleration_at_zero_theta = 0.0
+    acceleration_per_theta = 0.0
+    error_bound = 0.0
     for i in range(3):
-        spread += abs(fie.parity_direction[i]) * effect.error_bound[i]
-        acceleration_at_zero_theta += fie.parity_direction[i] * effect.acceleration_at_zero_theta[i]
-        acceleration_per_theta += fie.parity_direction[i] * effect.regressor[i]
-    at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
-    at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
-    return min(0.0, at_theta_min, at_theta_max) - spread, max(0.0, at_theta_min, at_theta_max) + spread
+        error_bound += abs(fie.parity_direction[i]) * frame_mean_effect.error_bound[i]
+        acceleration_at_zero_theta += (
+            fie.parity_direction[i] * frame_mean_effect.acceleration_at_zero_theta[i]
+        )
+        acceleration_per_theta += fie.parity_direction[i] * frame_mean_effect.regressor[i]
+    acceleration_at_theta_min = acceleration_at_zero_theta + fie.theta_min * acceleration_per_theta
+    acceleration_at_theta_max = acceleration_at_zero_theta + fie.theta_max * acceleration_per_theta
+    acceleration_low = min(0.0, acceleration_at_theta_min, acceleration_at_theta_max) - error_bound
+    acceleration_high = max(0.0, acceleration_at_theta_min, acceleration_at_theta_max) + error_bound
+    return acceleration_low, acceleration_high
 
 
 @kernel
 def advance_reachable_residuals(bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; channel 3: `parity_direction`."""
-    for channel in range(4):
-        low, high = (
-            fault_acceleration_range(fie, channel)
-            if channel < 3
+    """Advance the reach of the fault in each filter since the flight began; index 3: `parity_direction`."""
+    for axis_or_parity in range(4):
+        acceleration_low, acceleration_high = (
+            fault_acceleration_range(fie, axis_or_parity)
+            if axis_or_parity < 3
             else fault_acceleration_range_along_parity(fie)
         )
         for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
-            fie.reachable_bank_residual_low[m, channel] = (
-                decay_factor * fie.reachable_bank_residual_low[m, channel] + dt * low
+            fie.reachable_bank_residual_low[m, axis_or_parity] = (
+                decay_factor * fie.reachable_bank_residual_low[m, axis_or_parity] + dt * acceleration_low
             )
-            fie.reachable_bank_residual_high[m, channel] = (
-                decay_factor * fie.reachable_bank_residual_high[m, channel] + dt * high
+            fie.reachable_bank_residual_high[m, axis_or_parity] = (
+                decay_factor * fie.reachable_bank_residual_high[m, axis_or_parity] + dt * acceleration_high
             )
 
 
@@ -341,18 +350,20 @@ FDAE_RECORD = record(
 
 _RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS = np.exp(-1.0)
 _N_ALPHA_CENTRES, _N_BETA_CENTRES = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
-_FIRST_ALPHA_CENTRE, _ALPHA_CENTRE_SPACING = ALPHA_CENTRES_RAD[0], ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
-_FIRST_BETA_CENTRE, _BETA_CENTRE_SPACING = BETA_CENTRES_RAD[0], BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
+_FIRST_ALPHA_CENTRE_RAD = ALPHA_CENTRES_RAD[0]
+_ALPHA_CENTRE_SPACING_RAD = ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
+_FIRST_BETA_CENTRE_RAD = BETA_CENTRES_RAD[0]
+_BETA_CENTRE_SPACING_RAD = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
 
 
 def configure_fdae(fdae: np.void, scenario: Scenario) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    config, network = scenario.control, fdae["network"]
+    control_config, network = scenario.control, fdae["network"]
     fdae["config"]["pole_per_s"] = scenario.fdi.detection_pole_per_s
     fdae["config"]["decay_factor"] = exp(-scenario.fdi.detection_pole_per_s * (1.0 / scenario.rate_hz))
-    network["config"]["learning_gain"] = config.network_gain_per_s2
-    network["config"]["leak_per_s"] = config.network_leak_per_s
-    network["config"]["weight_limit"] = config.network_weight_limit_rad_s2
+    network["config"]["learning_gain"] = control_config.network_gain_per_s2
+    network["config"]["leak_per_s"] = control_config.network_leak_per_s
+    network["config"]["weight_limit"] = control_config.network_weight_limit_rad_s2
 
 
 @kernel
@@ -363,13 +374,13 @@ def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out)
     The ratio of a value and the one before is exp(grid_position - j - 1/2). The ratio of two successive
     ratios is 1 / e. So two exponentials are enough for all values.
     """
-    value, ratio = np.exp(-0.5 * grid_position * grid_position), np.exp(grid_position - 0.5)
+    gaussian, next_gaussian_ratio = np.exp(-0.5 * grid_position * grid_position), np.exp(grid_position - 0.5)
     sum_of_squares = 0.0
     for j in range(n_gaussians):
-        out[first_index + j] = value
-        sum_of_squares += value * value
-        value *= ratio
-        ratio *= _RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS
+        out[first_index + j] = gaussian
+        sum_of_squares += gaussian * gaussian
+        gaussian *= next_gaussian_ratio
+        next_gaussian_ratio *= _RATIO_OF_SUCCESSIVE_GAUSSIAN_RATIOS
     return sum_of_squares
 
 
@@ -380,17 +391,17 @@ def fill_basis_functions(alpha, beta, out):
     Each width equals the spacing of its centres; outside the grid the nearest edge answers.
     """
     alpha_grid_position = min(
-        max((alpha - _FIRST_ALPHA_CENTRE) / _ALPHA_CENTRE_SPACING, 0.0), _N_ALPHA_CENTRES - 1.0
+        max((alpha - _FIRST_ALPHA_CENTRE_RAD) / _ALPHA_CENTRE_SPACING_RAD, 0.0), _N_ALPHA_CENTRES - 1.0
     )
     beta_grid_position = min(
-        max((beta - _FIRST_BETA_CENTRE) / _BETA_CENTRE_SPACING, 0.0), _N_BETA_CENTRES - 1.0
+        max((beta - _FIRST_BETA_CENTRE_RAD) / _BETA_CENTRE_SPACING_RAD, 0.0), _N_BETA_CENTRES - 1.0
     )
-    norm = np.sqrt(
+    basis_norm = np.sqrt(
         fill_gaussians_and_sum_squares(alpha_grid_position, _N_ALPHA_CENTRES, 0, out)
         + fill_gaussians_and_sum_squares(beta_grid_position, _N_BETA_CENTRES, _N_ALPHA_CENTRES, out)
     )
     for j in range(N_BASIS_FUNCTIONS):
-        out[j] /= norm
+        out[j] /= basis_norm
 
 
 @kernel
@@ -408,10 +419,10 @@ def evaluate_network(network, alpha, beta):
     """Fill network.output (3,) rad/s2 for the present alpha and beta."""
     fill_basis_functions(alpha, beta, network.memory.basis_values)
     for i in range(3):
-        total = 0.0
+        fhat_i = 0.0
         for j in range(N_BASIS_FUNCTIONS):
-            total += network.memory.weights[i, j] * network.memory.basis_values[j]
-        network.output[i] = total
+            fhat_i += network.memory.weights[i, j] * network.memory.basis_values[j]
+        network.output[i] = fhat_i
 
 
 @kernel
@@ -487,8 +498,9 @@ def advance_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_w
     if is_fault_detected:
         train_network(fdae.network, fdae.output.residual, fdae.output.threshold, do_weights_leak, dt)
     for i in range(3):
-        rate, decay_factor = predicted_acceleration[i] + fdae.network.output[i], fdae.config.decay_factor[i]
-        fdae.memory.xhat[i] = x[i] + dt * rate + decay_factor * (fdae.memory.xhat[i] - x[i])
+        estimated_acceleration = predicted_acceleration[i] + fdae.network.output[i]
+        decay_factor = fdae.config.decay_factor[i]
+        fdae.memory.xhat[i] = x[i] + dt * estimated_acceleration + decay_factor * (fdae.memory.xhat[i] - x[i])
         fdae.memory.threshold_uncertainty_part[i] = advance_residual_bound(
             fdae.memory.threshold_uncertainty_part[i], bound.eta_bar[i], decay_factor, dt
         )
@@ -503,7 +515,7 @@ def advance_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_w
 
 
 @kernel
-def fill_fdae_unknown_acceleration(fdae, gyro_error_change_bound, out):
+def fill_fdae_unmodelled_acceleration(fdae, gyro_error_change_bound, out):
     """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
@@ -511,7 +523,7 @@ def fill_fdae_unknown_acceleration(fdae, gyro_error_change_bound, out):
     explains stays out of it, and off the surfaces.
     """
     for i in range(3):
-        noise_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_error_change_bound[i]
+        gyro_error_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_error_change_bound[i]
         out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * apply_dead_zone(
-            fdae.output.residual[i], noise_bound
+            fdae.output.residual[i], gyro_error_bound
         )

@@ -36,7 +36,7 @@ MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run 
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
 MAX_FORCE_FLOW_LAG_S = 0.002
 FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
-SIDESLIP_RATE_TOLERANCE_BY_AIR_MOVES = {
+SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES = {
     False: 0.05,
     True: 0.2,
 }  # of the term in the rate of sideslip: gusts have a part in it
@@ -73,7 +73,7 @@ MEASURED_FORCES_RECORD = record(
     dynamic_pressure_over_trim=float,  # forces scale with it
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     sideslip_rate_coefficient=float, flow_angle_rate=2,
-    n_updates_up_to_minimum=int,  # updates so far, up to MIN_FORCE_UPDATES
+    n_updates_capped_at_minimum=int,  # updates so far, up to MIN_FORCE_UPDATES
     gust_acceleration_noise_std=3,  # noise of the gust estimate from forces, rad/s2
     y_without_vanes=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
@@ -85,19 +85,19 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
-    if forces.n_updates_up_to_minimum == 0:
+    if forces.n_updates_capped_at_minimum == 0:
         fill_flow_angle_rates(forces, measured)
     evaluate(gust.memory.force_table, measured.x, measured.y)
     forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
-    for f in range(2):
-        scaled_force_before = forces.component[f].predicted_scaled_force
-        update_force_innovation(forces, gust, f, measured, u)
+    for force_index in range(2):
+        scaled_force_before = forces.component[force_index].predicted_scaled_force
+        update_force_innovation(forces, gust, force_index, measured, u)
         fill_force_flow_lag_error_bound(
-            forces.component[f], scaled_force_before, forces.n_updates_up_to_minimum, dt
+            forces.component[force_index], scaled_force_before, forces.n_updates_capped_at_minimum, dt
         )
-        integrate_inertial_flow_angle(forces, forces.component[f], f, measured.y, dt)
+        integrate_inertial_flow_angle(forces, forces.component[force_index], force_index, measured.y, dt)
     fill_flow_angle_rates(forces, measured)
-    forces.n_updates_up_to_minimum = min(forces.n_updates_up_to_minimum + 1, MIN_FORCE_UPDATES)
+    forces.n_updates_capped_at_minimum = min(forces.n_updates_capped_at_minimum + 1, MIN_FORCE_UPDATES)
 
 
 @kernel
@@ -118,12 +118,14 @@ def fill_readings_without_vanes(forces, air_rotation, y):
     air_rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
     """
     forces.y_without_vanes[:] = y
-    for f in range(2):
-        force, vane_index, rotation_effect = forces.component[f], BETA if f == SIDE_COMPONENT else ALPHA, 0.0
+    for force_index in range(2):
+        force = forces.component[force_index]
+        vane_index = BETA if force_index == SIDE_COMPONENT else ALPHA
+        air_rotation_effect = 0.0
         for k in range(3):
-            rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
+            air_rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
-            force.innovation / forces.dynamic_pressure_over_trim + rotation_effect
+            force.innovation / forces.dynamic_pressure_over_trim + air_rotation_effect
         ) / force.axis_and_force_innovation_per_vane_error[1]
 
 
@@ -136,64 +138,69 @@ def stop_using_forces(forces, gust, inertial_gust):
 
 
 @kernel
-def integrate_inertial_flow_angle(forces, force, f, y, dt):
+def integrate_inertial_flow_angle(forces, force, force_index, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    vane_angle = y[BETA if f == SIDE_COMPONENT else ALPHA]
-    innovation_per_rad = force.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
+    vane_angle = y[BETA if force_index == SIDE_COMPONENT else ALPHA]
+    innovation_per_vane_rad = (
+        force.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
+    )
     force.inertial_flow_angle = (
-        force.inertial_flow_angle + dt * forces.flow_angle_rate[f]
-        if forces.n_updates_up_to_minimum
+        force.inertial_flow_angle + dt * forces.flow_angle_rate[force_index]
+        if forces.n_updates_capped_at_minimum
         else vane_angle
     )
-    force.innovation_per_flow_angle_drift += dt * innovation_per_rad
-    force.innovation_at_inertial_flow_angle = force.innovation - innovation_per_rad * (
+    force.innovation_per_flow_angle_drift += dt * innovation_per_vane_rad
+    force.innovation_at_inertial_flow_angle = force.innovation - innovation_per_vane_rad * (
         vane_angle - force.inertial_flow_angle
     )
 
 
 @kernel
-def update_force_innovation(forces, gust, f, measured, u):
+def update_force_innovation(forces, gust, force_index, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
-    table, force = gust.memory.force_table, forces.component[f]
-    first_term = table.free_from[SIDE_FORCE_TABLE_INDEX + f]
-    end_term = table.surface_to[SIDE_FORCE_TABLE_INDEX + f]
-    acceleration_per_coefficient = (
+    force_table, force = gust.memory.force_table, forces.component[force_index]
+    first_term_index = force_table.free_from[SIDE_FORCE_TABLE_INDEX + force_index]
+    end_term_index = force_table.surface_to[SIDE_FORCE_TABLE_INDEX + force_index]
+    scaled_force_per_coefficient = (
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
     scaled_force = 0.0
     force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
     force.scaled_force_per_surface_rad[:], force.scaled_force_per_surface_rad_error_bound[:] = 0.0, 0.0
-    for k in range(first_term, end_term):
-        s, unit_effect = table.surface[k], acceleration_per_coefficient * table.power[table.monomial[k]]
+    for k in range(first_term_index, end_term_index):
+        s = force_table.surface[k]
+        scaled_force_per_term_value = (
+            scaled_force_per_coefficient * force_table.power[force_table.monomial[k]]
+        )
         if s >= 0:
-            force.scaled_force_per_surface_rad[s] += table.value[k] * unit_effect
+            force.scaled_force_per_surface_rad[s] += force_table.value[k] * scaled_force_per_term_value
             force.scaled_force_per_surface_rad_error_bound[s] += force.regressor_tolerance[
-                k - first_term
-            ] * abs(unit_effect)
-            unit_effect *= u[s]
-        force.regressor[k - first_term] = unit_effect
-        scaled_force += table.value[k] * unit_effect
-    if f == SIDE_COMPONENT:
-        sideslip_rate_effect = (
-            acceleration_per_coefficient
+                k - first_term_index
+            ] * abs(scaled_force_per_term_value)
+            scaled_force_per_term_value *= u[s]
+        force.regressor[k - first_term_index] = scaled_force_per_term_value
+        scaled_force += force_table.value[k] * scaled_force_per_term_value
+    if force_index == SIDE_COMPONENT:
+        sideslip_rate_scaled_force = (
+            scaled_force_per_coefficient
             * forces.sideslip_rate_coefficient
             * forces.flow_angle_rate[SIDE_COMPONENT]
             * forces.wing_span
             / (2.0 * measured.y[AIRSPEED])
         )
-        force.regressor[end_term - first_term] = sideslip_rate_effect
-        scaled_force += sideslip_rate_effect
+        force.regressor[end_term_index - first_term_index] = sideslip_rate_scaled_force
+        scaled_force += sideslip_rate_scaled_force
     force.regressor[force.n_regressors - 1], force.predicted_scaled_force = scaled_force, scaled_force
-    if forces.n_updates_up_to_minimum == 0:
+    if forces.n_updates_capped_at_minimum == 0:
         force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
     for s in range(u.size):
         force.scaled_force_of_surface_at_command[s] = force.previous_scaled_force_per_surface_rad[s] * u[s]
-    force.innovation = measured.force[1 + f] * forces.inverse_chord_per_m - scaled_force
-    pressure_noise_effect = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
+    force.innovation = measured.force[1 + force_index] * forces.inverse_chord_per_m - scaled_force
+    pressure_noise_scaled_force_std = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     for k in range(2):
         force.noise_variance[k] = (
             force.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
-            + pressure_noise_effect * pressure_noise_effect
+            + pressure_noise_scaled_force_std * pressure_noise_scaled_force_std
             + force.accelerometer_innovation_variance
         )
 
@@ -204,31 +211,37 @@ def fill_flow_angle_rates(forces, measured):
 
     They follow from accelerometers, rates, attitude and flow.
     """
-    gravity, x, a = forces.gravity, measured.x, measured.force
+    gravity, x, specific_force = forces.gravity, measured.x, measured.force
     phi, theta = measured.attitude[0], measured.attitude[1]
     alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
-    flow_forward, flow_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
-    flow_down = np.sin(alpha) * np.cos(beta)
-    forward_acceleration = a[0] - gravity * np.sin(theta)
-    right_acceleration = a[1] + gravity * np.cos(theta) * np.sin(phi)
-    down_acceleration = a[2] + gravity * np.cos(theta) * np.cos(phi)
+    unit_flow_forward, unit_flow_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
+    unit_flow_down = np.sin(alpha) * np.cos(beta)
+    forward_acceleration = specific_force[0] - gravity * np.sin(theta)
+    right_acceleration = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
+    down_acceleration = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
     airspeed_rate = (
-        flow_forward * forward_acceleration + flow_right * right_acceleration + flow_down * down_acceleration
+        unit_flow_forward * forward_acceleration
+        + unit_flow_right * right_acceleration
+        + unit_flow_down * down_acceleration
     )
-    right_velocity_rate = right_acceleration + V * (x[0] * flow_down - x[2] * flow_forward)
-    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * flow_right) / (
+    right_velocity_rate = right_acceleration + V * (x[0] * unit_flow_down - x[2] * unit_flow_forward)
+    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * unit_flow_right) / (
         V * np.cos(beta)
     )
-    forward_velocity_rate = forward_acceleration + V * (x[2] * flow_right - x[1] * flow_down)
-    down_velocity_rate = down_acceleration + V * (x[1] * flow_forward - x[0] * flow_right)
+    forward_velocity_rate = forward_acceleration + V * (x[2] * unit_flow_right - x[1] * unit_flow_down)
+    down_velocity_rate = down_acceleration + V * (x[1] * unit_flow_forward - x[0] * unit_flow_right)
     forces.flow_angle_rate[NORMAL_COMPONENT] = (
         down_velocity_rate * np.cos(alpha) - forward_velocity_rate * np.sin(alpha)
     ) / (V * np.cos(beta))
 
 
-def force_terms(aircraft: Aircraft, f: int) -> list[Term]:
+def force_terms(aircraft: Aircraft, force_index: int) -> list[Term]:
     """The terms of one direction, as `update_force_innovation` goes through them."""
-    return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_COEFFICIENT_NAMES[f]]
+    return [
+        term
+        for term in aircraft.measurable_forces
+        if term.coefficient == FORCE_COEFFICIENT_NAMES[force_index]
+    ]
 
 
 def configure_forces(
@@ -238,40 +251,47 @@ def configure_forces(
 
     acceleration_slopes_by_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
-    y, statistical, aircraft, sensors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
+    y, statistical, aircraft, sensor_errors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
     forces, gust, geometry = statistical["forces"], statistical["gust"], aircraft.geometry
     forces["inverse_chord_per_m"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
-    forces["trim_dynamic_pressure"], forces["dynamic_pressure_noise_std"] = y[QDYN], sensors["qdyn"].random
+    forces["trim_dynamic_pressure"] = y[QDYN]
+    forces["dynamic_pressure_noise_std"] = sensor_errors["qdyn"].random
     sideslip_rate_coefficients = [
         t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)
     ]
     forces["wing_span"] = geometry.span_m
     forces["sideslip_rate_coefficient"] = sum(sideslip_rate_coefficients)
-    acceleration_per_coefficient = (
+    scaled_force_per_coefficient = (
         y[QDYN] * gust["config"]["wing_area_per_mass"] * forces["inverse_chord_per_m"]
     )
-    reading_noise_std = sensors.each("random", ("alpha", "beta", "V", *AXES))
-    slipstream_per_airspeed, other_slipstream_variance = _slipstream_slope_and_noise_variance(
-        y, fdi["bound"]["declared_errors"], sensors
+    reading_noise_std = sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
+    slipstream_per_airspeed, slipstream_variance_by_other_readings = _slipstream_slope_and_noise_variance(
+        y, fdi["bound"]["declared_errors"], sensor_errors
     )
-    for f, (vane, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
-        force, terms = forces["component"][f], force_terms(aircraft, f)
-        slopes_with_slipstream = acceleration_per_coefficient * _force_coefficient_slopes(
-            aircraft, FORCE_COEFFICIENT_NAMES[f], trim
+    for force_index, (vane_index, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
+        force, terms = forces["component"][force_index], force_terms(aircraft, force_index)
+        force_slopes_with_slipstream = scaled_force_per_coefficient * _force_coefficient_slopes(
+            aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim
         )
-        slopes, slipstream_slope = slopes_with_slipstream[:-1], slopes_with_slipstream[-1]
+        force_slopes = force_slopes_with_slipstream[:-1]
+        force_per_slipstream = force_slopes_with_slipstream[-1]
         force["axis_and_force_innovation_per_vane_error"] = (
-            -acceleration_slopes_by_y[axis, vane],
-            -slopes[vane],
+            -acceleration_slopes_by_y[axis, vane_index],
+            -force_slopes[vane_index],
         )
-        force["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane]
-        force["innovation_per_air_rotation"] = slopes[3:]
-        total_slopes = slopes.copy()
-        total_slopes[AIRSPEED] += slipstream_slope * slipstream_per_airspeed
-        variance_parts = (total_slopes * reading_noise_std) ** 2
-        variance = variance_parts.sum() + slipstream_slope**2 * other_slipstream_variance
-        force["trim_noise_variance_with_without_vane"] = variance, variance - variance_parts[vane]
-        accelerometer_noise_std = sensors[ACCELEROMETERS[1 + f]].random
+        force["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
+        force["innovation_per_air_rotation"] = force_slopes[3:]
+        force_slopes_through_slipstream = force_slopes.copy()
+        force_slopes_through_slipstream[AIRSPEED] += force_per_slipstream * slipstream_per_airspeed
+        variance_by_reading = (force_slopes_through_slipstream * reading_noise_std) ** 2
+        innovation_noise_variance = (
+            variance_by_reading.sum() + force_per_slipstream**2 * slipstream_variance_by_other_readings
+        )
+        force["trim_noise_variance_with_without_vane"] = (
+            innovation_noise_variance,
+            innovation_noise_variance - variance_by_reading[vane_index],
+        )
+        accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
         force["accelerometer_innovation_variance"] = (
             forces["inverse_chord_per_m"] * accelerometer_noise_std
         ) ** 2
@@ -280,22 +300,24 @@ def configure_forces(
             declared,
             terms,
             y,
-            slopes[vane] / acceleration_per_coefficient,
-            f,
+            force_slopes[vane_index] / scaled_force_per_coefficient,
+            force_index,
             forces["inverse_chord_per_m"],
         )
-        acceleration_per_rad = acceleration_per_coefficient * sum(
+        surfaces_scaled_force_per_rad = scaled_force_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
-        force["deflection_error_effect_bound"] = acceleration_per_rad * declared.actuators.deflection_rad
-        force["flow_angle_drift_bound"] = _flow_angle_drift_bound(
-            sensors, gust["config"]["gravity"], y[AIRSPEED], f
+        force["deflection_error_effect_bound"] = (
+            surfaces_scaled_force_per_rad * declared.actuators.deflection_rad
         )
-        drift_intensity = (
+        force["flow_angle_drift_bound"] = _flow_angle_drift_bound(
+            sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
+        )
+        flow_angle_drift_intensity = (
             FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force["inertial_innovation_drift_intensity"] = slopes[vane] ** 2 * (
-            drift_intensity + declared.air.angle_walk(y[AIRSPEED])
+        force["inertial_innovation_drift_intensity"] = force_slopes[vane_index] ** 2 * (
+            flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 
 
@@ -305,34 +327,39 @@ def _slipstream_slope_and_noise_variance(
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
     if not declared_errors["has_engine_errors"]:
         return 0.0, 0.0
-    slope_by_airspeed, slope_by_pressure, slope_per_kw = slipstream_slopes(
+    slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
         y, declared_errors["density_power_error_kw"]
     )
     power_noise_kw = declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
-    return slope_by_airspeed, float(
-        (slope_by_pressure * sensor_errors["qdyn"].random) ** 2 + (slope_per_kw * power_noise_kw) ** 2
+    return slipstream_per_airspeed, float(
+        (slipstream_per_pressure * sensor_errors["qdyn"].random) ** 2
+        + (slipstream_per_kw * power_noise_kw) ** 2
     )
 
 
-def _flow_angle_drift_bound(errors: SensorErrors, gravity: float, airspeed_mps: float, f: int) -> float:
+def _flow_angle_drift_bound(
+    sensor_errors: SensorErrors, gravity: float, airspeed_mps: float, force_index: int
+) -> float:
     """Bound the drift of the flow angle from inertial motion, rad/s. Gravity acts along the path's slope only
     on the incidence, and in full on sideslip."""
-    attitude_error = errors["phi"].steady + errors["theta"].steady
-    gyro_error = sum(errors[gyro].steady + TYPICAL_BODY_RATE_RAD_S * errors[gyro].slope for gyro in AXES)
+    attitude_error_bound = sensor_errors["phi"].steady + sensor_errors["theta"].steady
+    gyro_error_bound = sum(
+        sensor_errors[gyro].steady + TYPICAL_BODY_RATE_RAD_S * sensor_errors[gyro].slope for gyro in AXES
+    )
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
-    accelerometer = errors[ACCELEROMETERS[1 + f]]
-    accelerometer_error = (
-        accelerometer.steady
-        + TYPICAL_PATH_SLOPE_RAD * errors["ax"].steady
-        + gravity * (accelerometer.slope if f == NORMAL_COMPONENT else 0.0)
+    accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
+    accelerometer_error_bound = (
+        accelerometer_errors.steady
+        + TYPICAL_PATH_SLOPE_RAD * sensor_errors["ax"].steady
+        + gravity * (accelerometer_errors.slope if force_index == NORMAL_COMPONENT else 0.0)
     )
-    acceleration_error = (
-        gravity * attitude_error * (TYPICAL_PATH_SLOPE_RAD if f == NORMAL_COMPONENT else 1.0)
+    acceleration_error_bound = (
+        gravity * attitude_error_bound * (TYPICAL_PATH_SLOPE_RAD if force_index == NORMAL_COMPONENT else 1.0)
         + EARTH_ACCELERATION_BOUND_M_S2
-        + accelerometer_error
+        + accelerometer_error_bound
     )
-    return float(EARTH_RATE_RAD_S + gyro_error + acceleration_error / airspeed_mps)
+    return float(EARTH_RATE_RAD_S + gyro_error_bound + acceleration_error_bound / airspeed_mps)
 
 
 def _configure_force_tolerances(
@@ -340,60 +367,64 @@ def _configure_force_tolerances(
     declared: Declared,
     terms: list[Term],
     y: np.ndarray,
-    vane_slope: float,
-    f: int,
+    coefficient_per_vane_rad: float,
+    force_index: int,
     inverse_chord_per_m: float,
 ) -> None:
     """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
     pressure do; of the accelerometer's bias, m/s2; of the whole."""
-    coefficient_tolerance, errors = declared.coefficients.largest, declared.sensors
-    vane, accelerometer = errors["alpha" if f == NORMAL_COMPONENT else "beta"], errors[ACCELEROMETERS[1 + f]]
-    pressure_error_share = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
+    coefficient_tolerance, sensor_errors = declared.coefficients.largest, declared.sensors
+    vane_errors = sensor_errors["alpha" if force_index == NORMAL_COMPONENT else "beta"]
+    accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
+    relative_pressure_error_bound = sensor_errors["qdyn"].steady / y[QDYN] + sensor_errors["qdyn"].slope
     for k, term in enumerate(terms):
-        force["regressor_tolerance"][k] = (coefficient_tolerance + pressure_error_share + vane.slope) * abs(
-            term.value
-        )
+        force["regressor_tolerance"][k] = (
+            coefficient_tolerance + relative_pressure_error_bound + vane_errors.slope
+        ) * abs(term.value)
         if term.is_constant:
-            force["regressor_tolerance"][k] += vane.steady * abs(vane_slope)
+            force["regressor_tolerance"][k] += vane_errors.steady * abs(coefficient_per_vane_rad)
     n_regressors = len(terms)
-    if f == SIDE_COMPONENT:
+    if force_index == SIDE_COMPONENT:
         force["regressor_tolerance"][n_regressors] = (
-            coefficient_tolerance + SIDESLIP_RATE_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
+            coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
         )
         n_regressors = n_regressors + 1
-    if accelerometer.steady:
-        force["regressor_tolerance"][n_regressors] = accelerometer.steady
+    if accelerometer_errors.steady:
+        force["regressor_tolerance"][n_regressors] = accelerometer_errors.steady
         force["regressor"][n_regressors] = inverse_chord_per_m
         n_regressors = n_regressors + 1
-    force["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer.slope
+    force["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer_errors.slope
     force["n_regressors"] = n_regressors + 1
 
 
-def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
+def _force_coefficient(aircraft: Aircraft, coefficient_name: str, flight_state: TrimState) -> float:
     """A force coefficient at x (3,) rad/s, y, u rad."""
-    x, y, u = state
+    x, y, u = flight_state
     geometry, V = aircraft.geometry, y[AIRSPEED]
     normalised_rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
-    factor_values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
+    value_by_factor = dict(zip(aircraft.surfaces, u, strict=True)) | dict(
         zip(aircraft.signals, y[4:], strict=True)
     )
-    factor_values |= dict(
+    value_by_factor |= dict(
         zip(
             ("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE),
             (y[0], y[1], *normalised_rates, 0.0),
             strict=True,
         )
     )
-    return float(aircraft.coefficient(name, factor_values))
+    return float(aircraft.coefficient(coefficient_name, value_by_factor))
 
 
-def _force_coefficient_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
+def _force_coefficient_slopes(aircraft: Aircraft, coefficient_name: str, trim: TrimState) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
-    (x, y, u), step = trim, 1e-5
-    changed_states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
-    changed_states += [(x + step * e, y, u) for e in np.eye(3)]
-    changed_states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    trim_coefficient = _force_coefficient(aircraft, name, trim)
+    (x, y, u), difference_step = trim, 1e-5
+    changed_states = [(x, y + difference_step * e, u) for e in np.eye(3, y.size)]
+    changed_states += [(x + difference_step * e, y, u) for e in np.eye(3)]
+    changed_states += [(x, y + difference_step * (np.arange(y.size) == DPT), u)]
+    trim_coefficient = _force_coefficient(aircraft, coefficient_name, trim)
     return np.array(
-        [(_force_coefficient(aircraft, name, state) - trim_coefficient) / step for state in changed_states]
+        [
+            (_force_coefficient(aircraft, coefficient_name, state) - trim_coefficient) / difference_step
+            for state in changed_states
+        ]
     )

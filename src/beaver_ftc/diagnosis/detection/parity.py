@@ -599,7 +599,7 @@ def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
     """
     for view in views:
         view.is_used = not uses_force(view) or (
-            forces.in_use and forces.n_updates_up_to_minimum == MIN_FORCE_UPDATES
+            forces.in_use and forces.n_updates_capped_at_minimum == MIN_FORCE_UPDATES
         )
         if view.is_used:
             view.column_leak = (

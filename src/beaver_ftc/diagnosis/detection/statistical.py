@@ -617,7 +617,7 @@ def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_fa
 
 
 @kernel
-def fill_statistical_unknown_acceleration(blocks, gust, out):
+def fill_statistical_unmodelled_acceleration(blocks, gust, out):
     """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
 
     It is the estimated drift plus the effect of the gust estimated from the vanes.

@@ -47,7 +47,7 @@ def block_of(drift, noise, jitter=0.0, prior=1.0, keep=1.0):
     """A block as a record, with as many axes as `drift` (n, n) has. Standard deviations noise and jitter."""
     n = len(drift)
     block = np.zeros(1, block_dtype(BlockCapacity(105, USUAL_MAX_HYPOTHESES_PER_BLOCK))).view(np.recarray)[0]
-    block["n_axes"], block["axis"][:n], block["drift_decay_factor"] = n, range(n), keep
+    block["n_axes"], block["axes"][:n], block["drift_decay_factor"] = n, range(n), keep
     block["drift_intensity"][:n, :n] = drift
     block["gyro_noise_variance"][:n], block["model_noise_variance"][:n] = np.square(noise), np.square(jitter)
     block["P_xx"][:n, :n] = np.diag(block["gyro_noise_variance"][:n])
@@ -155,7 +155,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, has_regre
             likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(first + k))
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.innovation)
+        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
         for j in range(block.n_regressors):
             likelihood.whiten(
                 block, block.regressor_filter_state[j], regressors[k, j], dt, block.regressor_response[j]
@@ -173,7 +173,7 @@ def bounded_all(block, d, signatures, onset, dt):
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = d[k]
-        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.innovation)
+        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[: block.n_axes] = signatures[k, h]
         likelihood.fill_uncertainty_response(block, bounded, dt)
@@ -206,7 +206,7 @@ class Detector:
         """Healthy ones (frames, 3), as declared."""
         out = np.empty((frames, 3))
         for block in self.blocks:  # of the two views of roll and yaw the latter, if it is there
-            out[:, block["axis"][: block["n_axes"]]] = drawn(
+            out[:, block["axes"][: block["n_axes"]]] = drawn(
                 block, frames, self.dt, rng, likelihood.PRIOR_DRIFT_STD_RAD_S2
             )
         return out

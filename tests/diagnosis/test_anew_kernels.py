@@ -58,7 +58,7 @@ def test_the_drift_of_the_detectors_blocks(moving):
         ) = np.eye(3), 1e-3, 0.5
         record["gust"]["output"]["gust_axes_in_body"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
-            block["n_axes"], block["axis"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
+            block["n_axes"], block["axes"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
         record["noise"]["uncertainty_bound"] = record["block"]["drift_intensity"] = record["block"][
             "model_noise_variance"
         ] = before

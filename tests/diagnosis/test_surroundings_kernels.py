@@ -299,7 +299,7 @@ def new_detector(**fields):
         (0.01, 0.02, 0.03),
     )
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n_axes"], block["axis"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
+        block["n_axes"], block["axes"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
     record["block"][2]["drift_intensity_scale"], record["block"][2]["drift_correlation_length_m"] = 4.0, 90.0
     put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
@@ -334,7 +334,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
     turned = record["gust"]["output"]["rate_damping"] @ record["gust"]["output"]["gust_axes_in_body"]
     usual, slow = (1e-3, 4e-4, 9e-4), (4e-3, 16e-4, 36e-4 * 0.75**2)  # stronger; 20, 20 and 15 m
     for block, intensity in zip(record["block"], (usual, usual, slow), strict=True):
-        axes = block["axis"][: block["n_axes"]]
+        axes = block["axes"][: block["n_axes"]]
         unseen = moving * V * turned @ np.diag(intensity) @ turned.T
         drift = unseen[np.ix_(axes, axes)] + 2.0 * np.diag(bounded[axes] ** 2)
         assert block["drift_intensity"][: len(axes), : len(axes)] == pytest.approx(drift)
@@ -475,7 +475,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     ) = 5, 2, 1
     fdi["isolation"]["estimator"]["theta"][5] = -0.1, -0.2, -0.3
     block = fdi["statistical"]["block"][0]
-    block["n_hypotheses"], block["n_axes"], block["axis"][0] = 1, 1, 1
+    block["n_hypotheses"], block["n_axes"], block["axes"][0] = 1, 1, 1
     hypothesis = block["hypothesis"][0]
     (
         hypothesis["kind"],
@@ -490,7 +490,7 @@ def test_the_estimate_is_that_of_whoever_counts():
     )
     assert on(conclusion.isolated_surface, fdi) == 2
     assert frame.estimated_theta_of_isolated_loss(fdi, 2) == -0.2
-    fdi["fdae"]["network"]["output"], block["residual_filter_state"] = 0.3, (0, 0, 0.7, 0)
+    fdi["fdae"]["network"]["output"], block["filter_state_after_known_faults"] = 0.3, (0, 0, 0.7, 0)
     assert unknown_acceleration(fdi) == [0.0] * 3
     fdi["verdict"]["detected"] = 1
     assert unknown_acceleration(fdi) == pytest.approx([0.3] * 3)
@@ -519,7 +519,7 @@ def test_a_leap_of_the_air_widens_what_a_drift_may_be():
         1.7,
         0.3,
     )
-    block["n_axes"], block["axis"] = 2, (0, 2)
+    block["n_axes"], block["axes"] = 2, (0, 2)
     statistical.add_gust_axes_turn_to_drift_covariance(record, block)
     assert block["P_dd"] == pytest.approx(
         0.3 + 1.7 * record["output"]["acceleration_variance_by_axes_turn"][np.ix_((0, 2), (0, 2))]

@@ -374,7 +374,7 @@ def certificate_arrays_of_every_frame(
 # frames up to the alarm.
 RECORDED_BLOCK_FIELDS = (
     "drift_decay_factor", "uncertainty_change_over_bound_per_frame", "state", "P_xx", "P_xd", "P_dd",
-    "drift_intensity", "model_noise_variance", "gyro_noise_variance", "calm_air_prediction",
+    "drift_intensity", "model_noise_variance", "gyro_noise_variance", "predictable_innovation_in_calm_air",
     "coarse_gust_response", "regressor_filter_state", "regressor_response",
 )  # fmt: skip
 
@@ -445,7 +445,7 @@ def _read_block(block: np.void) -> StatisticalBlock:
         for name in OnsetTests._fields
     )
     return StatisticalBlock(
-        tuple(block["axis"][: block["n_axes"]].tolist()),
+        tuple(block["axes"][: block["n_axes"]].tolist()),
         float(block["drift_correlation_length_m"]), float(block["drift_intensity_scale"]),
         block["regressor_tolerance"][: block["n_regressors"]].copy(), hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip

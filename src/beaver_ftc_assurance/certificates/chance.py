@@ -206,7 +206,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
         )
     onset_tests = block.onset_tests
     sense, explained = onset_tests.supporting_correlation_sign[h, slot], {
-        "calm_air_prediction": onset_tests.correlation_by_calm_air,
+        "predictable_innovation_in_calm_air": onset_tests.correlation_by_calm_air,
         "coarse_gust_response": onset_tests.correlation_by_coarse_gust,
     }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]

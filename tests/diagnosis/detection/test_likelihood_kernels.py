@@ -152,7 +152,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
     block["K_x"], block["K_d"], block["S_inverse"], block["drift_decay_factor"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(len(tolerance), 2))
-    block["innovation"], block["regressor_response"][: len(tolerance)] = seen, regressors
+    block["whitened_innovation"], block["regressor_response"][: len(tolerance)] = seen, regressors
     for name in (
         "signature_for_onset",
         "signature_filter_state",
@@ -225,14 +225,14 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
         block["no_gust_filter"][name] = block[name]
     block["no_gust_filter"]["drift_intensity"][:] = 0.1 * TOGETHER
     alone = block["no_gust_filter"].copy()
-    block["innovation"], block["frame_innovation"] = (0.003, -0.001), (0.4, -0.2)
+    block["whitened_innovation"], block["frame_innovation"] = (0.003, -0.001), (0.4, -0.2)
     block["calm_air_cross_correlation"], block["calm_air_information"] = calm_air_cross_correlation, size
-    inverse, g = block["S_inverse"].copy(), block["innovation"].copy()
+    inverse, g = block["S_inverse"].copy(), block["whitened_innovation"].copy()
     likelihood.whiten_by_no_gust_filter(block, DT)
-    likelihood.fill_calm_air_prediction(block, DT)
+    likelihood.fill_predictable_innovation(block, DT)
     likelihood.advance_covariance(alone, DT)
-    likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["innovation"])
-    foretold = g - alone["innovation"]
+    likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["whitened_innovation"])
+    foretold = g - alone["whitened_innovation"]
     kept = np.exp(-DT / 2.0)
     calm_air_cross_correlation, size = (
         kept * calm_air_cross_correlation + foretold @ inverse @ g,
@@ -241,7 +241,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     assert (block["calm_air_cross_correlation"], block["calm_air_information"]) == pytest.approx(
         (calm_air_cross_correlation, size), rel=1e-12
     )
-    assert block["calm_air_prediction"] == pytest.approx(
+    assert block["predictable_innovation_in_calm_air"] == pytest.approx(
         share(calm_air_cross_correlation, size) * foretold, rel=1e-12
     )
     assert block["no_gust_filter"]["state"] == pytest.approx(alone["state"], rel=1e-12)
@@ -452,7 +452,7 @@ def detector(**fields):
     )
     put(record, **fields)
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n_axes"], block["axis"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
+        block["n_axes"], block["axes"][: len(axes)], block["n_hypotheses"] = len(axes), axes, 3
     return fdi, record
 
 
@@ -625,8 +625,8 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     axes = [(1,), (0, 2)][b]
     left = DT * (surprise - mean)[list(axes)]
     drift = gains[: len(axes), : len(axes)] @ left
-    assert record["block"][b]["residual_filter_state"][2 : 2 + len(axes)] == pytest.approx(drift)
-    assert not record["block"][2]["residual_filter_state"].any()
+    assert record["block"][b]["filter_state_after_known_faults"][2 : 2 + len(axes)] == pytest.approx(drift)
+    assert not record["block"][2]["filter_state_after_known_faults"].any()
     out = np.zeros(3)
     Statistical.unknown_acceleration(record, out)
     assert out[list(axes)] == pytest.approx(drift + np.array([0.1, 0.2, 0.3])[list(axes)])

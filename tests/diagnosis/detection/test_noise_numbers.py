@@ -136,7 +136,7 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
             (LOSS_END, RUDDER, 2, 0),
         }  # fmt: skip
     assert [int(block["n_axes"]) for block in alone.blocks] == [1, 2, 2]
-    assert [block["axis"][: block["n_axes"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
+    assert [block["axes"][: block["n_axes"]].tolist() for block in alone.blocks] == [[1], [0, 2], [0, 2]]
     for block in alone.blocks:
         for h in block["hypothesis"][: block["n_hypotheses"]]:
             if h["raises_alarm"]:
@@ -150,11 +150,11 @@ def test_a_block_begins_with_the_gyros_noise_and_a_drift_that_may_be_anything():
     gyros = {"p": (0.1, 0.3), "q": (0.2, 0.5), "r": (0.05, 0.4)}
     sensors = {k: {"noise_std_deg_s": n, "quantum_deg_s": q} for k, (n, q) in gyros.items()}
     blocks = Detector(50.0, bounds={"sensors": sensors}).blocks
-    axes = [axis for block in blocks for axis in block["axis"][: block["n_axes"]]]
+    axes = [axis for block in blocks for axis in block["axes"][: block["n_axes"]]]
     assert axes == [1, 0, 2, 0, 2]
     for block in blocks:
         for i in range(block["n_axes"]):
-            noise, quantum = gyros["pqr"[block["axis"][i]]]
+            noise, quantum = gyros["pqr"[block["axes"][i]]]
             variance = radians(1.0) ** 2 * (noise**2 + quantum**2 / 12.0)
             assert block["gyro_noise_variance"][i] == pytest.approx(variance, rel=1e-9)
             assert block["P_xx"][i, i] == block["gyro_noise_variance"][i]

@@ -59,7 +59,7 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
         found = moved(design, *flown_there, which, float(declared_errors["density_power_error_kw"]))
         error = STEADY[which] if which < POWER else float(declared_errors["engine_power_error_kw"])
         for block in alone.blocks:
-            n, axes = int(block["n_regressors"]) - N_INPUT_READINGS + which, block["axis"][: block["n_axes"]]
+            n, axes = int(block["n_regressors"]) - N_INPUT_READINGS + which, block["axes"][: block["n_axes"]]
             assert block["regressor_tolerance"][n] == pytest.approx(error)
             assert block["regressor"][n, : len(axes)] == pytest.approx(found[axes], rel=1e-5, abs=1e-9)
 
@@ -75,7 +75,7 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
         ) ** 2
     assert detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(expected, rel=1e-5)
     for block in alone.blocks:
-        axes = block["axis"][: block["n_axes"]]
+        axes = block["axes"][: block["n_axes"]]
         assert block["model_noise_variance"][: len(axes)] == pytest.approx(expected[axes], rel=1e-5)
 
 

@@ -201,7 +201,7 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     assert alone.detector["noise"]["acceleration_variance_by_input_noise"] == pytest.approx(square, rel=0.02)
     for block in alone.blocks:
         n = block["n_axes"]
-        assert block["model_noise_variance"][:n] == pytest.approx(square[block["axis"][:n]], rel=0.02)
+        assert block["model_noise_variance"][:n] == pytest.approx(square[block["axes"][:n]], rel=0.02)
     half_a_degree = np.abs(_rates(design, x, y, u) - _rates(design, x, y, u + np.deg2rad([0, 0.5, 0, 0])))[1]
     assert alone.detector["noise"]["deflection_error_effect_bound"][1] >= half_a_degree
     calm = Detector(100.0, bounds=TACTICAL)

@@ -144,9 +144,9 @@ ONSET_TESTS_RECORD = record(
 
 
 _FILTER_FIELDS = {
-    "n_axes": int, "drift_decay_factor": float, "state": 4, "innovation": 2, "P_xx": (2, 2), "P_xd": (2, 2),
-    "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2, "gyro_noise_variance": 2,
-    "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
+    "n_axes": int, "drift_decay_factor": float, "state": 4, "whitened_innovation": 2, "P_xx": (2, 2),
+    "P_xd": (2, 2), "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2,
+    "gyro_noise_variance": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
 FILTER_RECORD = record(**_FILTER_FIELDS)
 
@@ -155,9 +155,9 @@ def set_supporting_correlation_signs(block: np.void, kinds: Sequence[int]) -> No
     """Fill the sign of N that supports each hypothesis, in all of its onset tests."""
     block["onset_tests"]["supporting_correlation_sign"] = 0.0
     for h, kind in enumerate(kinds):
-        first_test = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
+        first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
         block["onset_tests"]["supporting_correlation_sign"][
-            h // HYPOTHESES_PER_TEST_GROUP, first_test : first_test + N_ONSET_SLOTS
+            h // HYPOTHESES_PER_TEST_GROUP, first_test_index : first_test_index + N_ONSET_SLOTS
         ] = SUPPORTING_CORRELATION_SIGN_BY_KIND[kind]
 
 
@@ -170,12 +170,12 @@ def max_test_groups(capacity: BlockCapacity) -> int:
 def block_dtype(capacity: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
     return record(
-        axis=(int, 2),  # first: a record that begins as another does is taken for one
+        axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
-        drift_correlation_length_m=float, drift_intensity_scale=float, residual_filter_state=4,
+        drift_correlation_length_m=float, drift_intensity_scale=float, filter_state_after_known_faults=4,
         frame_innovation=2,  # rad/s2
         # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
-        no_gust_filter=FILTER_RECORD, calm_air_prediction=2, calm_air_cross_correlation=float,
+        no_gust_filter=FILTER_RECORD, predictable_innovation_in_calm_air=2, calm_air_cross_correlation=float,
         calm_air_information=float,
         # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
         has_coarse_gust_estimate=int, coarse_gust_response=2, coarse_gust_filter_state=4,
@@ -196,12 +196,16 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
     """A block (1,) that filters n rates and has no hypotheses.
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
-    blocks, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
-    block, rates, drifts = blocks[0], slice(0, n), slice(n, 2 * n)
-    block["n_axes"], block["axis"], block["gyro_noise_variance"][:n] = n, (0, 1), R
-    for name, rows, columns in (("P_xx", rates, rates), ("P_xd", rates, drifts), ("P_dd", drifts, drifts)):
-        block[name][:n, :n] = P[rows, columns]
-    return blocks
+    one_block, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
+    block, rate_indices, drift_indices = one_block[0], slice(0, n), slice(n, 2 * n)
+    block["n_axes"], block["axes"], block["gyro_noise_variance"][:n] = n, (0, 1), R
+    for covariance_name, rows, columns in (
+        ("P_xx", rate_indices, rate_indices),
+        ("P_xd", rate_indices, drift_indices),
+        ("P_dd", drift_indices, drift_indices),
+    ):
+        block[covariance_name][:n, :n] = P[rows, columns]
+    return one_block
 
 
 @kernel
@@ -219,7 +223,7 @@ def invert_symmetric(n, S):
 @kernel
 def predict_covariance(block, dt):
     """Predict the covariances over a frame of dt s, and fill `S_inverse` with S, yet to be inverted."""
-    P_xx, P_xd, P_dd, S = block.P_xx, block.P_xd, block.P_dd, block.S_inverse
+    P_xx, P_xd, P_dd, S_before_inversion = block.P_xx, block.P_xd, block.P_dd, block.S_inverse
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             P_xx[i, j] += dt * (P_xd[i, j] + P_xd[j, i]) + dt * dt * P_dd[i, j]
@@ -231,8 +235,8 @@ def predict_covariance(block, dt):
                 block.drift_decay_factor * block.drift_decay_factor * P_dd[i, j]
                 + dt * block.drift_intensity[i, j]
             )
-            S[i, j] = P_xx[i, j]
-        S[i, i] += block.gyro_noise_variance[i]
+            S_before_inversion[i, j] = P_xx[i, j]
+        S_before_inversion[i, i] += block.gyro_noise_variance[i]
 
 
 @kernel
@@ -279,28 +283,35 @@ def whiten(block, state, acceleration, dt, out):
     for i in range(block.n_axes):
         out[i] = state[i] + dt * (acceleration[i] - state[2 + i])
     for i in range(block.n_axes):
-        rate_error, drift_correction = out[i], 0.0
+        remaining_rate_error, drift_correction = out[i], 0.0
         for j in range(block.n_axes):
-            rate_error -= block.K_x[i, j] * out[j]
+            remaining_rate_error -= block.K_x[i, j] * out[j]
             drift_correction += block.K_d[i, j] * out[j]
-        state[i] = rate_error
+        state[i] = remaining_rate_error
         state[2 + i] = block.drift_decay_factor * state[2 + i] + drift_correction
 
 
 @kernel
 def whiten_regressors(block, dt):
     """Whiten all regressors as `whiten` does; in a block of one axis all values of a second axis are zero."""
-    K_x, K_d, drift_decay = block.K_x, block.K_d, block.drift_decay_factor
+    K_x, K_d, drift_decay_factor = block.K_x, block.K_d, block.drift_decay_factor
     K_x00, K_x01, K_x10, K_x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     K_d00, K_d01, K_d10, K_d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
-    regressor, state, response = block.regressor, block.regressor_filter_state, block.regressor_response
+    regressor = block.regressor
+    filter_state = block.regressor_filter_state
+    response = block.regressor_response
     for j in range(block.n_regressors):
-        r0 = state[j, 0] + dt * (regressor[j, 0] - state[j, 2])
-        r1 = state[j, 1] + dt * (regressor[j, 1] - state[j, 3])
-        response[j, 0], response[j, 1] = r0, r1
-        state[j, 0], state[j, 1] = r0 - K_x00 * r0 - K_x01 * r1, r1 - K_x10 * r0 - K_x11 * r1
-        state[j, 2] = drift_decay * state[j, 2] + (K_d00 * r0 + K_d01 * r1)
-        state[j, 3] = drift_decay * state[j, 3] + (K_d10 * r0 + K_d11 * r1)
+        response_0 = filter_state[j, 0] + dt * (regressor[j, 0] - filter_state[j, 2])
+        response_1 = filter_state[j, 1] + dt * (regressor[j, 1] - filter_state[j, 3])
+        response[j, 0], response[j, 1] = response_0, response_1
+        filter_state[j, 0] = response_0 - K_x00 * response_0 - K_x01 * response_1
+        filter_state[j, 1] = response_1 - K_x10 * response_0 - K_x11 * response_1
+        filter_state[j, 2] = drift_decay_factor * filter_state[j, 2] + (
+            K_d00 * response_0 + K_d01 * response_1
+        )
+        filter_state[j, 3] = drift_decay_factor * filter_state[j, 3] + (
+            K_d10 * response_0 + K_d11 * response_1
+        )
 
 
 @kernel
@@ -312,52 +323,62 @@ def whiten_by_no_gust_filter(block, dt):
         block.no_gust_filter.state,
         block.frame_innovation,
         dt,
-        block.no_gust_filter.innovation,
+        block.no_gust_filter.whitened_innovation,
     )
 
 
 @kernel
-def fill_calm_air_prediction(block, dt):
-    """Fill `calm_air_prediction` (2,) rad/s with lambda p: the part of g that calm air makes predictable.
+def fill_predictable_innovation(block, dt):
+    """Fill `predictable_innovation_in_calm_air` (2,) rad/s with lambda p, the part of g that calm air makes
+    predictable.
 
     lambda is estimated over the last CALM_AIR_SHARE_MEMORY_S. `whiten_by_no_gust_filter` must have run for
     this frame.
     """
-    no_gust_filter, prediction, g = block.no_gust_filter, block.calm_air_prediction, block.innovation
-    memory_factor = np.exp(-dt / CALM_AIR_SHARE_MEMORY_S)
-    block.calm_air_cross_correlation *= memory_factor
-    block.calm_air_information *= memory_factor
+    no_gust_filter = block.no_gust_filter
+    predictable_innovation = block.predictable_innovation_in_calm_air
+    innovation = block.whitened_innovation
+    sum_decay_factor = np.exp(-dt / CALM_AIR_SHARE_MEMORY_S)
+    block.calm_air_cross_correlation *= sum_decay_factor
+    block.calm_air_information *= sum_decay_factor
     for i in range(block.n_axes):
-        prediction[i] = g[i] - no_gust_filter.innovation[i]
+        predictable_innovation[i] = innovation[i] - no_gust_filter.whitened_innovation[i]
     for i in range(block.n_axes):
         for j in range(block.n_axes):
-            block.calm_air_cross_correlation += prediction[i] * block.S_inverse[i, j] * g[j]
-            block.calm_air_information += prediction[i] * block.S_inverse[i, j] * prediction[j]
-    information = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
-    cross_correlation = (
+            block.calm_air_cross_correlation += (
+                predictable_innovation[i] * block.S_inverse[i, j] * innovation[j]
+            )
+            block.calm_air_information += (
+                predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
+            )
+    information_with_prior = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
+    cross_correlation_with_margin = (
         block.calm_air_cross_correlation
         + CALM_AIR_SHARE_PRIOR_INFORMATION
-        + CALM_AIR_SHARE_MARGIN_STD * sqrt(information)
+        + CALM_AIR_SHARE_MARGIN_STD * sqrt(information_with_prior)
     )
-    calm_air_share = min(max(cross_correlation / information, 0.0), 1.0)
+    calm_air_share = min(max(cross_correlation_with_margin / information_with_prior, 0.0), 1.0)
     for i in range(block.n_axes):
-        prediction[i] *= calm_air_share
+        predictable_innovation[i] *= calm_air_share
 
 
 @kernel
-def onset_slot_to_reset(frame):
+def onset_slot_to_reset(frame_index):
     """The slot that restarts at a frame: slot j at odd multiples of 2^j, the last at all other frames."""
-    slot = 0
-    while frame % 2 == 0 and slot < N_ONSET_SLOTS - 1:
-        frame //= 2
-        slot += 1
-    return slot
+    onset_slot = 0
+    while frame_index % 2 == 0 and onset_slot < N_ONSET_SLOTS - 1:
+        frame_index //= 2
+        onset_slot += 1
+    return onset_slot
 
 
 @kernel
-def n_onset_tests_in_group(block, g):
+def n_onset_tests_in_group(block, group_index):
     """The number of onset tests in use in group g: the first entries of each array."""
-    return min(block.n_hypotheses - g * HYPOTHESES_PER_TEST_GROUP, HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
+    return (
+        min(block.n_hypotheses - group_index * HYPOTHESES_PER_TEST_GROUP, HYPOTHESES_PER_TEST_GROUP)
+        * N_ONSET_SLOTS
+    )
 
 
 @kernel
@@ -367,11 +388,11 @@ def n_test_groups(block):
 
 
 @kernel
-def reset_onset_slot(block, slot):
+def reset_onset_slot(block, onset_slot):
     """Restart a slot: its onset is the next frame, without evidence."""
-    for g in range(n_test_groups(block)):
-        onset_tests = block.onset_tests[g]
-        for k in range(slot, n_onset_tests_in_group(block, g), N_ONSET_SLOTS):
+    for group_index in range(n_test_groups(block)):
+        onset_tests = block.onset_tests[group_index]
+        for k in range(onset_slot, n_onset_tests_in_group(block, group_index), N_ONSET_SLOTS):
             onset_tests.correlation[k] = onset_tests.information[k] = 0.0
             onset_tests.correlation_weight[0, k] = onset_tests.correlation_weight[1, k] = 0.0
             onset_tests.correlation_bound_by_constant_uncertainty[
@@ -383,7 +404,7 @@ def reset_onset_slot(block, slot):
             for i in range(4):
                 onset_tests.signature_filter_state[i, k] = 0.0
             for j in range(block.n_regressors):
-                block.regressor_correlation[g, j, k] = 0.0
+                block.regressor_correlation[group_index, j, k] = 0.0
 
 
 @kernel
@@ -393,168 +414,211 @@ def fill_uncertainty_response(block, uncertainty_bound, dt):
 
     uncertainty_bound (3,) rad/s2: eta_bar.
     """
-    K, drift_loss_per_frame = block.K_d, 1.0 - block.drift_decay_factor
-    determinant = K[0, 0] * K[1, 1] - K[0, 1] * K[1, 0] if block.n_axes > 1 else K[0, 0]
+    K_d, drift_share_lost_per_frame = block.K_d, 1.0 - block.drift_decay_factor
+    K_d_determinant = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if block.n_axes > 1 else K_d[0, 0]
     for i in range(block.n_axes):
         block.constant_uncertainty_response[i] = block.transient_uncertainty_response[i] = 0.0
         for j in range(block.n_axes):
-            cofactor = 1.0 if block.n_axes == 1 else (K[1 - i, 1 - i] if i == j else K[i, j])
+            K_d_cofactor = 1.0 if block.n_axes == 1 else (K_d[1 - i, 1 - i] if i == j else K_d[i, j])
             block.transient_uncertainty_response[i] += (
-                TRANSIENT_RINGING_SUM_FACTOR * abs(cofactor / determinant) * uncertainty_bound[block.axis[j]]
+                TRANSIENT_RINGING_SUM_FACTOR
+                * abs(K_d_cofactor / K_d_determinant)
+                * uncertainty_bound[block.axes[j]]
             )
-        if drift_loss_per_frame > 0.0:
-            settled_response = (
-                dt * drift_loss_per_frame / (block.K_x[i, i] * drift_loss_per_frame + dt * K[i, i])
+        if drift_share_lost_per_frame > 0.0:
+            settled_response_per_uncertainty = (
+                dt
+                * drift_share_lost_per_frame
+                / (block.K_x[i, i] * drift_share_lost_per_frame + dt * K_d[i, i])
             )
-            block.constant_uncertainty_response[i] = settled_response * uncertainty_bound[block.axis[i]]
+            block.constant_uncertainty_response[i] = (
+                settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
+            )
 
 
 @kernel
-def fill_signatures_for_onsets(hypothesis, onset_tests, first_test):
-    """Fill `signature_for_onset`, rad/s2, of a hypothesis for each onset, from test `first_test` on.
+def fill_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
+    """Fill `signature_for_onset`, rad/s2, of a hypothesis for each onset, from test `first_test_index` on.
 
     It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
     of the onset.
     """
-    s0, s1 = hypothesis.signature[0], hypothesis.signature[1]
-    for k in range(first_test, first_test + N_ONSET_SLOTS):
+    signature_0, signature_1 = hypothesis.signature[0], hypothesis.signature[1]
+    for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
         if hypothesis.kind == LOSS_END:
             if onset_tests.remaining_growth_share[k] > 0.0:
                 onset_tests.remaining_growth_share[k] = 0.0
-                onset_tests.signature_at_loss_end[0, k] = s0
-                onset_tests.signature_at_loss_end[1, k] = s1
+                onset_tests.signature_at_loss_end[0, k] = signature_0
+                onset_tests.signature_at_loss_end[1, k] = signature_1
             onset_tests.signature_for_onset[0, k] = onset_tests.signature_at_loss_end[0, k]
             onset_tests.signature_for_onset[1, k] = onset_tests.signature_at_loss_end[1, k]
         elif hypothesis.kind == GROWING_LOSS:
             onset_tests.remaining_growth_share[k] *= hypothesis.remaining_growth_decay_factor
             grown_share = 1.0 - onset_tests.remaining_growth_share[k]
-            onset_tests.signature_for_onset[0, k] = grown_share * s0
-            onset_tests.signature_for_onset[1, k] = grown_share * s1
+            onset_tests.signature_for_onset[0, k] = grown_share * signature_0
+            onset_tests.signature_for_onset[1, k] = grown_share * signature_1
         else:
-            onset_tests.signature_for_onset[0, k], onset_tests.signature_for_onset[1, k] = s0, s1
+            onset_tests.signature_for_onset[0, k] = signature_0
+            onset_tests.signature_for_onset[1, k] = signature_1
 
 
 @kernel
-def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay):
+def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_factor):
     """Whiten `signature_for_onset` of the first n_tests tests, and add the frame to N, D and the bounds on N.
 
-    evidence_decay: factor by which earlier sums decay. In a block of one axis all values of a second axis are
-    zero.
+    evidence_decay_factor: factor by which earlier sums decay. In a block of one axis all values of a second
+    axis are zero.
     """
     K_x, K_d, S_inverse = block.K_x, block.K_d, block.S_inverse
     K_x00, K_x01, K_x10, K_x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
     K_d00, K_d01, K_d10, K_d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     S_inv00, S_inv01, S_inv10, S_inv11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 0], S_inverse[1, 1]
-    drift_decay, g0, g1 = block.drift_decay_factor, block.innovation[0], block.innovation[1]
-    p0, p1 = block.calm_air_prediction[0], block.calm_air_prediction[1]
-    transient0, transient1 = block.transient_uncertainty_response[0], block.transient_uncertainty_response[1]
-    constant0, constant1 = block.constant_uncertainty_response[0], block.constant_uncertainty_response[1]
-    state = onset_tests.signature_filter_state
-    signature = onset_tests.signature_for_onset
-    weight = onset_tests.correlation_weight
-    uncertainty_change = block.uncertainty_change_over_bound_per_frame
+    drift_decay_factor = block.drift_decay_factor
+    innovation_0 = block.whitened_innovation[0]
+    innovation_1 = block.whitened_innovation[1]
+    predictable_0 = block.predictable_innovation_in_calm_air[0]
+    predictable_1 = block.predictable_innovation_in_calm_air[1]
+    transient_response_0 = block.transient_uncertainty_response[0]
+    transient_response_1 = block.transient_uncertainty_response[1]
+    constant_response_0 = block.constant_uncertainty_response[0]
+    constant_response_1 = block.constant_uncertainty_response[1]
+    signature_filter_state = onset_tests.signature_filter_state
+    signature_for_onset = onset_tests.signature_for_onset
+    correlation_weight = onset_tests.correlation_weight
+    uncertainty_change_over_bound = block.uncertainty_change_over_bound_per_frame
     for k in range(n_tests):
-        r0 = state[0, k] + dt * (signature[0, k] - state[2, k])
-        r1 = state[1, k] + dt * (signature[1, k] - state[3, k])
-        state[0, k], state[1, k] = r0 - K_x00 * r0 - K_x01 * r1, r1 - K_x10 * r0 - K_x11 * r1
-        state[2, k] = drift_decay * state[2, k] + (K_d00 * r0 + K_d01 * r1)
-        state[3, k] = drift_decay * state[3, k] + (K_d10 * r0 + K_d11 * r1)
-        w0, w1 = S_inv00 * r0 + S_inv01 * r1, S_inv10 * r0 + S_inv11 * r1
-        onset_tests.correlation[k] = evidence_decay * onset_tests.correlation[k] + (w0 * g0 + w1 * g1)
-        onset_tests.information[k] = evidence_decay * onset_tests.information[k] + w0 * r0 + w1 * r1
-        onset_tests.correlation_by_calm_air[k] = evidence_decay * onset_tests.correlation_by_calm_air[k] + (
-            w0 * p0 + w1 * p1
+        response_0 = signature_filter_state[0, k] + dt * (
+            signature_for_onset[0, k] - signature_filter_state[2, k]
         )
-        variation = transient0 * abs(w0 - weight[0, k]) + transient1 * abs(w1 - weight[1, k])
-        constant = constant0 * abs(w0) + constant1 * abs(w1)
+        response_1 = signature_filter_state[1, k] + dt * (
+            signature_for_onset[1, k] - signature_filter_state[3, k]
+        )
+        signature_filter_state[0, k] = response_0 - K_x00 * response_0 - K_x01 * response_1
+        signature_filter_state[1, k] = response_1 - K_x10 * response_0 - K_x11 * response_1
+        signature_filter_state[2, k] = drift_decay_factor * signature_filter_state[2, k] + (
+            K_d00 * response_0 + K_d01 * response_1
+        )
+        signature_filter_state[3, k] = drift_decay_factor * signature_filter_state[3, k] + (
+            K_d10 * response_0 + K_d11 * response_1
+        )
+        weight_0 = S_inv00 * response_0 + S_inv01 * response_1
+        weight_1 = S_inv10 * response_0 + S_inv11 * response_1
+        onset_tests.correlation[k] = evidence_decay_factor * onset_tests.correlation[k] + (
+            weight_0 * innovation_0 + weight_1 * innovation_1
+        )
+        onset_tests.information[k] = (
+            evidence_decay_factor * onset_tests.information[k] + weight_0 * response_0 + weight_1 * response_1
+        )
+        onset_tests.correlation_by_calm_air[k] = (
+            evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
+        ) + (weight_0 * predictable_0 + weight_1 * predictable_1)
+        varying_bound_increment = transient_response_0 * abs(
+            weight_0 - correlation_weight[0, k]
+        ) + transient_response_1 * abs(weight_1 - correlation_weight[1, k])
+        constant_bound_increment = constant_response_0 * abs(weight_0) + constant_response_1 * abs(weight_1)
         onset_tests.correlation_bound_by_constant_uncertainty[k] = (
-            evidence_decay * onset_tests.correlation_bound_by_constant_uncertainty[k] + constant
+            evidence_decay_factor * onset_tests.correlation_bound_by_constant_uncertainty[k]
+            + constant_bound_increment
         )
         onset_tests.correlation_bound_by_varying_uncertainty[k] = (
-            evidence_decay * onset_tests.correlation_bound_by_varying_uncertainty[k] + variation
+            evidence_decay_factor * onset_tests.correlation_bound_by_varying_uncertainty[k]
+            + varying_bound_increment
         )
         onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = (
-            evidence_decay * onset_tests.correlation_bound_by_rate_limited_uncertainty[k]
-            + uncertainty_change * (transient0 * abs(w0) + transient1 * abs(w1))
+            evidence_decay_factor * onset_tests.correlation_bound_by_rate_limited_uncertainty[k]
+            + uncertainty_change_over_bound
+            * (transient_response_0 * abs(weight_0) + transient_response_1 * abs(weight_1))
         )
-        weight[0, k], weight[1, k] = w0, w1
+        correlation_weight[0, k], correlation_weight[1, k] = weight_0, weight_1
 
 
 @kernel
-def accumulate_regressor_correlation(block, onset_tests, overlap, n_tests, evidence_decay):
-    """Add the frame to R_j of n onset tests, `overlap` (regressors, tests), and fill their
+def accumulate_regressor_correlation(
+    block, onset_tests, regressor_correlation, n_tests, evidence_decay_factor
+):
+    """Add the frame to R_j of n onset tests, `regressor_correlation` (regressors, tests), and fill their
     `correlation_bound_by_coefficient_errors`.
 
     Regressors go in pairs: weight and bound then pass through memory half as often. LLVM makes vector
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
-    weight, bound = onset_tests.correlation_weight, onset_tests.correlation_bound_by_coefficient_errors
-    response, tolerance = block.regressor_response, block.regressor_tolerance
+    correlation_weight = onset_tests.correlation_weight
+    correlation_bound = onset_tests.correlation_bound_by_coefficient_errors
+    regressor_response, regressor_tolerance = block.regressor_response, block.regressor_tolerance
     n_regressors = block.n_regressors
-    bound[:n_tests] = 0.0
+    correlation_bound[:n_tests] = 0.0
     for j in range(0, n_regressors - 1, 2):
-        a0, a1, b0, b1 = response[j, 0], response[j, 1], response[j + 1, 0], response[j + 1, 1]
-        overlap_a, overlap_b = overlap[j], overlap[j + 1]
-        tolerance_a, tolerance_b = tolerance[j], tolerance[j + 1]
+        response_a0 = regressor_response[j, 0]
+        response_a1 = regressor_response[j, 1]
+        response_b0 = regressor_response[j + 1, 0]
+        response_b1 = regressor_response[j + 1, 1]
+        correlation_a, correlation_b = regressor_correlation[j], regressor_correlation[j + 1]
+        tolerance_a, tolerance_b = regressor_tolerance[j], regressor_tolerance[j + 1]
         for k in range(n_tests):
-            w0, w1 = weight[0, k], weight[1, k]
-            R_a = evidence_decay * overlap_a[k] + (w0 * a0 + w1 * a1)
-            R_b = evidence_decay * overlap_b[k] + (w0 * b0 + w1 * b1)
-            overlap_a[k], overlap_b[k] = R_a, R_b
-            bound[k] = bound[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+            weight_0, weight_1 = correlation_weight[0, k], correlation_weight[1, k]
+            R_a = evidence_decay_factor * correlation_a[k] + (weight_0 * response_a0 + weight_1 * response_a1)
+            R_b = evidence_decay_factor * correlation_b[k] + (weight_0 * response_b0 + weight_1 * response_b1)
+            correlation_a[k], correlation_b[k] = R_a, R_b
+            correlation_bound[k] = correlation_bound[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
     for j in range(n_regressors - n_regressors % 2, n_regressors):
-        r0, r1 = response[j, 0], response[j, 1]
+        response_0, response_1 = regressor_response[j, 0], regressor_response[j, 1]
         for k in range(n_tests):
-            overlap[j, k] = evidence_decay * overlap[j, k] + (weight[0, k] * r0 + weight[1, k] * r1)
-            bound[k] += tolerance[j] * abs(overlap[j, k])
+            regressor_correlation[j, k] = evidence_decay_factor * regressor_correlation[j, k] + (
+                correlation_weight[0, k] * response_0 + correlation_weight[1, k] * response_1
+            )
+            correlation_bound[k] += regressor_tolerance[j] * abs(regressor_correlation[j, k])
 
 
 @kernel
-def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay):
+def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
     """Add the frame to the share of N that a roughly visible gust contributes.
 
     `accumulate_correlations` must have filled the weights of the frame.
     """
-    gust0, gust1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
+    gust_response_0, gust_response_1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
     for k in range(n_tests):
-        onset_tests.correlation_by_coarse_gust[k] = evidence_decay * onset_tests.correlation_by_coarse_gust[
-            k
-        ] + (onset_tests.correlation_weight[0, k] * gust0 + onset_tests.correlation_weight[1, k] * gust1)
+        onset_tests.correlation_by_coarse_gust[k] = (
+            evidence_decay_factor * onset_tests.correlation_by_coarse_gust[k]
+            + (
+                onset_tests.correlation_weight[0, k] * gust_response_0
+                + onset_tests.correlation_weight[1, k] * gust_response_1
+            )
+        )
 
 
 @kernel
-def accumulate_evidence(block, has_regressors, dt, evidence_decay):
+def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by
-    `evidence_decay`."""
+    `evidence_decay_factor`."""
     for h in range(block.n_hypotheses):
         fill_signatures_for_onsets(
             block.hypothesis[h],
             block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP],
             (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS,
         )
-    for g in range(n_test_groups(block)):
-        onset_tests, n_tests = block.onset_tests[g], n_onset_tests_in_group(block, g)
-        accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay)
+    for group_index in range(n_test_groups(block)):
+        onset_tests, n_tests = block.onset_tests[group_index], n_onset_tests_in_group(block, group_index)
+        accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_factor)
         if block.has_coarse_gust_estimate:
-            accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay)
+            accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
         if has_regressors:
             accumulate_regressor_correlation(
-                block, onset_tests, block.regressor_correlation[g], n_tests, evidence_decay
+                block, onset_tests, block.regressor_correlation[group_index], n_tests, evidence_decay_factor
             )
 
 
 @kernel
-def correlation_bound_by_uncertainty(onset_tests, k, transient0, transient1):
+def correlation_bound_by_uncertainty(onset_tests, k, transient_response_0, transient_response_1):
     """The largest share of |N| in test k that a bounded uncertainty explains.
 
-    transient0, transient1: the two entries of the block's `transient_uncertainty_response`.
+    transient_response_0, _1: the two entries of the block's `transient_uncertainty_response`.
     """
-    last_variation = transient0 * abs(onset_tests.correlation_weight[0, k]) + transient1 * abs(
-        onset_tests.correlation_weight[1, k]
-    )
+    bound_by_last_weight_change = transient_response_0 * abs(
+        onset_tests.correlation_weight[0, k]
+    ) + transient_response_1 * abs(onset_tests.correlation_weight[1, k])
     return onset_tests.correlation_bound_by_constant_uncertainty[k] + min(
-        onset_tests.correlation_bound_by_varying_uncertainty[k] + last_variation,
+        onset_tests.correlation_bound_by_varying_uncertainty[k] + bound_by_last_weight_change,
         onset_tests.correlation_bound_by_rate_limited_uncertainty[k],
     )
 
@@ -579,57 +643,64 @@ def max_log_likelihood_ratio(is_loss, evidence, information):
 
 @kernel
 def normalised_evidence(
-    alarm_level, noise_share_of_level, evidence, evidence_bound_by_uncertainty, information
+    alarm_level, noise_share_of_alarm_level, evidence, evidence_bound_by_uncertainty, information
 ):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
     evidence_bound_by_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
-    of the alarm; noise_share_of_level: share of the level that is reserved for noise in addition. The result
-    is compared with the level.
+    of the alarm; noise_share_of_alarm_level: share of the level that is reserved for noise in addition. The
+    result is compared with the level.
     """
     evidence_std = sqrt(information)
     return evidence / (
         evidence_std
         if evidence_bound_by_uncertainty <= 0.0
         else max(
-            evidence_std, evidence_bound_by_uncertainty / alarm_level + noise_share_of_level * evidence_std
+            evidence_std,
+            evidence_bound_by_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
         )
     )
 
 
 @kernel
-def evaluate_onset_tests(block, onset_tests, n_tests, ignores_uncertainty, has_error_map):
+def evaluate_onset_tests(block, onset_tests, n_tests, loss_bounds_ignore_uncertainty, has_error_map):
     """Fill the score and the log-likelihood ratios of n onset tests; those of a test without information are
     0.
 
-    ignores_uncertainty: the bounds on the ratio of a loss leave bounded uncertainty out of account.
+    loss_bounds_ignore_uncertainty: the bounds on the ratio of a loss leave out the bounded uncertainty.
     has_error_map: the model's error is mapped; it is then large and lasting, so the bounds on other
     hypotheses always include it.
     """
     supporting_correlation_sign = onset_tests.supporting_correlation_sign
-    transient0 = block.transient_uncertainty_response[0]
-    transient1 = block.transient_uncertainty_response[1]
+    transient_response_0 = block.transient_uncertainty_response[0]
+    transient_response_1 = block.transient_uncertainty_response[1]
     alarm_level = block.alarm_level
-    noise_share_of_level = block.noise_share_of_alarm_level
-    uncertainty_weight = 0.0 if ignores_uncertainty else 1.0
+    noise_share_of_alarm_level = block.noise_share_of_alarm_level
+    uncertainty_weight_of_losses = 0.0 if loss_bounds_ignore_uncertainty else 1.0
     for k in range(n_tests):
         N, D = onset_tests.correlation[k], onset_tests.information[k]
-        explained_part = onset_tests.correlation_bound_by_coefficient_errors[k] + max(
+        evidence_explained_by_errors = onset_tests.correlation_bound_by_coefficient_errors[k] + max(
             supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
         )
-        explained_part += max(supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0)
+        evidence_explained_by_errors += max(
+            supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0
+        )
         is_loss, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
         evidence = supporting_correlation_sign[k] * N if is_loss else abs(N)
         evidence_bound_by_uncertainty = correlation_bound_by_uncertainty(
-            onset_tests, k, transient0, transient1
+            onset_tests, k, transient_response_0, transient_response_1
         )
-        evidence_error_bound = explained_part + (
+        evidence_error_bound = evidence_explained_by_errors + (
             evidence_bound_by_uncertainty
             if has_error_map and not is_loss
-            else uncertainty_weight * evidence_bound_by_uncertainty
+            else uncertainty_weight_of_losses * evidence_bound_by_uncertainty
         )
         score = normalised_evidence(
-            alarm_level, noise_share_of_level, evidence - explained_part, evidence_bound_by_uncertainty, D
+            alarm_level,
+            noise_share_of_alarm_level,
+            evidence - evidence_explained_by_errors,
+            evidence_bound_by_uncertainty,
+            D,
         )
         llr = max_log_likelihood_ratio(is_loss, evidence, D)
         llr_lower_bound = max_log_likelihood_ratio(is_loss, evidence - evidence_error_bound, D)
@@ -641,62 +712,70 @@ def evaluate_onset_tests(block, onset_tests, n_tests, ignores_uncertainty, has_e
 
 
 @kernel
-def evaluate_hypotheses(block, upper_bound_decay=0.0, has_error_map=False):
+def evaluate_hypotheses(block, upper_bound_decay_factor=0.0, has_error_map=False):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
-    upper_bound_decay: if a loss may end, the factor by which its earlier upper bound decays per frame; else
-    0. has_error_map: see `evaluate_onset_tests`.
+    upper_bound_decay_factor: if a loss may end, the factor by which its earlier upper bound decays per frame;
+    else 0. has_error_map: see `evaluate_onset_tests`.
     """
-    for g in range(n_test_groups(block)):
+    for group_index in range(n_test_groups(block)):
         evaluate_onset_tests(
             block,
-            block.onset_tests[g],
-            n_onset_tests_in_group(block, g),
-            upper_bound_decay > 0.0,
+            block.onset_tests[group_index],
+            n_onset_tests_in_group(block, group_index),
+            upper_bound_decay_factor > 0.0,
             has_error_map,
         )
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]
-        first_test = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
-        score, best_llr, likeliest_test = 0.0, -1.0, -1
-        llr_lower_bound, llr_upper_bound = 0.0, upper_bound_decay * hypothesis.llr_upper_bound
-        for k in range(first_test, first_test + N_ONSET_SLOTS):
+        first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
+        score, best_llr, likeliest_test_index = 0.0, -1.0, -1
+        llr_lower_bound, llr_upper_bound = 0.0, upper_bound_decay_factor * hypothesis.llr_upper_bound
+        for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
             score = max(score, onset_tests.score[k])
             llr_lower_bound = max(llr_lower_bound, onset_tests.llr_lower_bound[k])
             llr_upper_bound = max(llr_upper_bound, onset_tests.llr_upper_bound[k])
             if onset_tests.llr[k] > best_llr:
-                best_llr, likeliest_test = onset_tests.llr[k], k
+                best_llr, likeliest_test_index = onset_tests.llr[k], k
         hypothesis.score = score
         hypothesis.llr_lower_bound, hypothesis.llr_upper_bound = llr_lower_bound, llr_upper_bound
-        if likeliest_test >= 0:
-            N, D = onset_tests.correlation[likeliest_test], onset_tests.information[likeliest_test]
+        if likeliest_test_index >= 0:
+            N = onset_tests.correlation[likeliest_test_index]
+            D = onset_tests.information[likeliest_test_index]
             hypothesis.theta_estimate, hypothesis.theta_information = estimate_theta(hypothesis.kind, N, D), D
 
 
 @kernel
 def update_block(
-    block, uncertainty_bound, has_regressors, dt, evidence_decay, upper_bound_decay=0.0, has_error_map=False
+    block,
+    uncertainty_bound,
+    has_regressors,
+    dt,
+    evidence_decay_factor,
+    upper_bound_decay_factor=0.0,
+    has_error_map=False,
 ):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
     The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `has_regressors`,
-    regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response`; evidence_decay:
-    `accumulate_evidence`; upper_bound_decay, has_error_map: `evaluate_hypotheses`.
+    regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response`;
+    evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor, has_error_map:
+    `evaluate_hypotheses`.
     """
     advance_covariance(block, dt)
     if block.alarm_level > 0.0:
         fill_uncertainty_response(block, uncertainty_bound, dt)
-    whiten(block, block.state, block.frame_innovation, dt, block.innovation)
+    whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
     if block.no_gust_filter.n_axes > 0:
-        fill_calm_air_prediction(block, dt)
+        fill_predictable_innovation(block, dt)
     if block.has_coarse_gust_estimate:
         whiten(
             block, block.coarse_gust_filter_state, block.coarse_gust_response, dt, block.coarse_gust_response
         )
     if has_regressors:
         whiten_regressors(block, dt)
-    accumulate_evidence(block, has_regressors, dt, evidence_decay)
-    evaluate_hypotheses(block, upper_bound_decay, has_error_map)
+    accumulate_evidence(block, has_regressors, dt, evidence_decay_factor)
+    evaluate_hypotheses(block, upper_bound_decay_factor, has_error_map)
 
 
 @kernel
@@ -714,5 +793,5 @@ def set_block_coarse_gust_acceleration(block, acceleration):
 
     `update_block` whitens it in place.
     """
-    for i, axis in enumerate(block.axis[: block.n_axes]):
+    for i, axis in enumerate(block.axes[: block.n_axes]):
         block.coarse_gust_response[i] = acceleration[axis]

@@ -154,7 +154,7 @@ def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regre
     tone_tests, block = view.tone_tests, view.block
     n_regressors = block.n_regressors if has_regressors else 0
     inverse_std = np.sqrt(block.S_inverse[0, 0]) if within_envelope else 0.0
-    tone_tests.innovation_sum += inverse_std * block.innovation[0]
+    tone_tests.innovation_sum += inverse_std * block.whitened_innovation[0]
     for j in range(n_regressors):
         tone_tests.regressor_sums[j] += inverse_std * block.regressor_response[j, 0]
     tone_tests.frames_since_update += 1
@@ -925,9 +925,9 @@ def fill_block_signatures(blocks, Gu, alpha_cubed_acceleration):
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             for i in range(block.n_axes):
                 if hypothesis.surface >= 0:
-                    hypothesis.signature[i] = Gu[block.axis[i], hypothesis.surface]
+                    hypothesis.signature[i] = Gu[block.axes[i], hypothesis.surface]
                 elif hypothesis.kind == STEP_FAULT:
-                    hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axis[i] else 0.0
+                    hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axes[i] else 0.0
                 else:
                     hypothesis.signature[i] = alpha_cubed_acceleration
 

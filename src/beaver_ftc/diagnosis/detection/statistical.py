@@ -281,7 +281,7 @@ def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Airc
         block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
         block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
         for i, axis in enumerate(axes):
-            block["axis"][i] = axis
+            block["axes"][i] = axis
             variance = max(errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
             block["gyro_noise_variance"][i] = block["P_xx"][i, i] = variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
@@ -569,7 +569,7 @@ def update_blocks(
     for b, block in enumerate(blocks):
         if not is_alarm_latched:
             likelihood.reset_onset_slot(block, slot)
-        for i, axis in enumerate(block.axis[: block.n_axes]):
+        for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
         block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
         if gust.config.only_coarse_estimate:
@@ -579,7 +579,9 @@ def update_blocks(
             if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
-                block.no_gust_filter.innovation[:] = blocks[LATERAL_BLOCK].no_gust_filter.innovation
+                block.no_gust_filter.whitened_innovation[:] = blocks[
+                    LATERAL_BLOCK
+                ].no_gust_filter.whitened_innovation
         upper_bound_decay = test_config.evidence_decay_factor if may_loss_end else 0.0
         likelihood.update_block(
             block,
@@ -599,7 +601,7 @@ def add_gust_axes_turn_to_drift_covariance(gust, block):
         for j in range(block.n_axes):
             block.P_dd[i, j] += (
                 block.drift_intensity_scale
-                * gust.output.acceleration_variance_by_axes_turn[block.axis[i], block.axis[j]]
+                * gust.output.acceleration_variance_by_axes_turn[block.axes[i], block.axes[j]]
             )
 
 
@@ -607,12 +609,12 @@ def add_gust_axes_turn_to_drift_covariance(gust, block):
 def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_faults, dt):
     """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
-        for i, axis in enumerate(block.axis[: block.n_axes]):
+        for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = (
                 innovation_after_known_faults[axis] - gust.output.mean_gust_acceleration[axis]
             )
         likelihood.whiten(
-            block, block.residual_filter_state, block.frame_innovation, dt, block.frame_innovation
+            block, block.filter_state_after_known_faults, block.frame_innovation, dt, block.frame_innovation
         )
 
 
@@ -623,8 +625,8 @@ def fill_statistical_unmodelled_acceleration(blocks, gust, out):
     It is the estimated drift plus the effect of the gust estimated from the vanes.
     """
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
-        for i, axis in enumerate(block.axis[: block.n_axes]):
-            out[axis] = block.residual_filter_state[2 + i] + gust.output.gust_acceleration[axis]
+        for i, axis in enumerate(block.axes[: block.n_axes]):
+            out[axis] = block.filter_state_after_known_faults[2 + i] + gust.output.gust_acceleration[axis]
 
 
 @kernel
@@ -905,12 +907,12 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
                 bound.model_error_map, bound.model_error_map.n_levels - 1, i
             )
     for b, block in enumerate(blocks):
-        for i, axis in enumerate(block.axis[: block.n_axes]):
+        for i, axis in enumerate(block.axes[: block.n_axes]):
             for j in range(block.n_axes):
                 block.drift_intensity[i, j] = 0.0
                 if gust.output.accounts_for_gusts:
                     gust_drift = gusts.unmeasured_gust_drift_intensity(
-                        gust, V, axis, block.axis[j], b == likelihood.MEAN_REVERTING_LATERAL_BLOCK
+                        gust, V, axis, block.axes[j], b == likelihood.MEAN_REVERTING_LATERAL_BLOCK
                     )
                     block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift
             drift_bound = max(uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)

@@ -577,14 +577,16 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
 
 
 @kernel
-def fill_frame_mean_gust(gust, frame_share):
+def fill_frame_mean_gust(gust, frame_share_per_instant):
     """Fill `mean_gust_acceleration` and `acceleration_variance_by_axes_turn` for the elapsed frame.
 
-    frame_share: one over the number of instants. Axes may turn in the middle of a frame. A part of the
-    effect is then in this frame and the rest in the next, so the variance counts in both frames.
+    frame_share_per_instant: one over the number of instants. Axes may turn in the middle of a frame. A part
+    of the effect is then in this frame and the rest in the next, so the variance counts in both frames.
     """
     for i in range(3):
-        gust.output.mean_gust_acceleration[i] = frame_share * gust.memory.gust_angular_acceleration_sum[i]
+        gust.output.mean_gust_acceleration[i] = (
+            frame_share_per_instant * gust.memory.gust_angular_acceleration_sum[i]
+        )
     if gust.memory.n_frames_left_with_axes_turn_variance > 0:
         gust.memory.n_frames_left_with_axes_turn_variance -= 1
         for i in range(3):

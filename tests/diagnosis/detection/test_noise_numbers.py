@@ -96,7 +96,7 @@ def returning(rapidity, moving=1, rolling=200.0, rate_hz=50.0):
         rapidity,
         6.0,
     )
-    return statistical.drift_correlation_length(record, V, rate_hz, moving * rolling)
+    return statistical.derive_drift_correlation_length_m(record, V, rate_hz, moving * rolling)
 
 
 def test_a_drift_returns_so_soon_that_a_swing_takes_half_the_level():
@@ -193,7 +193,7 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     rolling = sqrt(0.3048 * 1750.0 * SPAN_M) / 2.6
     assert air["config"]["rolling_gust_correlation_length"] == pytest.approx(rolling)
     assert last["drift_correlation_length_m"] == pytest.approx(
-        statistical.drift_correlation_length(alone.detector, V, 50.0, rolling)
+        statistical.derive_drift_correlation_length_m(alone.detector, V, 50.0, rolling)
     )
     assert last["drift_intensity_scale"] == pytest.approx((rolling / last["drift_correlation_length_m"]) ** 2)
     assert [float(block["drift_intensity_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
@@ -435,7 +435,7 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
-    record.noise.base_change_over_bound_per_frame = 0.02
+    record.noise.base_uncertainty_change_over_bound = 0.02
     rng = np.random.default_rng(1)
     steps = rng.dirichlet(np.ones(20)) * 0.25
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
@@ -458,7 +458,7 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
-    record.noise.base_change_over_bound_per_frame, paces = 0.02, []
+    record.noise.base_uncertainty_change_over_bound, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
         statistical.update_uncertainty_change(record.noise, record.block, error_map, np.array(u))
         paces.append(float(record.block[1].uncertainty_change_over_bound_per_frame))

@@ -115,16 +115,21 @@ def axes_and_hypotheses_by_block(
 ) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
     are held against. Roll and yaw are there twice, see above."""
-    pitch = (
+    pitch_hypotheses = (
         *_loss_hypotheses(aircraft, PITCH_AXES),
         *_step_fault_hypotheses(PITCH_AXES),
         (ALPHA_CUBED_EFFECT, -1, 1, 0),
     )
-    lateral = (*_loss_hypotheses(aircraft, LATERAL_AXES), *_step_fault_hypotheses(LATERAL_AXES))
-    pitch, lateral = (
-        (*hypotheses, *_growing_and_ending_hypotheses(hypotheses)) for hypotheses in (pitch, lateral)
+    lateral_hypotheses = (*_loss_hypotheses(aircraft, LATERAL_AXES), *_step_fault_hypotheses(LATERAL_AXES))
+    pitch_hypotheses, lateral_hypotheses = (
+        (*hypotheses, *_growing_and_ending_hypotheses(hypotheses))
+        for hypotheses in (pitch_hypotheses, lateral_hypotheses)
     )
-    return (PITCH_AXES, pitch), (LATERAL_AXES, lateral), (LATERAL_AXES, lateral)
+    return (
+        (PITCH_AXES, pitch_hypotheses),
+        (LATERAL_AXES, lateral_hypotheses),
+        (LATERAL_AXES, lateral_hypotheses),
+    )
 
 
 def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
@@ -133,31 +138,38 @@ def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[Hypo
             yield LOSS, s, axis, 1
 
 
-def _growing_and_ending_hypotheses(members: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
-    losses = [(surface, axis) for kind, surface, axis, _ in members if kind == LOSS]
-    return ((kind, surface, axis, 0) for surface, axis in losses for kind in (GROWING_LOSS, LOSS_END))
+def _growing_and_ending_hypotheses(hypotheses: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
+    surface_and_axis_of_losses = [(surface, axis) for kind, surface, axis, _ in hypotheses if kind == LOSS]
+    return (
+        (kind, surface, axis, 0)
+        for surface, axis in surface_and_axis_of_losses
+        for kind in (GROWING_LOSS, LOSS_END)
+    )
 
 
 def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
     return ((STEP_FAULT, -1, axis, 1) for axis in axes)
 
 
-def n_tests_per_frame(aircraft: Aircraft, *views: ParityDirection) -> int:
+def n_tests_per_frame(aircraft: Aircraft, *parity_directions: ParityDirection) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included."""
-    kinds = [
+    alarm_hypothesis_kinds = [
         kind
-        for _, members in axes_and_hypotheses_by_block(aircraft)
-        for kind, _, _, alarms in members
-        if alarms
+        for _, hypotheses in axes_and_hypotheses_by_block(aircraft)
+        for kind, _, _, raises_alarm in hypotheses
+        if raises_alarm
     ]
     n_tone_tests = 0
-    for view in views:
-        if view.orthogonal_to_surface >= 0 and any(view.direction[SIDE_FORCE:]):
-            kinds += [STEP_FAULT, *(LOSS for _ in view.surfaces_tested_for_loss)]
+    for parity_direction in parity_directions:
+        if parity_direction.orthogonal_to_surface >= 0 and any(parity_direction.direction[SIDE_FORCE:]):
+            alarm_hypothesis_kinds += [STEP_FAULT, *(LOSS for _ in parity_direction.surfaces_tested_for_loss)]
             n_tone_tests += N_TONE_FREQUENCIES
-        elif view.orthogonal_to_surface == AXIS_VIEW and not view.uses_inertial_flow_angle:
+        elif (
+            parity_direction.orthogonal_to_surface == AXIS_VIEW
+            and not parity_direction.uses_inertial_flow_angle
+        ):
             n_tone_tests += N_TONE_FREQUENCIES
-    return N_ONSET_SLOTS * sum(N_TESTED_SIGNS_BY_KIND[kind] for kind in kinds) + n_tone_tests
+    return N_ONSET_SLOTS * sum(N_TESTED_SIGNS_BY_KIND[kind] for kind in alarm_hypothesis_kinds) + n_tone_tests
 
 
 def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
@@ -187,46 +199,58 @@ def configure_statistical_detector(
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
-    statistical, settings = fdi["statistical"], config.statistical
+    statistical, statistical_settings = fdi["statistical"], config.statistical
     statistical["alarm"]["detected_at_s"] = -1.0
-    if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
+    if statistical_settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
     test_config, gust, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
-    errors, dt_s, n_instants = declared.sensors, 1.0 / rate_hz, int(fdi["config"]["n_substeps"])
+    sensor_errors, dt_s = declared.sensors, 1.0 / rate_hz
+    n_instants_per_frame = int(fdi["config"]["n_substeps"])
     airspeed_mps = float(trim[1][AIRSPEED])
-    uncertainty_change = uncertainty_change_over_bound_per_frame(settings, aircraft, dt_s)
-    test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants, 1)
+    uncertainty_change_over_bound = uncertainty_change_over_bound_per_frame(
+        statistical_settings, aircraft, dt_s
+    )
+    test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
     test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
-    statistical["forces"]["in_use"] = forces = declared.uses_accelerometers
+    statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust, declared, mass)
-    uses_parity_views = config.compares_across(n_instants)
+    uses_parity_views = config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
-        aircraft, *(parity_directions_of(aircraft, forces) if uses_parity_views else ())
+        aircraft, *(parity_directions_of(aircraft, uses_forces) if uses_parity_views else ())
     )
-    test_config["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
+    test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
     configure_speed_error(gust, declared, float(test_config["alarm_level"]), airspeed_mps)
-    test_config["isolation_llr_margin"] = derive_isolation_llr_margin(settings.misnaming, rate_hz, aircraft)
-    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
-    _configure_blocks(statistical, errors, aircraft)
-    _configure_bounded_uncertainty(statistical, config, declared, uncertainty_change, dt_s)
-    statistical["noise"]["base_change_over_bound_per_frame"] = settings.uncertainty_rad_s * dt_s
-    _configure_drift_and_model_noise(
-        statistical, drift_uncertainty_frequency_rad_s(settings, aircraft), declared, design, trim, dt_s
+    test_config["isolation_llr_margin"] = derive_isolation_llr_margin(
+        statistical_settings.misnaming, rate_hz, aircraft
     )
-    tolerance = moment_term_tolerances(declared, design, mass, *trim[1:])
-    _configure_regressor_tolerances(statistical, aircraft, tolerance)
-    configure_reading_regressors(statistical, errors, fdi["bound"]["declared_errors"])
+    test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
+    _configure_blocks(statistical, sensor_errors, aircraft)
+    _configure_bounded_uncertainty(statistical, config, declared, uncertainty_change_over_bound, dt_s)
+    statistical["noise"]["base_uncertainty_change_over_bound"] = statistical_settings.uncertainty_rad_s * dt_s
+    _configure_drift_and_model_noise(
+        statistical,
+        drift_uncertainty_frequency_rad_s(statistical_settings, aircraft),
+        declared,
+        design,
+        trim,
+        dt_s,
+    )
+    term_tolerances = moment_term_tolerances(declared, design, mass, *trim[1:])
+    _configure_regressor_tolerances(statistical, aircraft, term_tolerances)
+    configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
-        false_alarm_probability = settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
+        false_alarm_probability_per_test = statistical_settings.false_alarms_per_h / (
+            3600.0 * rate_hz * n_tests
+        )
         configure_tone_tests(
             statistical["tone_config"],
-            false_alarm_probability,
+            false_alarm_probability_per_test,
             airspeed_mps,
-            uncertainty_change * rate_hz,
+            uncertainty_change_over_bound * rate_hz,
             dt_s,
         )
-        if forces:
+        if uses_forces:
             acceleration_slopes_by_y = jacobian(design, *trim)[3]
             configure_forces(fdi, declared, trim, acceleration_slopes_by_y, dt_s)
             gust["output"][
@@ -241,68 +265,74 @@ def configure_statistical_detector(
             )
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
-    rolling_gust_length_m = (
+    rolling_gust_correlation_length_m = (
         float(gust["config"]["rolling_gust_correlation_length"])
         if gust["output"]["accounts_for_gusts"]
         else 0.0
     )
-    gust_lengths_m = (
+    gust_correlation_lengths_m = (
         rotation_lengths(gust["config"]["wing_span"])
         if gust["config"]["only_coarse_estimate"]
-        else [rolling_gust_length_m]
+        else [rolling_gust_correlation_length_m]
     )
-    mean_reverting_block["drift_correlation_length_m"] = drift_correlation_length(
-        statistical, airspeed_mps, rate_hz, float(min(gust_lengths_m))
+    mean_reverting_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
+        statistical, airspeed_mps, rate_hz, float(min(gust_correlation_lengths_m))
     )
     if gust["output"]["accounts_for_gusts"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
-        for name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
-            statistical["block"]["no_gust_filter"][name] = statistical["block"][name]
+        for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
+            statistical["block"]["no_gust_filter"][field_name] = statistical["block"][field_name]
         mean_reverting_block["drift_intensity_scale"] = (
-            rolling_gust_length_m / mean_reverting_block["drift_correlation_length_m"]
+            rolling_gust_correlation_length_m / mean_reverting_block["drift_correlation_length_m"]
         ) ** 2
         if not gust["output"]["is_gust_measured"]:
-            pitching_gust_length_m = float(rotation_lengths(gust["config"]["wing_span"])[1])
-            pitch_block["drift_correlation_length_m"] = drift_correlation_length(
-                statistical, airspeed_mps, rate_hz, pitching_gust_length_m
+            pitching_gust_correlation_length_m = float(rotation_lengths(gust["config"]["wing_span"])[1])
+            pitch_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
+                statistical, airspeed_mps, rate_hz, pitching_gust_correlation_length_m
             )
             pitch_block["drift_intensity_scale"] = (
-                pitching_gust_length_m / pitch_block["drift_correlation_length_m"]
+                pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
             ) ** 2
-        add_gust_estimate_noise(statistical, errors, design, *trim[1:], dt_s)
+        add_gust_estimate_noise(statistical, sensor_errors, design, *trim[1:], dt_s)
 
 
-def _configure_blocks(statistical: np.void, errors: SensorErrors, aircraft: Aircraft) -> None:
+def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
     blocks = axes_and_hypotheses_by_block(aircraft)
-    losses = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
-    statistical["test_config"]["n_score_columns"] = len(losses) + len(AXES)
-    for block, (axes, members) in zip(statistical["block"], blocks, strict=True):
-        block["n_axes"], block["n_hypotheses"] = len(axes), len(members)
+    loss_surfaces = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
+    statistical["test_config"]["n_score_columns"] = len(loss_surfaces) + len(AXES)
+    for block, (axes, hypothesis_entries) in zip(statistical["block"], blocks, strict=True):
+        block["n_axes"], block["n_hypotheses"] = len(axes), len(hypothesis_entries)
         block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
         block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axes"][i] = axis
-            variance = max(errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
-            block["gyro_noise_variance"][i] = block["P_xx"][i, i] = variance
+            gyro_noise_variance = max(sensor_errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
+            block["gyro_noise_variance"][i] = block["P_xx"][i, i] = gyro_noise_variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
-        likelihood.set_supporting_correlation_signs(block, [kind for kind, *_ in members])
-        for hypothesis, (kind, surface, axis, alarms) in zip(block["hypothesis"], members, strict=False):
+        likelihood.set_supporting_correlation_signs(block, [kind for kind, *_ in hypothesis_entries])
+        for hypothesis, (kind, surface, axis, raises_alarm) in zip(
+            block["hypothesis"], hypothesis_entries, strict=False
+        ):
             hypothesis["kind"], hypothesis["surface"] = kind, surface
-            hypothesis["axis"], hypothesis["raises_alarm"] = axis, alarms
-            hypothesis["score_column_index"] = losses.index(surface) if kind == LOSS else len(losses) + axis
+            hypothesis["axis"], hypothesis["raises_alarm"] = axis, raises_alarm
+            hypothesis["score_column_index"] = (
+                loss_surfaces.index(surface) if kind == LOSS else len(loss_surfaces) + axis
+            )
 
 
-def uncertainty_change_over_bound_per_frame(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
+def uncertainty_change_over_bound_per_frame(
+    statistical_settings: Statistical, aircraft: Aircraft, dt_s: float
+) -> float:
     """Largest change of a bounded uncertainty within a frame, over its bound.
 
     The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
     from one end of the bound to the other. If the error is mapped, its rate of change is worked out in flight
     (`statistical.update_uncertainty_change`).
     """
-    return 2.0 if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
+    return 2.0 if any(aircraft.model_error_rad_s2) else statistical_settings.uncertainty_rad_s * dt_s
 
 
-def drift_uncertainty_frequency_rad_s(settings: Statistical, aircraft: Aircraft) -> float:
+def drift_uncertainty_frequency_rad_s(statistical_settings: Statistical, aircraft: Aircraft) -> float:
     """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
     The evidence that the uncertainty explains is bounded by its declared rate of change in any case
@@ -311,14 +341,18 @@ def drift_uncertainty_frequency_rad_s(settings: Statistical, aircraft: Aircraft)
     error of the model.
     """
     return (
-        min(MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S, settings.uncertainty_rad_s)
+        min(MAX_DRIFT_FREQUENCY_WITH_DAMAGE_RAD_S, statistical_settings.uncertainty_rad_s)
         if aircraft.loses_surfaces
-        else settings.uncertainty_rad_s
+        else statistical_settings.uncertainty_rad_s
     )
 
 
 def _configure_bounded_uncertainty(
-    statistical: np.void, config: FdiConfig, declared: Declared, uncertainty_change: float, dt_s: float
+    statistical: np.void,
+    config: FdiConfig,
+    declared: Declared,
+    uncertainty_change_over_bound: float,
+    dt_s: float,
 ) -> None:
     """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
     not grow."""
@@ -326,7 +360,7 @@ def _configure_bounded_uncertainty(
     for block in statistical["block"]:
         block["alarm_level"] = statistical["test_config"]["alarm_level"]
         block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
-        block["uncertainty_change_over_bound_per_frame"] = uncertainty_change
+        block["uncertainty_change_over_bound_per_frame"] = uncertainty_change_over_bound
         kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
@@ -343,20 +377,20 @@ def _configure_drift_and_model_noise(
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
     u."""
-    errors = declared.sensors.each("random")
-    gyro_noise_std = float(errors[:3].max())
-    max_bound = max(declared.constant_rad_s2)
+    reading_noise_std = declared.sensors.each("random")
+    gyro_noise_std = float(reading_noise_std[:3].max())
+    max_constant_error_bound = max(declared.constant_rad_s2)
     alarm_level = float(statistical["test_config"]["alarm_level"])
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
-        max_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
+        max_constant_error_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
     _, G, f_x, f_y = jacobian(design, *trim)
-    statistical["noise"]["acceleration_variance_without_air_data"] = f_x**2 @ errors[:3] ** 2
-    air_data_variance = (
-        f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ errors[3:] ** 2
+    statistical["noise"]["acceleration_variance_without_air_data"] = f_x**2 @ reading_noise_std[:3] ** 2
+    acceleration_variance_by_air_data = (
+        f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
     )  # later as `add_reading_regressors` says
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
-        statistical["noise"]["acceleration_variance_without_air_data"] + air_data_variance
+        statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
     )
     statistical["noise"]["deflection_error_effect_bound"] = (
         np.abs(G).sum(axis=1) * declared.actuators.deflection_rad
@@ -376,13 +410,23 @@ def derive_drift_intensity_over_squared_bound(
     takes up no more than the other half. eta_bar rad/s2; omega, noise rad/s; level in standard deviations.
     """
     eta_bar = max(eta_bar, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
-    swing = 8.0 * sqrt(2.0) * (eta_bar * uncertainty_frequency_rad_s / alarm_level) ** 2  # of i w0
-    ramp = 4.0 * (1.204 * eta_bar / alarm_level) ** 2 * uncertainty_frequency_rad_s
-    walk = (swing * (gyro_noise_std**2 * dt_s) ** 0.25) ** 0.8
-    return max(hypot(walk, ramp), swing * dt_s) / eta_bar**2
+    intensity_times_bandwidth_of_step_test = (
+        8.0 * sqrt(2.0) * (eta_bar * uncertainty_frequency_rad_s / alarm_level) ** 2
+    )  # of i w0
+    intensity_for_loss_test = 4.0 * (1.204 * eta_bar / alarm_level) ** 2 * uncertainty_frequency_rad_s
+    intensity_for_step_test = (
+        intensity_times_bandwidth_of_step_test * (gyro_noise_std**2 * dt_s) ** 0.25
+    ) ** 0.8
+    return (
+        max(
+            hypot(intensity_for_step_test, intensity_for_loss_test),
+            intensity_times_bandwidth_of_step_test * dt_s,
+        )
+        / eta_bar**2
+    )
 
 
-def drift_correlation_length(
+def derive_drift_correlation_length_m(
     statistical: np.void, airspeed_mps: float, rate_hz: float, gust_correlation_length_m: float
 ) -> float:
     """Return length, m, of the drift in the second block of roll and yaw, or of pitch without gust estimate.
@@ -396,71 +440,84 @@ def drift_correlation_length(
     if statistical["noise"]["drift_intensity_over_squared_bound"] == 0.0:
         # 0 in still air: nothing is declared that drifts, and the two views are one
         return gust_correlation_length_m
-    longest_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
+    longest_window_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
     alarm_level = float(statistical["test_config"]["alarm_level"])
-    lag_s = sqrt(2.0 * longest_s / statistical["noise"]["drift_intensity_over_squared_bound"]) / alarm_level
-    return min(airspeed_mps * lag_s, gust_correlation_length_m or np.inf)
+    drift_lag_s = (
+        sqrt(2.0 * longest_window_s / statistical["noise"]["drift_intensity_over_squared_bound"])
+        / alarm_level
+    )
+    return min(airspeed_mps * drift_lag_s, gust_correlation_length_m or np.inf)
 
 
-def _configure_regressor_tolerances(statistical: np.void, aircraft: Aircraft, tolerance: np.ndarray) -> None:
+def _configure_regressor_tolerances(
+    statistical: np.void, aircraft: Aircraft, term_tolerances: np.ndarray
+) -> None:
     """Fill the tolerances of unknown constants: coefficients, inertia, steady sensor errors."""
-    axis = np.array([moment_axis_of_term(term) for term in aircraft.moments])
+    axis_of_term = np.array([moment_axis_of_term(term) for term in aircraft.moments])
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
-        block_tolerance = tolerance[np.isin(axis, axes)]
-        block["regressor_tolerance"][: block_tolerance.size] = block_tolerance
-    statistical["test_config"]["has_regressors"] = bool(np.any(tolerance))
+        block_term_tolerances = term_tolerances[np.isin(axis_of_term, axes)]
+        block["regressor_tolerance"][: block_term_tolerances.size] = block_term_tolerances
+    statistical["test_config"]["has_regressors"] = bool(np.any(term_tolerances))
 
 
 def configure_reading_regressors(
-    statistical: np.void, errors: SensorErrors, declared_errors: np.void
+    statistical: np.void, sensor_errors: SensorErrors, declared_errors: np.void
 ) -> None:
     """Add the readings of the air data to the regressors of the blocks."""
-    steady_error, noise_std = np.zeros(N_INPUT_READINGS), statistical["noise"]["reading_noise_std"]
-    for name, reading_index in _READING_INDEX_BY_SENSOR.items():
-        steady_error[reading_index], noise_std[reading_index] = errors[name].steady, errors[name].random
-    steady_error[_ENGINE_POWER_READING_INDEX] = declared_errors[
+    steady_error_bound = np.zeros(N_INPUT_READINGS)
+    reading_noise_std = statistical["noise"]["reading_noise_std"]
+    for sensor_name, reading_index in _READING_INDEX_BY_SENSOR.items():
+        steady_error_bound[reading_index] = sensor_errors[sensor_name].steady
+        reading_noise_std[reading_index] = sensor_errors[sensor_name].random
+    steady_error_bound[_ENGINE_POWER_READING_INDEX] = declared_errors[
         "engine_power_error_kw"
     ]  # all of it: so many standard deviations are part of that
-    noise_std[_ENGINE_POWER_READING_INDEX] = declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
-    if not (steady_error.any() or noise_std.any()):
+    reading_noise_std[_ENGINE_POWER_READING_INDEX] = (
+        declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
+    )
+    if not (steady_error_bound.any() or reading_noise_std.any()):
         return
     statistical["noise"]["has_reading_errors"] = statistical["test_config"]["has_regressors"] = 1
     for block in statistical["block"]:
-        first_regressor = int(block["n_regressors"])
-        block["n_regressors"] = first_regressor + N_INPUT_READINGS
-        block["regressor_tolerance"][first_regressor : first_regressor + N_INPUT_READINGS] = steady_error
+        first_reading_regressor_index = int(block["n_regressors"])
+        block["n_regressors"] = first_reading_regressor_index + N_INPUT_READINGS
+        block["regressor_tolerance"][
+            first_reading_regressor_index : first_reading_regressor_index + N_INPUT_READINGS
+        ] = steady_error_bound
 
 
 @kernel
-def fill_signal_change_per_reading(table, declared_errors, y, reading_index, signal_change):
-    """Fill signal_change (N_SIGNALS,) with the change of a table's signals per unit of a reading."""
-    signal_change[:] = 0.0
+def fill_signal_change_per_reading(
+    moment_table, declared_errors, y, reading_index, signal_change_per_reading
+):
+    """Fill signal_change_per_reading (N_SIGNALS,): change of a table's signals per unit of a reading."""
+    signal_change_per_reading[:] = 0.0
     if reading_index < AIRSPEED:  # a vane
-        signal_change[reading_index] = 1.0
+        signal_change_per_reading[reading_index] = 1.0
     if reading_index == AIRSPEED:
         for k in range(PH, RH + 1):
-            signal_change[k] = -table.signal[k] / y[AIRSPEED]
+            signal_change_per_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
     if declared_errors.has_engine_errors and reading_index >= AIRSPEED:
-        slope_by_airspeed, slope_by_pressure, slope_per_kw = slipstream_slopes(
+        slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
             y, declared_errors.density_power_error_kw
         )
-        other_slope = slope_by_pressure if reading_index == QDYN else slope_per_kw
-        signal_change[_SLIPSTREAM_SIGNAL_INDEX] = (
-            slope_by_airspeed if reading_index == AIRSPEED else other_slope
+        slipstream_per_other_reading = slipstream_per_pressure if reading_index == QDYN else slipstream_per_kw
+        signal_change_per_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
+            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_other_reading
         )
 
 
 @kernel
-def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_change, out):
+def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_change_per_reading, out):
     """Fill out (3,) rad/s2 with the change of the accelerations per unit of a reading.
 
-    monomial_change: the change of the monomials per unit of it.
+    monomial_change_per_reading: the change of the monomials per unit of it.
     """
-    table, dynamic_force = design.moments, y[QDYN] * design.S
+    moment_table, dynamic_force = design.moments, y[QDYN] * design.S
     for i in range(3):
-        out[i] = whole_sum(table, i, monomial_change, u)
+        out[i] = whole_sum(moment_table, i, monomial_change_per_reading, u)
         if reading_index == QDYN:
-            out[i] += whole_sum(table, i, table.power, u) / y[QDYN]
+            out[i] += whole_sum(moment_table, i, moment_table.power, u) / y[QDYN]
     L = dynamic_force * design.b * out[0]
     M = dynamic_force * design.c * out[1]
     N = dynamic_force * design.b * out[2]
@@ -468,35 +525,43 @@ def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_c
 
 
 @kernel
-def add_reading_regressors(frame_share, noise_model, blocks, declared_errors, design, y, u):
-    """Add this instant, a `frame_share` of the frame, to the readings' regressors, rad/s2 per unit, and fill
-    the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
-    table, out = design.moments, noise_model.acceleration_change_per_reading
+def add_reading_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u):
+    """Add this instant, a `frame_share_per_instant` of the frame, to the readings' regressors, rad/s2 per
+    unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
+    moment_table = design.moments
+    acceleration_change_per_reading = noise_model.acceleration_change_per_reading
     noise_model.acceleration_variance_by_input_noise[:] = noise_model.acceleration_variance_without_air_data
     for reading_index in range(N_INPUT_READINGS):
         fill_signal_change_per_reading(
-            table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
+            moment_table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
         )
         directional(
-            table,
-            table.signal,
-            table.power,
+            moment_table,
+            moment_table.signal,
+            moment_table.power,
             noise_model.signal_change_per_reading,
             noise_model.monomial_change_per_reading,
         )
         fill_acceleration_change_per_reading(
-            design, y, u, reading_index, noise_model.monomial_change_per_reading, out
+            design,
+            y,
+            u,
+            reading_index,
+            noise_model.monomial_change_per_reading,
+            acceleration_change_per_reading,
         )
         for i in range(3):
             noise_model.acceleration_variance_by_input_noise[i] += (
-                out[i] * noise_model.reading_noise_std[reading_index]
+                acceleration_change_per_reading[i] * noise_model.reading_noise_std[reading_index]
             ) ** 2
-        pitch = blocks[likelihood.PITCH_BLOCK]
-        pitch.regressor[pitch.n_regressors - N_INPUT_READINGS + reading_index, 0] += frame_share * out[1]
-        for block in blocks[LATERAL_BLOCK:]:
-            j = block.n_regressors - N_INPUT_READINGS + reading_index
-            block.regressor[j, 0] += frame_share * out[0]
-            block.regressor[j, 1] += frame_share * out[2]
+        pitch_block = blocks[likelihood.PITCH_BLOCK]
+        pitch_block.regressor[pitch_block.n_regressors - N_INPUT_READINGS + reading_index, 0] += (
+            frame_share_per_instant * acceleration_change_per_reading[1]
+        )
+        for lateral_block in blocks[LATERAL_BLOCK:]:
+            j = lateral_block.n_regressors - N_INPUT_READINGS + reading_index
+            lateral_block.regressor[j, 0] += frame_share_per_instant * acceleration_change_per_reading[0]
+            lateral_block.regressor[j, 1] += frame_share_per_instant * acceleration_change_per_reading[2]
 
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
@@ -524,7 +589,7 @@ NOISE_RECORD = record(
     # of the drift that represents a bounded uncertainty, over bound squared, 1/s
     drift_intensity_over_squared_bound=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
-    base_change_over_bound_per_frame=float,
+    base_uncertainty_change_over_bound=float,
     uncertainty_bound=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
     additional_bound_for_surface_anywhere=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
@@ -558,17 +623,25 @@ def statistical_dtype(size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dty
 
 @kernel
 def update_blocks(
-    test_config, uncertainty_bound, blocks, gust, innovation, dt, frame, is_alarm_latched, may_loss_end=False
+    test_config,
+    uncertainty_bound,
+    blocks,
+    gust,
+    innovation,
+    dt,
+    frame_index,
+    is_alarm_latched,
+    may_loss_end=False,
 ):
     """Update the blocks with frame k, of dt s: innovation and bound `uncertainty_bound`, both (3,) rad/s2.
 
     is_alarm_latched: the detector has raised its alarm; may_loss_end: a loss may end.
     """
-    evidence_decay = test_config.evidence_decay_factor if is_alarm_latched else 1.0
-    slot = likelihood.onset_slot_to_reset(frame)
-    for b, block in enumerate(blocks):
+    evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
+    onset_slot = likelihood.onset_slot_to_reset(frame_index)
+    for block_index, block in enumerate(blocks):
         if not is_alarm_latched:
-            likelihood.reset_onset_slot(block, slot)
+            likelihood.reset_onset_slot(block, onset_slot)
         for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
         block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
@@ -576,20 +649,20 @@ def update_blocks(
             likelihood.set_block_coarse_gust_acceleration(block, gust.output.coarse_gust_acceleration)
         if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)
-            if b < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
+            if block_index < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 block.no_gust_filter.whitened_innovation[:] = blocks[
                     LATERAL_BLOCK
                 ].no_gust_filter.whitened_innovation
-        upper_bound_decay = test_config.evidence_decay_factor if may_loss_end else 0.0
+        upper_bound_decay_factor = test_config.evidence_decay_factor if may_loss_end else 0.0
         likelihood.update_block(
             block,
             uncertainty_bound,
             test_config.has_regressors,
             dt,
-            evidence_decay,
-            upper_bound_decay,
+            evidence_decay_factor,
+            upper_bound_decay_factor,
             test_config.has_error_map,
         )
 
@@ -664,9 +737,9 @@ def update_max_alarm_score(alarm):
 @kernel
 def keep_largest_alarm_score(alarm, alarm_level, score, axis):
     """Keep a score if it is the largest."""
-    score_over_level = score / alarm_level
-    if score_over_level > alarm.score_over_alarm_level:
-        alarm.score_over_alarm_level, alarm.axis = score_over_level, axis
+    score_over_alarm_level = score / alarm_level
+    if score_over_alarm_level > alarm.score_over_alarm_level:
+        alarm.score_over_alarm_level, alarm.axis = score_over_alarm_level, axis
 
 
 @kernel
@@ -675,17 +748,17 @@ def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
 
     Scores of forces and of oscillations are in the column of the step on their axis.
     """
-    first_column = row.size - test_config.n_score_columns
-    row[first_column:] = 0.0
+    first_score_column = row.size - test_config.n_score_columns
+    row[first_score_column:] = 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.raises_alarm:
-                column = first_column + hypothesis.score_column_index
-                row[column] = max(row[column], hypothesis.score / test_config.alarm_level)
+                score_column = first_score_column + hypothesis.score_column_index
+                row[score_column] = max(row[score_column], hypothesis.score / test_config.alarm_level)
     for view in views:
-        column = row.size - 3 + view.alarm_axis
-        row[column] = max(
-            row[column],
+        score_column = row.size - 3 + view.alarm_axis
+        row[score_column] = max(
+            row[score_column],
             parity.view_alarm_score(view, views, test_config, forces, gust) / test_config.alarm_level,
         )
 
@@ -697,23 +770,28 @@ def is_loss_not_excluded(estimators, loss_estimator, surface):
 
 
 @kernel
-def best_alternative_llr_lower_bound(block, estimators, loss_estimator, surface, includes_excluded=False):
+def best_alternative_llr_lower_bound(
+    block, estimators, loss_estimator, surface, includes_excluded_losses=False
+):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
-    Excluded losses are no alternatives, unless `includes_excluded`: as evidence decays, an uncertainty that
-    correlates with the commands may support them again.
+    Excluded losses are no alternatives, unless `includes_excluded_losses`: as evidence decays, an uncertainty
+    that correlates with the commands may support them again.
     """
-    best_bound = 0.0
+    largest_lower_bound = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.kind in (GROWING_LOSS, LOSS_END):
             continue
-        other = hypothesis.surface
+        alternative_surface = hypothesis.surface
         if hypothesis.kind != LOSS or (
-            other != surface
-            and (includes_excluded or is_loss_not_excluded(estimators, loss_estimator, other))
+            alternative_surface != surface
+            and (
+                includes_excluded_losses
+                or is_loss_not_excluded(estimators, loss_estimator, alternative_surface)
+            )
         ):
-            best_bound = max(best_bound, hypothesis.llr_lower_bound)
-    return best_bound
+            largest_lower_bound = max(largest_lower_bound, hypothesis.llr_lower_bound)
+    return largest_lower_bound
 
 
 @kernel
@@ -722,11 +800,11 @@ def loss_llr_upper_bound(block, surface, is_loss_end):
 
     It is 0 if the block has no such hypothesis.
     """
-    upper_bound = 0.0
+    largest_upper_bound = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.surface == surface and (hypothesis.kind == LOSS_END) == is_loss_end:
-            upper_bound = max(upper_bound, hypothesis.llr_upper_bound)
-    return upper_bound
+            largest_upper_bound = max(largest_upper_bound, hypothesis.llr_upper_bound)
+    return largest_upper_bound
 
 
 @kernel
@@ -738,18 +816,20 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
     estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
     is weakly excluded by WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED, excluded losses are alternatives as well.
     """
-    includes_excluded = (
+    includes_excluded_losses = (
         loss_estimator[surface] >= 0
         and estimators[loss_estimator[surface]].weakly_excluded == WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
     )
     for block in blocks:
-        loss_lower_bound = 0.0
+        loss_llr_lower_bound = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING_LOSS):
-                loss_lower_bound = max(loss_lower_bound, hypothesis.llr_lower_bound)
+                loss_llr_lower_bound = max(loss_llr_lower_bound, hypothesis.llr_lower_bound)
         if (
-            loss_lower_bound
-            - best_alternative_llr_lower_bound(block, estimators, loss_estimator, surface, includes_excluded)
+            loss_llr_lower_bound
+            - best_alternative_llr_lower_bound(
+                block, estimators, loss_estimator, surface, includes_excluded_losses
+            )
             > test_config.isolation_llr_margin
         ):
             return True
@@ -769,26 +849,32 @@ def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_
     there. The end of a loss in pitch counts only if `may_loss_end_in_pitch` is set: a fault outside the class
     may look like it. Arguments as in `confirms_loss`.
     """
-    pitch, single_instant = blocks[likelihood.PITCH_BLOCK], test_config.frame_share_per_instant == 1.0
-    loss_share = 1.0 if is_abrupt and single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
-    loss_end_share = 1.0 if single_instant else MIN_LLR_SHARE_OF_CONSTANT_LOSS
-    for lateral in blocks[LATERAL_BLOCK:]:
-        alternative_llr = best_alternative_llr_lower_bound(pitch, estimators, loss_estimator, surface)
-        alternative_llr = max(
-            alternative_llr, best_alternative_llr_lower_bound(lateral, estimators, loss_estimator, surface)
+    pitch_block = blocks[likelihood.PITCH_BLOCK]
+    has_one_instant_per_frame = test_config.frame_share_per_instant == 1.0
+    loss_llr_share_limit = 1.0 if is_abrupt and has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
+    loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
+    for lateral_block in blocks[LATERAL_BLOCK:]:
+        min_alternative_llr = best_alternative_llr_lower_bound(
+            pitch_block, estimators, loss_estimator, surface
         )
-        loss_llr = max(
-            loss_llr_upper_bound(pitch, surface, False), loss_llr_upper_bound(lateral, surface, False)
+        min_alternative_llr = max(
+            min_alternative_llr,
+            best_alternative_llr_lower_bound(lateral_block, estimators, loss_estimator, surface),
         )
-        loss_end_llr = loss_llr_upper_bound(lateral, surface, True)
+        max_loss_llr = max(
+            loss_llr_upper_bound(pitch_block, surface, False),
+            loss_llr_upper_bound(lateral_block, surface, False),
+        )
+        max_loss_end_llr = loss_llr_upper_bound(lateral_block, surface, True)
         if may_loss_end_in_pitch:
-            loss_end_llr = max(loss_end_llr, loss_llr_upper_bound(pitch, surface, True))
+            max_loss_end_llr = max(max_loss_end_llr, loss_llr_upper_bound(pitch_block, surface, True))
         is_loss_unlikely = (
-            loss_llr < loss_share * alternative_llr and loss_end_llr < loss_end_share * alternative_llr
+            max_loss_llr < loss_llr_share_limit * min_alternative_llr
+            and max_loss_end_llr < loss_end_llr_share_limit * min_alternative_llr
         )
         if (
             is_loss_unlikely
-            and alternative_llr - max(loss_llr, loss_end_llr) > test_config.isolation_llr_margin
+            and min_alternative_llr - max(max_loss_llr, max_loss_end_llr) > test_config.isolation_llr_margin
         ):
             return True
     return False
@@ -841,17 +927,17 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measure
 def update_uncertainty_change(noise_model, blocks, error_map, u):
     """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
     surfaces."""
-    travel_share_moved = 0.0
+    max_travel_share_moved = 0.0
     for s in range(u.size):
-        travel = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
-        travel_share_moved = max(
-            travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel
+        travel_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
+        max_travel_share_moved = max(
+            max_travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel_rad
         )
         error_map.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
-            noise_model.base_change_over_bound_per_frame
-            + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * travel_share_moved,
+            noise_model.base_uncertainty_change_over_bound
+            + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * max_travel_share_moved,
             UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
         )
 
@@ -874,13 +960,15 @@ def add_instant_to_tests(test_config, noise_model, blocks, gust, bound, design, 
 
 
 @kernel
-def add_regressors(frame_share, noise_model, blocks, declared_errors, design, measured, u):
-    """Add this instant, a `frame_share` of the frame, to the regressors of all unknown constants."""
+def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, measured, u):
+    """Add this instant, a `frame_share_per_instant` of the frame, to all regressors of unknown constants."""
     y = measured.y
     evaluate(design.moments, measured.x, y)
-    add_coefficient_regressors(frame_share, noise_model.coefficient_regressor, blocks, design, y, u)
+    add_coefficient_regressors(
+        frame_share_per_instant, noise_model.coefficient_regressor, blocks, design, y, u
+    )
     if noise_model.has_reading_errors:
-        add_reading_regressors(frame_share, noise_model, blocks, declared_errors, design, y, u)
+        add_reading_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u)
 
 
 @kernel
@@ -906,19 +994,25 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
             noise_model.additional_bound_for_surface_anywhere[i] = additional_error_at_travel_level(
                 bound.model_error_map, bound.model_error_map.n_levels - 1, i
             )
-    for b, block in enumerate(blocks):
+    for block_index, block in enumerate(blocks):
         for i, axis in enumerate(block.axes[: block.n_axes]):
             for j in range(block.n_axes):
                 block.drift_intensity[i, j] = 0.0
                 if gust.output.accounts_for_gusts:
-                    gust_drift = gusts.unmeasured_gust_drift_intensity(
-                        gust, V, axis, block.axes[j], b == likelihood.MEAN_REVERTING_LATERAL_BLOCK
+                    gust_drift_intensity = gusts.unmeasured_gust_drift_intensity(
+                        gust, V, axis, block.axes[j], block_index == likelihood.MEAN_REVERTING_LATERAL_BLOCK
                     )
-                    block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift
-            drift_bound = max(uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
-            walk_intensity = noise_model.drift_intensity_over_squared_bound * drift_bound * drift_bound
-            block.drift_intensity[i, i] += walk_intensity
-            block.no_gust_filter.drift_intensity[i, i] = walk_intensity
+                    block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift_intensity
+            uncertainty_bound_for_drift = max(
+                uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2
+            )
+            uncertainty_drift_intensity = (
+                noise_model.drift_intensity_over_squared_bound
+                * uncertainty_bound_for_drift
+                * uncertainty_bound_for_drift
+            )
+            block.drift_intensity[i, i] += uncertainty_drift_intensity
+            block.no_gust_filter.drift_intensity[i, i] = uncertainty_drift_intensity
             block.model_noise_variance[i] = block.no_gust_filter.model_noise_variance[i] = (
                 noise_model.acceleration_variance_by_input_noise[axis]
             )
@@ -930,25 +1024,27 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
 
 
 @kernel
-def add_coefficient_regressors(frame_share, coefficient_regressor, blocks, design, y, u):
-    """Add this instant, a `frame_share` of the frame, to the regressors (n, 2) rad/s2 of the coefficients."""
-    table = design.moments
-    regressors(table, table.power, u, coefficient_regressor)
-    dynamic_force = frame_share * y[QDYN] * design.S
-    lateral_moment_scale, pitching_moment_scale = dynamic_force * design.b, dynamic_force * design.c
+def add_coefficient_regressors(frame_share_per_instant, coefficient_regressor, blocks, design, y, u):
+    """Add this instant, a `frame_share_per_instant` of the frame, to the coefficients' regressors (n, 2)
+    rad/s2."""
+    moment_table = design.moments
+    regressors(moment_table, moment_table.power, u, coefficient_regressor)
+    frame_share_of_dynamic_force = frame_share_per_instant * y[QDYN] * design.S
+    lateral_moment_per_coefficient = frame_share_of_dynamic_force * design.b
+    pitching_moment_per_coefficient = frame_share_of_dynamic_force * design.c
     pitch_block = blocks[likelihood.PITCH_BLOCK]
-    first_term = table.free_from[1]
-    for j in range(table.surface_to[1] - first_term):
+    first_term_index = moment_table.free_from[1]
+    for j in range(moment_table.surface_to[1] - first_term_index):
         pitch_block.regressor[j, 0] += (
-            design.Qm * pitching_moment_scale * coefficient_regressor[first_term + j]
+            design.Qm * pitching_moment_per_coefficient * coefficient_regressor[first_term_index + j]
         )
     for lateral_block in blocks[LATERAL_BLOCK:]:
-        n_roll_terms, first_term = table.surface_to[0], table.free_from[2]
+        n_roll_terms, first_term_index = moment_table.surface_to[0], moment_table.free_from[2]
         for j in range(n_roll_terms):
-            Cl = lateral_moment_scale * coefficient_regressor[j]
-            lateral_block.regressor[j, 0] += design.Pl * Cl
-            lateral_block.regressor[j, 1] += design.Rl * Cl
-        for j in range(table.surface_to[2] - first_term):
-            Cn = lateral_moment_scale * coefficient_regressor[first_term + j]
-            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * Cn
-            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * Cn
+            roll_moment = lateral_moment_per_coefficient * coefficient_regressor[j]
+            lateral_block.regressor[j, 0] += design.Pl * roll_moment
+            lateral_block.regressor[j, 1] += design.Rl * roll_moment
+        for j in range(moment_table.surface_to[2] - first_term_index):
+            yaw_moment = lateral_moment_per_coefficient * coefficient_regressor[first_term_index + j]
+            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment
+            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment

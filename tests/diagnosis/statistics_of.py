@@ -99,7 +99,7 @@ class Across:
     @staticmethod
     def turn(fdi, view, G):
         record = fdi["statistical"]
-        return parity.set_view_direction_and_return_leak(
+        return parity.set_view_direction_and_return_leak_share(
             view, record["forces"], record["gust"], fdi["bound"], G
         )
 
@@ -114,7 +114,7 @@ class Across:
 
     @staticmethod
     def regress(fdi, view, innovation, share):
-        view["column_leak"] = share
+        view["column_leak_share"] = share
         parts = (fdi["statistical"][name] for name in ("block", "forces", "gust", "inertial_gust"))
         parity.fill_view_regressors(view, *parts, innovation)
 

@@ -525,7 +525,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
     assert share == pytest.approx(np.max(np.abs(corners @ mix)) / (0.9 * np.linalg.norm(column)))
     n = int(view["block"]["n_regressors"])
     Across.regress(viewed, view, np.zeros(3), share)
-    view["confirming_force"] = 0
+    view["confirming_force_component"] = 0
     Across.regress(viewed, view, np.array([0.4, 7.0, -0.3]), share)
     seen = np.array([0.4, -0.3, force["innovation"]])
     assert view["block"]["regressor"][n - 1, 0] == pytest.approx(
@@ -806,8 +806,14 @@ def test_in_moving_air_the_vanes_are_asked_but_for_the_rolling_gust(viewed):
     for moving in (0, 1):
         viewed["statistical"]["gust"]["output"]["accounts_for_gusts"] = moving
         configure_parity_views(viewed["statistical"], AIRCRAFT)
-        confirming_force = viewed["statistical"]["views"]["confirming_force"][:5].tolist()
-        assert confirming_force == [moving * NORMAL_FORCE, 0, moving * SIDE_FORCE, moving * SIDE_FORCE, 0]
+        confirming_force_component = viewed["statistical"]["views"]["confirming_force_component"][:5].tolist()
+        assert confirming_force_component == [
+            moving * NORMAL_FORCE,
+            0,
+            moving * SIDE_FORCE,
+            moving * SIDE_FORCE,
+            0,
+        ]
 
 
 def without_force(coefficient, surface):
@@ -848,7 +854,7 @@ def test_an_aircraft_told_apart_in_one_plane_only_has_the_views_of_that_plane(ai
     found = [(int(view["orthogonal_to_surface"]), tuple(view["plane_axes"].tolist())) for view in views[5:]]
     assert found == expected
     asking = [asked and view in (0, 2, 3) for view in range(5)]  # pitch, yaw, and past the aileron
-    assert [bool(view["confirming_force"]) for view in views[:5]] == asking
+    assert [bool(view["confirming_force_component"]) for view in views[:5]] == asking
     assert aircraft.forces_separate_surfaces
 
 

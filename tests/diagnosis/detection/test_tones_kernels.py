@@ -90,7 +90,10 @@ def test_a_sum_is_judged_when_it_is_full_and_not_before(view, tone_config):
     assert (view["tone_tests"]["score"], view["tone_tests"]["correlation_variance"]) == (0.0, 0.0)
     listen(view, tone_config, [50.0])
     assert view["tone_tests"]["score"] > 0.0
-    assert (view["tone_tests"]["frames_since_update"], view["tone_tests"]["innovation_sum"]) == (0, 0.0)
+    assert (view["tone_tests"]["frames_since_update"], view["tone_tests"]["normalised_innovation_sum"]) == (
+        0,
+        0.0,
+    )
 
 
 def test_what_is_not_heard_lets_the_rest_fade(view, tone_config, rng):
@@ -320,7 +323,7 @@ def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, 
         (YAW, SIDE_FORCE),
         50.0,
     )
-    view["confirming_force"], view["decaying_peak_score"] = SIDE_FORCE, 9.0
+    view["confirming_force_component"], view["decaying_peak_score"] = SIDE_FORCE, 9.0
     (
         view["orthogonal_to_surface"],
         view["plane_axes"],

@@ -119,16 +119,16 @@ TONE_CONFIG_RECORD = record(
 def tone_tests_dtype(n_regressors: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
-        # frames since the last update; sums of g and of n_regressors
-        frames_since_update=int, innovation_sum=float, regressor_sums=n_regressors,
+        # frames since the last update; sums since then of g and of n_regressors, over the deviation of g
+        frames_since_update=int, normalised_innovation_sum=float, normalised_regressor_sums=n_regressors,
         # N and R_j: real and imaginary parts
         correlation=(2, N_TONE_FREQUENCIES), regressor_correlation=(n_regressors, 2, N_TONE_FREQUENCIES),
-        # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, the
-        # filtered bound: its mean, and its component at twice the frequency
+        # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, two
+        # sums over the filtered bound: of the bound, and of its component at twice the frequency
         correlation_bound_by_coefficient_errors=N_TONE_FREQUENCIES,
         correlation_bound_by_uncertainty=N_TONE_FREQUENCIES,
-        uncertainty_bound_mean=N_TONE_FREQUENCIES,
-        uncertainty_bound_harmonic=(2, N_TONE_FREQUENCIES),
+        filtered_bound_sum=N_TONE_FREQUENCIES,
+        filtered_bound_double_frequency_sum=(2, N_TONE_FREQUENCIES),
         correlation_variance=float,  # variance of N without a fault
         score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
     )  # fmt: skip
@@ -140,30 +140,32 @@ def is_within_envelope(tone_config, y):
 
     Outside, the tolerances of the tests, which are worked out for trim, do not hold.
     """
-    within = tone_config.min_airspeed < y[AIRSPEED] < tone_config.max_airspeed
-    return within and abs(y[ALPHA]) < MAX_VANE_ANGLE_RAD and abs(y[BETA]) < MAX_VANE_ANGLE_RAD
+    is_airspeed_within = tone_config.min_airspeed < y[AIRSPEED] < tone_config.max_airspeed
+    return is_airspeed_within and abs(y[ALPHA]) < MAX_VANE_ANGLE_RAD and abs(y[BETA]) < MAX_VANE_ANGLE_RAD
 
 
 @kernel
-def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regressors, dt):
+def update_tone_tests(view, tone_config, alarm_level, inside_envelope, has_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
-    has_regressors: whether the regressors of the block count. Without `within_envelope` the frame counts as
+    has_regressors: whether the regressors of the block count. Without `inside_envelope` the frame counts as
     zero, so the sums decay.
     """
     tone_tests, block = view.tone_tests, view.block
     n_regressors = block.n_regressors if has_regressors else 0
-    inverse_std = np.sqrt(block.S_inverse[0, 0]) if within_envelope else 0.0
-    tone_tests.innovation_sum += inverse_std * block.whitened_innovation[0]
+    inverse_innovation_std = np.sqrt(block.S_inverse[0, 0]) if inside_envelope else 0.0
+    tone_tests.normalised_innovation_sum += inverse_innovation_std * block.whitened_innovation[0]
     for j in range(n_regressors):
-        tone_tests.regressor_sums[j] += inverse_std * block.regressor_response[j, 0]
+        tone_tests.normalised_regressor_sums[j] += inverse_innovation_std * block.regressor_response[j, 0]
     tone_tests.frames_since_update += 1
     if tone_tests.frames_since_update < tone_config.frames_per_update:
         return
-    advance_resonators(tone_config, tone_tests.correlation, tone_tests.innovation_sum)
+    advance_resonators(tone_config, tone_tests.correlation, tone_tests.normalised_innovation_sum)
     for j in range(n_regressors):
-        advance_resonators(tone_config, tone_tests.regressor_correlation[j], tone_tests.regressor_sums[j])
-        tone_tests.regressor_sums[j] = 0.0
+        advance_resonators(
+            tone_config, tone_tests.regressor_correlation[j], tone_tests.normalised_regressor_sums[j]
+        )
+        tone_tests.normalised_regressor_sums[j] = 0.0
     tone_tests.correlation_variance = (
         tone_config.sum_decay_factor_per_update
         * tone_config.sum_decay_factor_per_update
@@ -171,34 +173,49 @@ def update_tone_tests(view, tone_config, alarm_level, within_envelope, has_regre
         + tone_tests.frames_since_update
     )
     update_correlation_bound_by_uncertainty(
-        tone_tests, tone_config, block, inverse_std * view.uncertainty_bound[0], dt
+        tone_tests, tone_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
     )
     fill_correlation_bound_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
     fill_tone_score(tone_tests, tone_config, alarm_level)
-    tone_tests.innovation_sum, tone_tests.frames_since_update = 0.0, 0
+    tone_tests.normalised_innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
 
 @kernel
 def advance_resonators(tone_config, resonator_state, input_sum):
     """Advance N at every frequency, resonator_state (2, N_TONE_FREQUENCIES), by one update: rotate, decay,
     add the drive."""
-    rotation = tone_config.decayed_rotation_per_update
-    for f in range(resonator_state.shape[1]):
-        real, imaginary = resonator_state[0, f], resonator_state[1, f]
-        resonator_state[0, f] = rotation[0, f] * real - rotation[1, f] * imaginary + input_sum
-        resonator_state[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
+    decayed_rotation = tone_config.decayed_rotation_per_update
+    for frequency_index in range(resonator_state.shape[1]):
+        state_real, state_imaginary = resonator_state[0, frequency_index], resonator_state[1, frequency_index]
+        resonator_state[0, frequency_index] = (
+            decayed_rotation[0, frequency_index] * state_real
+            - decayed_rotation[1, frequency_index] * state_imaginary
+            + input_sum
+        )
+        resonator_state[1, frequency_index] = (
+            decayed_rotation[1, frequency_index] * state_real
+            + decayed_rotation[0, frequency_index] * state_imaginary
+        )
 
 
 @kernel
-def tone_whitening_gain(K_x, K_d, drift_decay, cos, sin, dt):
+def tone_whitening_gain(K_x, K_d, drift_decay_factor, cos_phase_change, sin_phase_change, dt):
     """Amplitude, rad/s, of the whitened response to a tone of amplitude 1 rad/s2, at constant filter gains.
 
-    cos, sin: of the phase change of the tone per frame, of dt s.
+    cos_phase_change, sin_phase_change: of the change of the tone's phase per frame, of dt s.
     """
-    squared_distance = (cos - drift_decay) * (cos - drift_decay) + sin * sin
-    real = 1.0 - (1.0 - K_x) * cos + dt * K_d * (cos - drift_decay) / squared_distance
-    imaginary = (1.0 - K_x) * sin - dt * K_d * sin / squared_distance
-    return dt / np.sqrt(real * real + imaginary * imaginary)
+    squared_distance_to_drift_pole = (cos_phase_change - drift_decay_factor) * (
+        cos_phase_change - drift_decay_factor
+    ) + sin_phase_change * sin_phase_change
+    denominator_real = (
+        1.0
+        - (1.0 - K_x) * cos_phase_change
+        + dt * K_d * (cos_phase_change - drift_decay_factor) / squared_distance_to_drift_pole
+    )
+    denominator_imaginary = sin_phase_change * (1.0 - K_x) - (
+        dt * K_d * sin_phase_change / squared_distance_to_drift_pole
+    )
+    return dt / np.sqrt(denominator_real * denominator_real + denominator_imaginary * denominator_imaginary)
 
 
 @kernel
@@ -209,33 +226,43 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
-    rotation = tone_config.decayed_double_rotation_per_update
-    sum_decay = tone_config.sum_decay_factor_per_update
-    bound_sum = uncertainty_bound * tone_tests.frames_since_update
-    for f in range(tone_tests.correlation_bound_by_uncertainty.size):
-        cos, sin = tone_config.phase_rotation_per_frame[0, f], tone_config.phase_rotation_per_frame[1, f]
-        bounded_input = bound_sum * tone_whitening_gain(
-            block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos, sin, dt
+    decayed_double_rotation = tone_config.decayed_double_rotation_per_update
+    sum_decay_factor = tone_config.sum_decay_factor_per_update
+    uncertainty_bound_sum = uncertainty_bound * tone_tests.frames_since_update
+    for frequency_index in range(tone_tests.correlation_bound_by_uncertainty.size):
+        cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
+        sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
+        filtered_bound = uncertainty_bound_sum * tone_whitening_gain(
+            block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
-        real = tone_tests.uncertainty_bound_harmonic[0, f]
-        imaginary = tone_tests.uncertainty_bound_harmonic[1, f]
-        tone_tests.uncertainty_bound_harmonic[0, f] = (
-            rotation[0, f] * real - rotation[1, f] * imaginary + bounded_input
+        double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
+        double_frequency_imaginary = tone_tests.filtered_bound_double_frequency_sum[1, frequency_index]
+        tone_tests.filtered_bound_double_frequency_sum[0, frequency_index] = (
+            decayed_double_rotation[0, frequency_index] * double_frequency_real
+            - decayed_double_rotation[1, frequency_index] * double_frequency_imaginary
+            + filtered_bound
         )
-        tone_tests.uncertainty_bound_harmonic[1, f] = rotation[1, f] * real + rotation[0, f] * imaginary
-        tone_tests.uncertainty_bound_mean[f] = (
-            sum_decay * tone_tests.uncertainty_bound_mean[f] + bounded_input
+        tone_tests.filtered_bound_double_frequency_sum[1, frequency_index] = (
+            decayed_double_rotation[1, frequency_index] * double_frequency_real
+            + decayed_double_rotation[0, frequency_index] * double_frequency_imaginary
         )
-        tone_tests.correlation_bound_by_uncertainty[f] = tone_config.max_tone_mean_of_unit_uncertainty[f] * (
-            tone_tests.uncertainty_bound_mean[f]
-            + np.hypot(
-                tone_tests.uncertainty_bound_harmonic[0, f], tone_tests.uncertainty_bound_harmonic[1, f]
+        tone_tests.filtered_bound_sum[frequency_index] = (
+            sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound
+        )
+        tone_tests.correlation_bound_by_uncertainty[frequency_index] = (
+            tone_config.max_tone_mean_of_unit_uncertainty[frequency_index]
+            * (
+                tone_tests.filtered_bound_sum[frequency_index]
+                + np.hypot(
+                    tone_tests.filtered_bound_double_frequency_sum[0, frequency_index],
+                    tone_tests.filtered_bound_double_frequency_sum[1, frequency_index],
+                )
             )
         )
 
 
 @kernel
-def fill_correlation_bound_by_coefficient_errors(tone_tests, tolerance, n_regressors):
+def fill_correlation_bound_by_coefficient_errors(tone_tests, regressor_tolerance, n_regressors):
     """Fill `correlation_bound_by_coefficient_errors`: the most that the declared errors of the first n
     coefficients add to |N|.
 
@@ -243,11 +270,14 @@ def fill_correlation_bound_by_coefficient_errors(tone_tests, tolerance, n_regres
     """
     tone_tests.correlation_bound_by_coefficient_errors[:] = 0.0
     for j in range(n_regressors):
-        overlap, coefficient_tolerance = tone_tests.regressor_correlation[j], tolerance[j]
-        for f in range(tone_tests.correlation_bound_by_coefficient_errors.size):
-            real_part, imaginary_part = abs(overlap[0, f]), abs(overlap[1, f])
-            tone_tests.correlation_bound_by_coefficient_errors[f] += coefficient_tolerance * (
-                max(real_part, imaginary_part) + 0.41421356237309515 * min(real_part, imaginary_part)
+        regressor_correlation = tone_tests.regressor_correlation[j]
+        coefficient_tolerance = regressor_tolerance[j]
+        for frequency_index in range(tone_tests.correlation_bound_by_coefficient_errors.size):
+            real_magnitude = abs(regressor_correlation[0, frequency_index])
+            imaginary_magnitude = abs(regressor_correlation[1, frequency_index])
+            tone_tests.correlation_bound_by_coefficient_errors[frequency_index] += coefficient_tolerance * (
+                max(real_magnitude, imaginary_magnitude)
+                + 0.41421356237309515 * min(real_magnitude, imaginary_magnitude)
             )
 
 
@@ -255,32 +285,36 @@ def fill_correlation_bound_by_coefficient_errors(tone_tests, tolerance, n_regres
 def fill_tone_score(tone_tests, tone_config, alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
-    for f in range(tone_tests.correlation_bound_by_coefficient_errors.size):
+    for frequency_index in range(tone_tests.correlation_bound_by_coefficient_errors.size):
         evidence = (
-            np.hypot(tone_tests.correlation[0, f], tone_tests.correlation[1, f])
-            - tone_tests.correlation_bound_by_coefficient_errors[f]
+            np.hypot(tone_tests.correlation[0, frequency_index], tone_tests.correlation[1, frequency_index])
+            - tone_tests.correlation_bound_by_coefficient_errors[frequency_index]
         )
-        variance = tone_config.larger_complex_part_variance_share[f] * tone_tests.correlation_variance
+        larger_part_variance = (
+            tone_config.larger_complex_part_variance_share[frequency_index] * tone_tests.correlation_variance
+        )
         max_score = max(
             max_score,
             normalised_evidence(
                 tone_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
-                tone_tests.correlation_bound_by_uncertainty[f],
-                variance,
+                tone_tests.correlation_bound_by_uncertainty[frequency_index],
+                larger_part_variance,
             ),
         )
     tone_tests.score = max_score * alarm_level / tone_config.alarm_level
 
 
-def derive_max_tone_mean_of_uncertainty(frequency_rad_s: np.ndarray, change_rate_per_s: float) -> np.ndarray:
+def derive_max_tone_mean_of_uncertainty(
+    frequency_rad_s: np.ndarray, uncertainty_change_rate_per_s: float
+) -> np.ndarray:
     """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
 
     The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
     edges do not reach 1, by a triangular wave.
     """
-    normalised_frequency = frequency_rad_s / change_rate_per_s
+    normalised_frequency = frequency_rad_s / uncertainty_change_rate_per_s
     return (
         2.0
         / pi
@@ -291,41 +325,42 @@ def derive_max_tone_mean_of_uncertainty(frequency_rad_s: np.ndarray, change_rate
 
 def configure_tone_tests(
     tone_config: np.void,
-    false_alarm_probability: float,
+    false_alarm_probability_per_test: float,
     airspeed_mps: float,
-    change_rate_per_s: float,
+    uncertainty_change_rate_per_s: float,
     dt_s: float,
 ) -> None:
     """Fill the configuration that all views share.
 
-    false_alarm_probability: probability of a false alarm granted to one test in one frame. airspeed_mps: in
-    trim. change_rate_per_s: largest rate of change of a bounded uncertainty, in bounds per second.
+    false_alarm_probability_per_test: probability of a false alarm granted to one test in one frame.
+    airspeed_mps: in trim. uncertainty_change_rate_per_s: largest rate of change of a bounded uncertainty, in
+    bounds per second.
     """
     tone_config["max_tone_mean_of_unit_uncertainty"] = derive_max_tone_mean_of_uncertainty(
-        TONE_FREQUENCIES_RAD_S, change_rate_per_s
+        TONE_FREQUENCIES_RAD_S, uncertainty_change_rate_per_s
     )
     tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_OVER_TRIM
     tone_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_OVER_TRIM
     frames_per_update = max(round(TONE_UPDATE_INTERVAL_S / dt_s), 1)
-    phase_per_frame = TONE_FREQUENCIES_RAD_S * dt_s
-    decay_factor = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
+    phase_per_frame_rad = TONE_FREQUENCIES_RAD_S * dt_s
+    sum_decay_factor_per_update = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
     tone_config["frames_per_update"] = frames_per_update
-    tone_config["sum_decay_factor_per_update"] = decay_factor
-    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability))
-    tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame), np.sin(phase_per_frame)
+    tone_config["sum_decay_factor_per_update"] = sum_decay_factor_per_update
+    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability_per_test))
+    tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame_rad), np.sin(phase_per_frame_rad)
     tone_config["decayed_rotation_per_update"] = (
-        decay_factor * np.cos(frames_per_update * phase_per_frame),
-        decay_factor * np.sin(frames_per_update * phase_per_frame),
+        sum_decay_factor_per_update * np.cos(frames_per_update * phase_per_frame_rad),
+        sum_decay_factor_per_update * np.sin(frames_per_update * phase_per_frame_rad),
     )
     tone_config["decayed_double_rotation_per_update"] = (
-        decay_factor * np.cos(2.0 * frames_per_update * phase_per_frame),
-        decay_factor * np.sin(2.0 * frames_per_update * phase_per_frame),
+        sum_decay_factor_per_update * np.cos(2.0 * frames_per_update * phase_per_frame_rad),
+        sum_decay_factor_per_update * np.sin(2.0 * frames_per_update * phase_per_frame_rad),
     )
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    variance_difference = (1.0 - decay_factor**2) / np.abs(
-        1.0 - decay_factor**2 * np.exp(2j * frames_per_update * phase_per_frame)
+    relative_variance_difference = (1.0 - sum_decay_factor_per_update**2) / np.abs(
+        1.0 - sum_decay_factor_per_update**2 * np.exp(2j * frames_per_update * phase_per_frame_rad)
     )
-    tone_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + variance_difference)
+    tone_config["larger_complex_part_variance_share"] = 0.5 * (1.0 + relative_variance_difference)
 
 
 VANE_EFFECT_RELATIVE_TOLERANCE = (
@@ -371,9 +406,9 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
         always_has_regressors=int,  # whether regressors count in this view even if they do in no other block
         uses_inertial_flow_angle=int,  # whether the force is that at the flow angle from inertial motion
         is_immune_to_vane_error=int,  # whether an error of a vane does not appear in this view
-        confirming_force=int,  # force of the views that confirm this one; 0 if no vane is used
+        confirming_force_component=int,  # force of the views that confirm this one; 0 if no vane is used
         # of this frame: whether the view is used; which share of nu along the column leaks into it
-        is_used=int, column_leak=float,
+        is_used=int, column_leak_share=float,
         uncertainty_bound=1,  # bound on the uncertainty along m, rad/s2
         # effect of the air's rotation about the body axes, 1/s
         rate_gust_sensitivity=3, force_gust_sensitivity=3,
@@ -383,54 +418,66 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
 
 
 @kernel
-def innovation_component(view, forces, gust, inertial_gust, innovation, i):
-    """Component i of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
-    if i < SIDE_FORCE:
+def innovation_component(view, forces, gust, inertial_gust, innovation, component):
+    """One component of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
+    if component < SIDE_FORCE:
         gust_acceleration = 0.0
         if subtracts_gust_estimate(view, gust):
             gust_acceleration = gust_estimate_of_view(
                 view, gust, inertial_gust
-            ).output.mean_gust_acceleration[i]
-        return innovation[i] - gust_acceleration
-    force = forces.component[i - SIDE_FORCE]
+            ).output.mean_gust_acceleration[component]
+        return innovation[component] - gust_acceleration
+    force = forces.component[component - SIDE_FORCE]
     return force.innovation_at_inertial_flow_angle if view.uses_inertial_flow_angle else force.innovation
 
 
 @kernel
-def column_entry_and_error(view, forces, bound, G, j):
-    """Entry j, 0 or 1, of the column in a view's plane and the bound on its error, rad/s2 per rad."""
-    i, s = view.plane_axes[j], view.orthogonal_to_surface
+def column_entry_and_error(view, forces, bound, G, plane_axis_index):
+    """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
+    component, s = view.plane_axes[plane_axis_index], view.orthogonal_to_surface
     if s == VANE_VIEW:
-        entry = forces.component[view.plane_axes[1] - SIDE_FORCE].axis_and_force_innovation_per_vane_error[j]
-        return entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(entry)
-    if i >= SIDE_FORCE:
-        force = forces.component[i - SIDE_FORCE]
+        column_entry = forces.component[
+            view.plane_axes[1] - SIDE_FORCE
+        ].axis_and_force_innovation_per_vane_error[plane_axis_index]
+        return column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(column_entry)
+    if component >= SIDE_FORCE:
+        force = forces.component[component - SIDE_FORCE]
         return force.previous_scaled_force_per_surface_rad[s], force.scaled_force_per_surface_rad_error_bound[
             s
         ]
-    return G[i, s], bound.surface_error_per_rad[i, s] if bound.has_declared_surface_errors else 0.0
+    error_bound = bound.surface_error_per_rad[component, s] if bound.has_declared_surface_errors else 0.0
+    return G[component, s], error_bound
 
 
 @kernel
-def set_view_direction_and_return_leak(view, forces, gust, bound, G):
+def set_view_direction_and_return_leak_share(view, forces, gust, bound, G):
     """Fill `direction` and `unit_column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
 
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
     if view.is_orthogonal_to_rolling_gust:
         return set_direction_across_vane_and_rolling_gust(view, forces, gust)
-    first, second = view.plane_axes[0], view.plane_axes[1]
-    first_entry, first_error = column_entry_and_error(view, forces, bound, G, 0)
-    second_entry, second_error = column_entry_and_error(view, forces, bound, G, 1)
+    first_component, second_component = view.plane_axes[0], view.plane_axes[1]
+    first_entry, first_error_bound = column_entry_and_error(view, forces, bound, G, 0)
+    second_entry, second_error_bound = column_entry_and_error(view, forces, bound, G, 1)
     column_length = np.sqrt(first_entry * first_entry + second_entry * second_entry)
     if column_length == 0.0:
         return 0.0
-    view.direction[first], view.direction[second] = -second_entry / column_length, first_entry / column_length
-    view.unit_column[first] = first_entry / column_length
-    view.unit_column[second] = second_entry / column_length
-    leaking_error = abs(view.direction[first]) * first_error + abs(view.direction[second]) * second_error
-    length_error = abs(view.direction[second]) * first_error + abs(view.direction[first]) * second_error
-    return leaking_error / max(column_length - length_error, MIN_COLUMN_LENGTH_SHARE * column_length)
+    view.direction[first_component] = -second_entry / column_length
+    view.direction[second_component] = first_entry / column_length
+    view.unit_column[first_component] = first_entry / column_length
+    view.unit_column[second_component] = second_entry / column_length
+    error_bound_along_direction = (
+        abs(view.direction[first_component]) * first_error_bound
+        + abs(view.direction[second_component]) * second_error_bound
+    )
+    length_error_bound = (
+        abs(view.direction[second_component]) * first_error_bound
+        + abs(view.direction[first_component]) * second_error_bound
+    )
+    return error_bound_along_direction / max(
+        column_length - length_error_bound, MIN_COLUMN_LENGTH_SHARE * column_length
+    )
 
 
 @kernel
@@ -441,35 +488,49 @@ def set_direction_across_vane_and_rolling_gust(view, forces, gust):
 
     The vectors are the column of an error of the side vane and the effect of the rolling gust on the rates.
     """
-    force = forces.component[0]
-    roll = force.roll_innovation_per_vane_error
-    yaw = force.axis_and_force_innovation_per_vane_error[0]
-    side_force = force.axis_and_force_innovation_per_vane_error[1]
-    roll_gust = project_on_gust_axis(gust.output.rate_damping[ROLL], gust.output.gust_axes_in_body, 0)
-    yaw_gust = project_on_gust_axis(gust.output.rate_damping[YAW], gust.output.gust_axes_in_body, 0)
-    roll_component = -side_force * yaw_gust
-    yaw_component = side_force * roll_gust
-    side_component = roll * yaw_gust - yaw * roll_gust
-    length = np.sqrt(
-        roll_component * roll_component + yaw_component * yaw_component + side_component * side_component
+    side_force_record = forces.component[0]
+    vane_roll_effect = side_force_record.roll_innovation_per_vane_error
+    vane_yaw_effect = side_force_record.axis_and_force_innovation_per_vane_error[0]
+    vane_side_force_effect = side_force_record.axis_and_force_innovation_per_vane_error[1]
+    rolling_gust_roll_effect = project_on_gust_axis(
+        gust.output.rate_damping[ROLL], gust.output.gust_axes_in_body, 0
     )
-    if length == 0.0:
+    rolling_gust_yaw_effect = project_on_gust_axis(
+        gust.output.rate_damping[YAW], gust.output.gust_axes_in_body, 0
+    )
+    direction_roll = -vane_side_force_effect * rolling_gust_yaw_effect
+    direction_yaw = vane_side_force_effect * rolling_gust_roll_effect
+    direction_side_force = (
+        vane_roll_effect * rolling_gust_yaw_effect - vane_yaw_effect * rolling_gust_roll_effect
+    )
+    direction_length = np.sqrt(
+        direction_roll * direction_roll
+        + direction_yaw * direction_yaw
+        + direction_side_force * direction_side_force
+    )
+    if direction_length == 0.0:
         return 0.0
-    vane_column_length, leaking_error = np.sqrt(roll * roll + yaw * yaw + side_force * side_force), 0.0
-    for i, vane_entry, direction_entry in (
-        (ROLL, roll, roll_component),
-        (YAW, yaw, yaw_component),
-        (SIDE_FORCE, side_force, side_component),
+    vane_column_length = np.sqrt(
+        vane_roll_effect * vane_roll_effect
+        + vane_yaw_effect * vane_yaw_effect
+        + vane_side_force_effect * vane_side_force_effect
+    )
+    error_bound_along_direction = 0.0
+    for i, vane_effect, direction_entry in (
+        (ROLL, vane_roll_effect, direction_roll),
+        (YAW, vane_yaw_effect, direction_yaw),
+        (SIDE_FORCE, vane_side_force_effect, direction_side_force),
     ):
-        view.direction[i], view.unit_column[i] = direction_entry / length, vane_entry / vane_column_length
-        leaking_error += VANE_EFFECT_RELATIVE_TOLERANCE * abs(view.direction[i] * vane_entry)
-    return leaking_error / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_length)
+        view.direction[i] = direction_entry / direction_length
+        view.unit_column[i] = vane_effect / vane_column_length
+        error_bound_along_direction += VANE_EFFECT_RELATIVE_TOLERANCE * abs(view.direction[i] * vane_effect)
+    return error_bound_along_direction / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_length)
 
 
 @kernel
 def subtracts_gust_estimate(view, gust):
     """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
-    return view.confirming_force > 0 and gust.output.uses_accelerometers == 1
+    return view.confirming_force_component > 0 and gust.output.uses_accelerometers == 1
 
 
 @kernel
@@ -493,15 +554,17 @@ def fill_gust_sensitivity(view, forces, rate_damping):
     """
     m = view.direction
     for k in range(3):
-        roll = m[ROLL] * rate_damping[ROLL, k]
-        pitch = m[PITCH] * rate_damping[PITCH, k]
-        yaw = m[YAW] * rate_damping[YAW, k]
-        view.rate_gust_sensitivity[k] = roll + pitch + yaw
+        projected_roll_damping = m[ROLL] * rate_damping[ROLL, k]
+        projected_pitch_damping = m[PITCH] * rate_damping[PITCH, k]
+        projected_yaw_damping = m[YAW] * rate_damping[YAW, k]
+        view.rate_gust_sensitivity[k] = (
+            projected_roll_damping + projected_pitch_damping + projected_yaw_damping
+        )
         view.force_gust_sensitivity[k] = 0.0
-        for f in range(2):
+        for force_index in range(2):
             view.force_gust_sensitivity[k] += (
-                m[SIDE_FORCE + f]
-                * forces.component[f].innovation_per_air_rotation[k]
+                m[SIDE_FORCE + force_index]
+                * forces.component[force_index].innovation_per_air_rotation[k]
                 * forces.dynamic_pressure_over_trim
             )
 
@@ -522,15 +585,15 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         uncertainty_bound += abs(m[i]) * (
             noise_model.uncertainty_bound[i] + noise_model.additional_bound_for_surface_anywhere[i]
         )
-    for f, force in enumerate(forces.component):
-        model_noise_std += abs(m[SIDE_FORCE + f]) * np.sqrt(
+    for force_index, force in enumerate(forces.component):
+        model_noise_std += abs(m[SIDE_FORCE + force_index]) * np.sqrt(
             force.noise_variance[view.uses_inertial_flow_angle]
         )
         if view.uses_inertial_flow_angle:
             drift_intensity += (
-                m[SIDE_FORCE + f] * forces.dynamic_pressure_over_trim
+                m[SIDE_FORCE + force_index] * forces.dynamic_pressure_over_trim
             ) ** 2 * force.inertial_innovation_drift_intensity
-        uncertainty_bound += abs(m[SIDE_FORCE + f]) * (
+        uncertainty_bound += abs(m[SIDE_FORCE + force_index]) * (
             force.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
             + force.force_flow_lag_error_bound
         )
@@ -550,12 +613,15 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * gust.output.acceleration_variance_by_axes_turn[i, j]
-    drift_bound = max(uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+    uncertainty_bound_for_drift = max(uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
     block.gyro_noise_variance[0] = gyro_noise_variance
     block.model_noise_variance[0] = model_noise_std * model_noise_std
     view.uncertainty_bound[0] = uncertainty_bound
     block.drift_intensity[0, 0] = (
-        drift_intensity + noise_model.drift_intensity_over_squared_bound * drift_bound * drift_bound
+        drift_intensity
+        + noise_model.drift_intensity_over_squared_bound
+        * uncertainty_bound_for_drift
+        * uncertainty_bound_for_drift
     )
 
 
@@ -566,29 +632,32 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
     innovation (3,) rad/s2.
     """
     block, m = view.block, view.direction
-    first, second = view.plane_axes[0], view.plane_axes[1]
-    block_of_rates = blocks[PITCH_BLOCK if first == PITCH else LATERAL_BLOCK]
-    for j in range(block_of_rates.n_regressors):
-        if first == PITCH:
-            block.regressor[j, 0] = m[PITCH] * block_of_rates.regressor[j, 0]
+    first_component, second_component = view.plane_axes[0], view.plane_axes[1]
+    rate_block = blocks[PITCH_BLOCK if first_component == PITCH else LATERAL_BLOCK]
+    for j in range(rate_block.n_regressors):
+        if first_component == PITCH:
+            block.regressor[j, 0] = m[PITCH] * rate_block.regressor[j, 0]
         else:
-            block.regressor[j, 0] = (
-                m[ROLL] * block_of_rates.regressor[j, 0] + m[YAW] * block_of_rates.regressor[j, 1]
-            )
-    n = block_of_rates.n_regressors
-    if second >= SIDE_FORCE and m[second] != 0.0:
-        force = forces.component[second - SIDE_FORCE]
+            block.regressor[j, 0] = m[ROLL] * rate_block.regressor[j, 0] + m[YAW] * rate_block.regressor[j, 1]
+    next_regressor_index = rate_block.n_regressors
+    if second_component >= SIDE_FORCE and m[second_component] != 0.0:
+        force = forces.component[second_component - SIDE_FORCE]
         for j in range(force.n_regressors):
-            block.regressor[n + j, 0] = m[second] * force.regressor[j]
-        n += force.n_regressors
+            block.regressor[next_regressor_index + j, 0] = m[second_component] * force.regressor[j]
+        next_regressor_index += force.n_regressors
         if view.uses_inertial_flow_angle:
-            block.regressor[n, 0], n = m[second] * force.innovation_per_flow_angle_drift, n + 1
+            block.regressor[next_regressor_index, 0] = (
+                m[second_component] * force.innovation_per_flow_angle_drift
+            )
+            next_regressor_index = next_regressor_index + 1
     if view.orthogonal_to_surface != AXIS_VIEW:
-        block.regressor[n, 0] = 0.0
+        block.regressor[next_regressor_index, 0] = 0.0
         for i in range(m.size):
             if view.unit_column[i] != 0.0:
-                component = innovation_component(view, forces, gust, inertial_gust, innovation, i)
-                block.regressor[n, 0] += view.column_leak * view.unit_column[i] * component
+                component_innovation = innovation_component(view, forces, gust, inertial_gust, innovation, i)
+                block.regressor[next_regressor_index, 0] += (
+                    view.column_leak_share * view.unit_column[i] * component_innovation
+                )
 
 
 @kernel
@@ -602,8 +671,8 @@ def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
             forces.in_use and forces.n_updates_capped_at_minimum == MIN_FORCE_UPDATES
         )
         if view.is_used:
-            view.column_leak = (
-                set_view_direction_and_return_leak(view, forces, gust, bound, G)
+            view.column_leak_share = (
+                set_view_direction_and_return_leak_share(view, forces, gust, bound, G)
                 if view.orthogonal_to_surface != AXIS_VIEW
                 else 0.0
             )
@@ -622,33 +691,35 @@ def project_innovation(
         if not view.is_used:
             continue
         set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, inertial_gust, V)
-        m, projected = view.direction, view.block.frame_innovation
-        projected[0] = 0.0
+        m, projected_innovation = view.direction, view.block.frame_innovation
+        projected_innovation[0] = 0.0
         for i in range(m.size):
             if m[i] != 0.0:
-                projected[0] += m[i] * innovation_component(view, forces, gust, inertial_gust, innovation, i)
+                projected_innovation[0] += m[i] * innovation_component(
+                    view, forces, gust, inertial_gust, innovation, i
+                )
         if has_regressors or view.always_has_regressors:
             fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation)
 
 
 @kernel
-def update_view_tests(views, test_config, tone_config, y, dt, frame, is_alarm_latched):
+def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_alarm_latched):
     """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
-    within_envelope = is_within_envelope(tone_config, y)
-    evidence_decay = test_config.evidence_decay_factor if is_alarm_latched else 1.0
-    slot = likelihood.onset_slot_to_reset(frame)
+    inside_envelope = is_within_envelope(tone_config, y)
+    evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
+    onset_slot = likelihood.onset_slot_to_reset(frame_index)
     for view in views:
         if not view.is_used:
             view.decaying_peak_score = 0.0
             continue
         if not is_alarm_latched:
-            likelihood.reset_onset_slot(view.block, slot)
+            likelihood.reset_onset_slot(view.block, onset_slot)
         has_regressors = test_config.has_regressors or view.always_has_regressors
-        likelihood.update_block(view.block, view.uncertainty_bound, has_regressors, dt, evidence_decay)
+        likelihood.update_block(view.block, view.uncertainty_bound, has_regressors, dt, evidence_decay_factor)
         if (
             not view.uses_inertial_flow_angle
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
-            update_tone_tests(view, tone_config, test_config.alarm_level, within_envelope, has_regressors, dt)
+            update_tone_tests(view, tone_config, test_config.alarm_level, inside_envelope, has_regressors, dt)
         view.decaying_peak_score = max(
             (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
             * view.decaying_peak_score,
@@ -665,18 +736,20 @@ def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
     m, sensitivity = view.direction, 0.0
     for i in range(3):
         sensitivity += m[i] * effectiveness_column[i]
-    for f in range(2):
-        sensitivity += m[SIDE_FORCE + f] * forces.component[f].scaled_force_per_surface_rad[s]
+    for force_index in range(2):
+        sensitivity += (
+            m[SIDE_FORCE + force_index] * forces.component[force_index].scaled_force_per_surface_rad[s]
+        )
     return sensitivity != 0.0
 
 
 @kernel
 def max_test_score_of_view(view):
     """The largest score of the tests of a view."""
-    largest = view.tone_tests.score
+    largest_score = view.tone_tests.score
     for h in range(view.block.n_hypotheses):
-        largest = max(largest, view.block.hypothesis[h].score)
-    return largest
+        largest_score = max(largest_score, view.block.hypothesis[h].score)
+    return largest_score
 
 
 @kernel
@@ -692,9 +765,9 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
     if view.is_immune_to_vane_error or not (uses_force(view) or subtracts_gust_estimate(view, gust)):
         return max_test_score_of_view(view)
     confirming_score = 0.0
-    for other in views:
-        if other.is_immune_to_vane_error and other.plane_axes[1] == view.confirming_force:
-            confirming_score = max(confirming_score, other.decaying_peak_score)
+    for other_view in views:
+        if other_view.is_immune_to_vane_error and other_view.plane_axes[1] == view.confirming_force_component:
+            confirming_score = max(confirming_score, other_view.decaying_peak_score)
     return min(
         view.decaying_peak_score,
         confirming_score * test_config.alarm_level / np.sqrt(2.0 * test_config.isolation_llr_margin),
@@ -753,7 +826,7 @@ class ParityDirection(NamedTuple):
     )
 
 
-def parity_directions_of(aircraft: Aircraft, with_force: bool = False) -> Iterator[ParityDirection]:
+def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
     """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
 
     With accelerometers also, in the plane of a rate and its force, across the column of each surface that
@@ -777,31 +850,31 @@ def parity_directions_of(aircraft: Aircraft, with_force: bool = False) -> Iterat
         may_use_vane_gust_estimate=True,
     )
     for s in lateral_surfaces:
-        crosses_roll_column = aircraft.dominant_axis[s] == ROLL
-        others = [other for other in lateral_surfaces if other != s]
+        is_roll_surface = aircraft.dominant_axis[s] == ROLL
+        other_surfaces = [other_surface for other_surface in lateral_surfaces if other_surface != s]
         yield ParityDirection(
             s,
             _sum_of_unit_vectors((ROLL,)),
             LATERAL_PLANE,
-            others,
-            may_use_vane_gust_estimate=crosses_roll_column,
+            other_surfaces,
+            may_use_vane_gust_estimate=is_roll_surface,
         )
-    if not with_force:
+    if not with_forces:
         return
-    for f, plane_axes, moving_surfaces in (
+    for force_index, plane_axes, moving_surfaces in (
         (NORMAL_COMPONENT, PITCH_PLANE, pitch_surfaces),
         (SIDE_COMPONENT, YAW_PLANE, lateral_surfaces),
     ):
-        separated_surfaces = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[f])
-        for s in separated_surfaces:
-            own_components = aircraft.dominant_axis[s], plane_axes[1]
+        surfaces_separated_by_force = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+        for s in surfaces_separated_by_force:
+            column_components = aircraft.dominant_axis[s], plane_axes[1]
             yield ParityDirection(
                 s,
-                _sum_of_unit_vectors(own_components),
-                own_components,
-                [other for other in moving_surfaces if other != s],
+                _sum_of_unit_vectors(column_components),
+                column_components,
+                [other_surface for other_surface in moving_surfaces if other_surface != s],
             )
-        if separated_surfaces:
+        if surfaces_separated_by_force:
             yield ParityDirection(VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, moving_surfaces)
             yield ParityDirection(
                 AXIS_VIEW,
@@ -818,23 +891,29 @@ def _sum_of_unit_vectors(components: tuple[int, ...]) -> tuple[float, ...]:
 
 def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     """The capacities that the records of an aircraft need."""
-    axes = [moment_axis_of_term(term) for term in aircraft.moments]
-    views = list(parity_directions_of(aircraft, aircraft.forces_separate_surfaces))
-    n_rate_regressors = N_INPUT_READINGS + max(axes.count(PITCH), axes.count(ROLL) + axes.count(YAW))
-    n_force_regressors = (
-        max(len(force_terms(aircraft, f)) for f in (SIDE_COMPONENT, NORMAL_COMPONENT))
+    axis_of_term = [moment_axis_of_term(term) for term in aircraft.moments]
+    parity_directions = list(parity_directions_of(aircraft, aircraft.forces_separate_surfaces))
+    max_rate_regressors = N_INPUT_READINGS + max(
+        axis_of_term.count(PITCH), axis_of_term.count(ROLL) + axis_of_term.count(YAW)
+    )
+    max_force_regressors = (
+        max(len(force_terms(aircraft, force_index)) for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT))
         + forces.MAX_FORCE_REGRESSORS
         - MAX_TERMS_OF_ONE
     )
-    loss_axes = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
-    n_losses = max(loss_axes.count(PITCH), loss_axes.count(ROLL) + loss_axes.count(YAW))
-    n_tested_losses = max(len(view.surfaces_tested_for_loss) for view in views)
+    axis_of_loss = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
+    max_losses_per_rate_block = max(
+        axis_of_loss.count(PITCH), axis_of_loss.count(ROLL) + axis_of_loss.count(YAW)
+    )
+    max_tested_losses_per_view = max(
+        len(parity_direction.surfaces_tested_for_loss) for parity_direction in parity_directions
+    )
     error_map = aircraft.file.model_error_map
     n_boxes = len(error_map.boxes) if error_map else 0
     return StatisticalRecordSize(
-        BlockCapacity(n_rate_regressors, 3 * n_losses + 2),
-        BlockCapacity(n_rate_regressors + n_force_regressors + 2, n_tested_losses + 1),
-        len(views),
+        BlockCapacity(max_rate_regressors, 3 * max_losses_per_rate_block + 2),
+        BlockCapacity(max_rate_regressors + max_force_regressors + 2, max_tested_losses_per_view + 1),
+        len(parity_directions),
         n_boxes,
     )
 
@@ -843,23 +922,26 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
     surfaces_separated_by_force = [
-        aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[f]) for f in (SIDE_COMPONENT, NORMAL_COMPONENT)
+        aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+        for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT)
     ]
-    subtracts_gust = (
+    subtracts_gust_estimate_from_rates = (
         forces["in_use"]
         and statistical["gust"]["output"]["accounts_for_gusts"]
         and all(surfaces_separated_by_force)
     )
-    views = list(parity_directions_of(aircraft, bool(forces["in_use"])))[: len(statistical["views"])]
-    statistical["n_views"] = len(views)
+    parity_directions = list(parity_directions_of(aircraft, bool(forces["in_use"])))[
+        : len(statistical["views"])
+    ]
+    statistical["n_views"] = len(parity_directions)
     for view, (
         orthogonal_to_surface,
         direction,
         plane_axes,
-        moving_surfaces,
+        surfaces_tested_for_loss,
         uses_inertial_flow_angle,
         may_use_vane_gust_estimate,
-    ) in zip(statistical["views"], views, strict=False):
+    ) in zip(statistical["views"], parity_directions, strict=False):
         view["orthogonal_to_surface"], view["direction"], view["plane_axes"], block = (
             orthogonal_to_surface,
             direction,
@@ -875,35 +957,38 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
         law_reacts_to_gust = statistical["gust"]["output"]["accounts_for_gusts"] and direction[PITCH]
-        tested_losses = [] if law_reacts_to_gust else moving_surfaces[: len(block["hypothesis"]) - 1]
-        kinds, n_regressors = [STEP_FAULT, *(LOSS for _ in tested_losses)], int(rate_block["n_regressors"])
-        block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(kinds), 1.0
+        loss_surfaces = [] if law_reacts_to_gust else surfaces_tested_for_loss[: len(block["hypothesis"]) - 1]
+        hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surfaces)]
+        n_regressors = int(rate_block["n_regressors"])
+        block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(hypothesis_kinds), 1.0
         block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
         block["P_dd"][0, 0] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
-        for name in ("alarm_level", "noise_share_of_alarm_level", "uncertainty_change_over_bound_per_frame"):
-            block[name] = rate_block[name]
+        for field_name in (
+            "alarm_level",
+            "noise_share_of_alarm_level",
+            "uncertainty_change_over_bound_per_frame",
+        ):
+            block[field_name] = rate_block[field_name]
         block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
-        if may_use_vane_gust_estimate and subtracts_gust:
-            view["confirming_force"] = NORMAL_FORCE if plane_axes == PITCH_PLANE else SIDE_FORCE
+        if may_use_vane_gust_estimate and subtracts_gust_estimate_from_rates:
+            view["confirming_force_component"] = NORMAL_FORCE if plane_axes == PITCH_PLANE else SIDE_FORCE
         if any(direction[SIDE_FORCE:]):
-            force, view["confirming_force"] = (
-                forces["component"][plane_axes[1] - SIDE_FORCE],
-                plane_axes[1],
-            )
-            view["always_has_regressors"], n_force_regressors = 1, int(force["n_regressors"])
-            block["regressor_tolerance"][n_regressors : n_regressors + n_force_regressors] = force[
+            force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
+            view["confirming_force_component"] = plane_axes[1]
+            view["always_has_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
+            block["regressor_tolerance"][n_regressors : n_regressors + n_force_regressors] = force_record[
                 "regressor_tolerance"
             ][:n_force_regressors]
             n_regressors += n_force_regressors
             if uses_inertial_flow_angle:
-                block["regressor_tolerance"][n_regressors] = force["flow_angle_drift_bound"]
+                block["regressor_tolerance"][n_regressors] = force_record["flow_angle_drift_bound"]
                 n_regressors = n_regressors + 1
         block["n_regressors"] = n_regressors + (orthogonal_to_surface != AXIS_VIEW)
         block["regressor_tolerance"][n_regressors] = float(
             orthogonal_to_surface != AXIS_VIEW
         )  # of the leak, which is worked out in flight
-        hypotheses = block["hypothesis"][: len(kinds)]
-        hypotheses["kind"], hypotheses["surface"] = kinds, [-1, *tested_losses]
+        hypotheses = block["hypothesis"][: len(hypothesis_kinds)]
+        hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surfaces]
         view["is_orthogonal_to_rolling_gust"] = (
             orthogonal_to_surface == VANE_VIEW
             and plane_axes == YAW_PLANE
@@ -911,7 +996,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         )
         view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
         view["is_immune_to_vane_error"] = uses_inertial_flow_angle or orthogonal_to_surface == VANE_VIEW
-        likelihood.set_supporting_correlation_signs(block, kinds)
+        likelihood.set_supporting_correlation_signs(block, hypothesis_kinds)
 
 
 @kernel
@@ -944,8 +1029,9 @@ def fill_view_signatures(view, forces, Gu):
         hypothesis.signature[0] = 1.0
         if hypothesis.kind != STEP_FAULT:
             loss_signature = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
-            for f in range(2):
+            for force_index in range(2):
                 loss_signature += (
-                    m[SIDE_FORCE + f] * forces.component[f].scaled_force_of_surface_at_command[s]
+                    m[SIDE_FORCE + force_index]
+                    * forces.component[force_index].scaled_force_of_surface_at_command[s]
                 )
             hypothesis.signature[0] = loss_signature

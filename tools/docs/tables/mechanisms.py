@@ -1,4 +1,4 @@
-"""What docs/results/mechanisms.md shows of the study that `beaver-ftc mechanisms` flies."""
+"""What docs/results/mechanisms.md and mechanisms-tables.md show of the study of `beaver-ftc mechanisms`."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -19,7 +19,7 @@ from tools.docs.tables import shared
 
 Document = dict[str, Any]
 SEED = 1
-SEEDS = (SEED,)  # of all results on the page
+SEEDS = (SEED,)  # of all results on the pages
 PROBED = (
     Flight("loss 40 %", "high", 0.0, "exact sensors", 1),
     Flight("unanticipated", "low", 0.02, "real sensors", 0),
@@ -76,7 +76,8 @@ def _signs(row: Document) -> tuple[bool, bool]:
 
 def mechanisms_systems() -> str:
     """Both systems with all of their mechanisms."""
-    return markdown_table(shown.SYSTEM_HEAD, shown.system_rows(_flown()[0]))
+    document = _flown()[0]
+    return markdown_table(shown.system_head(document), shown.system_rows(document))
 
 
 def mechanisms_net() -> str:

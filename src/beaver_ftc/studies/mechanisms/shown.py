@@ -21,21 +21,26 @@ CRITERIA = {  # of effects.py, in the words of tables
     "names": "lost names",
     "tracking": "worse tracking",
 }
-NET_HEAD = ("mechanism", *(f"{words}, %" for words in CRITERIA.values()))
+INTERVAL = "95 % interval"
+NET_HEAD = ("mechanism", *(head for words in CRITERIA.values() for head in (f"{words}, points", INTERVAL)))
 SAME_HEAD = ("mechanism", "flights", "same verdict", "same tracking")
 MEDIAN_HEAD = ("mechanism", "delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s",
-               "error ratio")  # fmt: skip
-SYSTEM_HEAD = ("system", "flights", "false alarms, %", "detected, %", "named rightly, %", "aircraft lost, %",
-               "error, deg/s")  # fmt: skip
-ALARM_HEAD = ("flown", "false alarms", "with an undeclared error", "certified", "unexplained")
+               "error ratio", INTERVAL)  # fmt: skip
+SYSTEM_SHARES = {
+    "false_alarms": "false alarms, %", "detected": "detected, %", "named": "named rightly, %",
+    "lost": "aircraft lost, %",
+}  # fmt: skip
+ALARM_HEAD = (
+    "system", "mechanisms", "false alarms", "with an undeclared error", "certified", "unexplained",
+)  # fmt: skip
 MARGIN_HEAD = ("system", "bandwidth", "instruments", "gain margin, dB", "phase margin, deg")
 
 
 CAPTIONS = (
-    "Both systems with all of their mechanisms; in parentheses 95 % intervals.",
-    "Net share of flights that are worse without the mechanism, % (95 % interval).",
+    "Both systems with all of their mechanisms.",
+    "Net share of flights that are worse without the mechanism, percentage points.",
     "Pairs of flights with the same alarm, name and time of both, and with the same tracking error.",
-    "Medians with and without the mechanism; error ratio: without over with (95 % interval).",
+    "Medians with and without the mechanism; error ratio: without over with.",
     "False alarms, and how many of them are explained.",
 )
 
@@ -51,7 +56,7 @@ def as_text(document: Document) -> str:
 
 def tables(document: Document) -> Iterator[tuple[Sequence[str], Rows]]:
     """Head and rows of a table for each of CAPTIONS."""
-    yield SYSTEM_HEAD, system_rows(document)
+    yield system_head(document), system_rows(document)
     for head, row_of in ((NET_HEAD, net_row), (SAME_HEAD, same_row), (MEDIAN_HEAD, median_row)):
         yield head, [row_of(row) for row in document["mechanisms"]]
     yield ALARM_HEAD, alarm_rows(document)
@@ -102,13 +107,13 @@ def alarms_sentence(document: Document) -> str:
 
 def net_row(row: Document) -> tuple[str, ...]:
     """A mechanism's row for NET_HEAD."""
-    return label(row), *(net_cell(row[name]) for name in CRITERIA)
+    return label(row), *(cell for name in CRITERIA for cell in net_cells(row[name]))
 
 
-def net_cell(found: Document) -> str:
-    """A net share with its interval, %."""
-    value, low, high = (100.0 * found[key] for key in ("value", "low", "high"))
-    return f"{value:+.1f} ({low:+.1f} to {high:+.1f})".replace("+0.0 (", "0.0 (").replace("-0.0 (", "0.0 (")
+def net_cells(found: Document) -> tuple[str, str]:
+    """A net share and its interval, percentage points."""
+    value, low, high = (f"{100.0 * found[key]:+.1f}" for key in ("value", "low", "high"))
+    return "0.0" if value[1:] == "0.0" else value, f"{low} to {high}"
 
 
 def same_row(row: Document) -> tuple[str, ...]:
@@ -122,46 +127,59 @@ def median_row(row: Document) -> tuple[str, ...]:
     return (
         label(row),
         *(number(value, none="never") for value in medians),
-        interval_cell(row["tracking_ratio"]),
+        *interval_cells(row["tracking_ratio"]),
     )
 
 
 _BOTH = ("with", "without")
 
 
-def interval_cell(found: Document) -> str:
-    """A median with its interval."""
+def interval_cells(found: Document) -> tuple[str, str]:
+    """A median and its interval."""
     value, low, high = (number(found[key], none="never") for key in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"
+    return value, f"{low} to {high}"
+
+
+def system_head(document: Document) -> tuple[str, ...]:
+    """The head of `system_rows`: two columns a system."""
+    return "quantity", *(head for system in document["systems"] for head in (system, INTERVAL))
 
 
 def system_rows(document: Document) -> Rows:
-    """A row a system for SYSTEM_HEAD."""
+    """A row a quantity of both systems."""
+    systems = document["systems"].values()
     return [
-        (
-            system, str(row["flights"]),
-            *(_percent(row[name]) for name in ("false_alarms", "detected", "named", "lost")),
-            interval_cell(row["tracking_deg_s"]),
-        )
-        for system, row in document["systems"].items()
-    ]  # fmt: skip
+        ("flights", *(cell for row in systems for cell in (str(row["flights"]), ""))),
+        *(
+            (words, *(cell for row in systems for cell in _percent(row[name])))
+            for name, words in SYSTEM_SHARES.items()
+        ),
+        ("error, deg/s", *(cell for row in systems for cell in interval_cells(row["tracking_deg_s"]))),
+    ]
 
 
-def _percent(rate: Document) -> str:
+def _percent(rate: Document) -> tuple[str, str]:
     value, low, high = (100.0 * rate[key] for key in ("value", "low", "high"))
-    return f"{value:.0f} ({low:.0f} to {high:.0f})"
+    return f"{value:.0f}", f"{low:.0f} to {high:.0f}"
 
 
 def alarm_rows(document: Document) -> Rows:
     """A row of what was flown for ALARM_HEAD."""
     return [
         (
-            row["flown"], str(row["count"]), str(row["undeclared"]),
+            *_system_and_mechanisms(row["flown"]), str(row["count"]), str(row["undeclared"]),
             str(row["certified"]) if row["certifiable"] or not row["count"] else "-",
             str(row["unexplained"]) if row["worst_case"] else "-",
         )
         for row in document["false_alarms"]
     ]  # fmt: skip
+
+
+def _system_and_mechanisms(flown: str) -> tuple[str, str]:
+    """Both of a key such as "published" or "without default: bank of poles"."""
+    first, _, rest = flown.partition(" ")
+    system, _, mechanism = rest.partition(": ")
+    return (system, f"{first} {mechanism}") if rest else (first, "all")
 
 
 def margin_rows(document: Document) -> Rows:
@@ -174,8 +192,9 @@ def margin_rows(document: Document) -> Rows:
 
 
 def level_head(document: Document, factor: str) -> tuple[str, ...]:
-    """The head of `level_rows`: a column a level of a factor."""
-    return ("mechanism", *(_level(factor, value) for value in document["factors"][factor]))
+    """The head of `level_rows`: two columns a level of a factor."""
+    levels = document["factors"][factor]
+    return "mechanism", *(head for value in levels for head in (_level(factor, value), INTERVAL))
 
 
 def _level(factor: str, value: Any) -> str:
@@ -185,7 +204,7 @@ def _level(factor: str, value: Any) -> str:
 def level_rows(document: Document, factor: str, criterion: str, serves: str) -> Rows:
     """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
     return [
-        (label(row), *(net_cell(found[criterion]) for found in row["by"][factor].values()))
+        (label(row), *(cell for found in row["by"][factor].values() for cell in net_cells(found[criterion])))
         for row in document["mechanisms"]
         if row["serves"] == serves
     ]

@@ -72,12 +72,11 @@ def benchmark_gains() -> str:
     none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
     largest = max(again.get("gain", 0.0) for again in last)
     says = [
-        f"For {kept} of {len(rows)} pairs of method and grade the last search finds no values that cost 5 % "
-        "less: the gain is 0.",
-        f"No values are admissible: {', '.join(none)}.",
-        'A row with "yes" is not the last search of its method and grade.',
-        "A last search that finds no cheaper values is not in the table.",
+        f"The table does not contain searches that found no better values. There are {len(rows)} pairs of "
+        f"method and grade. For {kept} of them, the last search found no values that cost at least 5 % less.",
+        f"For {', '.join(none)}, no values were admissible.",
         f"The largest gain of a last search is {100.0 * largest:.1f} %.",
+        'After each row with "yes", a further search followed.',
     ]
     return f"{markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])}\n\n{' '.join(says)}"
 

@@ -32,7 +32,7 @@ _MAX_SQUARED_RESIDUAL = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
 
-OneHypothesis = tuple[
+HypothesisRow = tuple[
     Floats, int, float, Floats
 ]  # effectiveness of each group, kind, transition share, variance of the rate offset
 
@@ -75,44 +75,47 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model. A group whose effect is unknown has none, unless all effects are unknown."""
     n_groups, settings = len(model.groups), model.settings
     has_known_effect = is_group_effect_known(model)
-    known_groups = [
+    groups_with_hypotheses = [
         group for group in range(n_groups) if has_known_effect[group] or not any(has_known_effect)
     ]
-    rows: list[OneHypothesis] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
-    n_known_surfaces = sum(len(model.groups[group]) for group in known_groups)
-    may_be_stuck = "stuck" in model.vehicle.faults
-    may_be_pairs = len(known_groups) > 1
+    hypothesis_rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
+    n_surfaces_with_hypotheses = sum(len(model.groups[group]) for group in groups_with_hypotheses)
+    may_surfaces_be_stuck = "stuck" in model.vehicle.faults
+    has_pair_hypotheses = len(groups_with_hypotheses) > 1
     single_fault_share = (
         1.0
-        - (_PAIR_LOSS_TRANSITION_SHARE if may_be_pairs else 0.0)
-        - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_be_stuck else 0.0)
+        - (_PAIR_LOSS_TRANSITION_SHARE if has_pair_hypotheses else 0.0)
+        - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_surfaces_be_stuck else 0.0)
     )
-    for group in known_groups:
+    for group in groups_with_hypotheses:
         levels, level_shares = _effectiveness_levels_and_prior_shares(model, group)
-        group_share = (
-            single_fault_share * len(model.groups[group]) / n_known_surfaces / len(model.vehicle.faults)
+        group_fault_share = (
+            single_fault_share
+            * len(model.groups[group])
+            / n_surfaces_with_hypotheses
+            / len(model.vehicle.faults)
         )
         for offset_variance in _rate_offset_variance_per_fault_kind(model, group):
-            for level, transition_share in zip(levels, level_shares, strict=True):
-                rows.append(
+            for level, level_share in zip(levels, level_shares, strict=True):
+                hypothesis_rows.append(
                     (
                         _group_effectiveness_row(n_groups, {group: level}),
                         GROUP_LOSS,
-                        group_share * transition_share,
+                        group_fault_share * level_share,
                         offset_variance,
                     )
                 )
-    rows += _pair_hypotheses(n_groups, known_groups)
-    if may_be_stuck:
+    hypothesis_rows += _pair_hypotheses(n_groups, groups_with_hypotheses)
+    if may_surfaces_be_stuck:
         unknown_offset_variance = (
             np.diag(np.array(model.residual_covariance)) * settings.jam_rate_offset_sd**2
         )
-        rows.append(
+        hypothesis_rows.append(
             (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_TRANSITION_SHARE, unknown_offset_variance)
         )
-    rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
+    hypothesis_rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
     effectiveness, hypothesis_kind, transition_share, offset_variance = (
-        np.array(column) for column in zip(*rows, strict=True)
+        np.array(values) for values in zip(*hypothesis_rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
     change_probability_per_sample = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
@@ -131,20 +134,20 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
 
 
 def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) -> Floats:
-    row = np.ones(n_groups)
+    effectiveness = np.ones(n_groups)
     for group, level in level_of_group.items():
-        row[group] = level
-    return row
+        effectiveness[group] = level
+    return effectiveness
 
 
 def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
     labelled_levels = settings.likely_effectiveness_levels_by_group.get("+".join(model.groups[group]), [])
-    even_levels = np.arange(
+    grid_levels = np.arange(
         0.0, 1.0 - 0.5 * settings.effectiveness_level_step, settings.effectiveness_level_step
     )
-    levels = np.unique(np.round(np.concatenate([even_levels, np.array(labelled_levels, dtype=float)]), 6))
+    levels = np.unique(np.round(np.concatenate([grid_levels, np.array(labelled_levels, dtype=float)]), 6))
     is_labelled_level = np.isin(levels, np.round(labelled_levels, 6))
     if not is_labelled_level.any() or is_labelled_level.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
@@ -159,20 +162,23 @@ def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Fl
 def _rate_offset_variance_per_fault_kind(model: Model, group: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, response, noise = model.coefficient_arrays()
-    response_size = np.abs(response[group]).sum(axis=0) / np.sqrt(np.diag(noise))
-    axis_share = np.clip(response_size / max(response_size.max(), MIN_DIVISOR), 0.3, 1.0)
+    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    summed_response_sd = np.abs(command_response[group]).sum(axis=0) / np.sqrt(np.diag(residual_covariance))
+    relative_axis_response = np.clip(
+        summed_response_sd / max(summed_response_sd.max(), MIN_DIVISOR), 0.3, 1.0
+    )
     variance_of_fault_kind = {
         "loss": np.zeros(3),
-        "stuck": np.diag(noise) * (model.settings.jam_rate_offset_sd * axis_share) ** 2,
+        "stuck": np.diag(residual_covariance)
+        * (model.settings.jam_rate_offset_sd * relative_axis_response) ** 2,
     }
     return [variance_of_fault_kind[kind] for kind in model.vehicle.faults]
 
 
-def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[OneHypothesis]:
+def _pair_hypotheses(n_groups: int, groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
     groups_and_levels = list(
-        product(combinations(known_groups, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
+        product(combinations(groups_with_hypotheses, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
     )
     return [
         (
@@ -187,11 +193,11 @@ def _pair_hypotheses(n_groups: int, known_groups: list[int]) -> list[OneHypothes
 
 def _prior_probabilities(hypothesis_kind: np.ndarray, transition_share: Floats) -> Floats:
     """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed."""
-    is_other = (hypothesis_kind != HEALTHY) & (hypothesis_kind != NO_RESPONSE)
+    is_fault_or_unknown_offset = (hypothesis_kind != HEALTHY) & (hypothesis_kind != NO_RESPONSE)
     prior_probability = (
         transition_share
         * (1.0 - _PRIOR_HEALTHY_PROBABILITY - _PRIOR_NO_RESPONSE_PROBABILITY)
-        / transition_share[is_other].sum()
+        / transition_share[is_fault_or_unknown_offset].sum()
     )
     prior_probability[0] = _PRIOR_HEALTHY_PROBABILITY
     prior_probability[-1] = _PRIOR_NO_RESPONSE_PROBABILITY
@@ -217,27 +223,33 @@ class TrimAndGainStateModel(NamedTuple):
 def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     """The prior and the limits of trim and gains, from a model's settings."""
     settings, n_groups = model.settings, len(model.groups)
-    _, _, response, noise = model.coefficient_arrays()
-    noise_variance = np.diag(noise)
-    trim_shift = response.sum(axis=1) * settings.trim_command_shift_sd
-    covariance = np.zeros((4 + n_groups, 4 + n_groups))
-    covariance[:3, :3] = np.diag(noise_variance * settings.trim_sd**2) + trim_shift.T @ trim_shift
-    covariance[3, 3] = settings.gain_sd**2
-    covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
+    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    residual_variance = np.diag(residual_covariance)
+    trim_shift_by_group = command_response.sum(axis=1) * settings.trim_command_shift_sd
+    initial_covariance = np.zeros((4 + n_groups, 4 + n_groups))
+    initial_covariance[:3, :3] = (
+        np.diag(residual_variance * settings.trim_sd**2) + trim_shift_by_group.T @ trim_shift_by_group
+    )
+    initial_covariance[3, 3] = settings.gain_sd**2
+    initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
         settings.group_gain_sd** 2 + _gain_variance_beyond_level_step(model)
     )
     return_times_s = np.array(
         [np.inf] * 3 + [settings.gain_return_time_s] + [settings.group_gain_return_time_s] * n_groups
     )
-    retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
-    random_walk_variance = (1.0 - retention**2) * np.diag(covariance)
-    random_walk_variance[:3] = noise_variance * np.array(settings.trim_random_walk_sd) ** 2
+    deviation_retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
+    random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)
+    random_walk_variance[:3] = residual_variance * np.array(settings.trim_random_walk_sd) ** 2
     max_deviation_sd = np.array(
         [settings.max_trim_deviation_sd] * 3 + [settings.max_gain_deviation_sd] * (1 + n_groups)
     )
-    mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
+    initial_mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
     return TrimAndGainStateModel(
-        mean, covariance, np.sqrt(np.diag(covariance)) * max_deviation_sd, retention, random_walk_variance
+        initial_mean,
+        initial_covariance,
+        np.sqrt(np.diag(initial_covariance)) * max_deviation_sd,
+        deviation_retention,
+        random_walk_variance,
     )
 
 
@@ -277,10 +289,10 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
         model.settings,
         _MAX_SQUARED_RESIDUAL if len(model.residual_ar_coefficients(noise_ma_coefficients)) else np.inf,
     )
-    memory_samples = settings.noise_scale_memory_s * model.rate_hz
+    scale_memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(
         model.whitened_intercept(noise_ma_coefficients), model.coefficient_arrays()[3],
-        settings.effective_sample_share, settings.t_degrees_of_freedom, memory_samples,
+        settings.effective_sample_share, settings.t_degrees_of_freedom, scale_memory_samples,
         _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
         model.noise_inflation(noise_ma_coefficients),
     )  # fmt: skip

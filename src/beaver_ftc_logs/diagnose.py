@@ -259,7 +259,7 @@ def rows_of_posterior(
     evidence_increments = any_fault_log_odds_gains(posterior, bank)
     evidence = page_cusum(evidence_increments, threshold or np.inf)
     is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
-        probability >= model.settings.alarm_probability, model
+        probability >= model.settings.fault_probability_for_alarm, model
     )
     if threshold is not None:
         naming_threshold = model.settings.isolation_evidence_factor * threshold

@@ -70,20 +70,25 @@ def peaks_between_zeros(statistic: Floats) -> Floats:
 def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail | None:
     """The tail of the peaks of all held-out flights; None if there are at most ten peaks."""
     peaks = np.sort(
-        np.concatenate([one for one, _ in held_out_peaks_and_hours]) if held_out_peaks_and_hours else []
+        np.concatenate([peaks_of_flight for peaks_of_flight, _ in held_out_peaks_and_hours])
+        if held_out_peaks_and_hours
+        else []
     )[::-1]
     if len(peaks) <= _MIN_PEAKS:
         return None
     n_peaks_over_level = min(
         max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(peaks)))), len(peaks) - 1
     )
-    level = float(peaks[n_peaks_over_level])
+    tail_start_level = float(peaks[n_peaks_over_level])
     return PeakTail(
-        level=level,
-        excess=(peaks[:n_peaks_over_level] - level).tolist(),
+        level=tail_start_level,
+        excess=(peaks[:n_peaks_over_level] - tail_start_level).tolist(),
         minutes=60.0 * sum(hours for _, hours in held_out_peaks_and_hours),
         dispersion=_excess_overdispersion(
-            [(one[one > level] - level, hours) for one, hours in held_out_peaks_and_hours]
+            [
+                (peaks_of_flight[peaks_of_flight > tail_start_level] - tail_start_level, hours)
+                for peaks_of_flight, hours in held_out_peaks_and_hours
+            ]
         ),
     )
 
@@ -92,47 +97,48 @@ def _excess_overdispersion(held_out_peaks_and_hours: Sequence[PeaksAndHours]) ->
     """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
     excess_sums, hours = (
-        np.array([one.sum() for one, _ in held_out_peaks_and_hours]),
+        np.array([excesses.sum() for excesses, _ in held_out_peaks_and_hours]),
         np.array([hours for _, hours in held_out_peaks_and_hours]),
     )
-    n_peaks, hours_share = sum(len(one) for one, _ in held_out_peaks_and_hours), hours / hours.sum()
+    n_peaks, hours_share = sum(len(excesses) for excesses, _ in held_out_peaks_and_hours), hours / hours.sum()
     if len(held_out_peaks_and_hours) < 2 or excess_sums.sum() <= 0.0:
         return 1.0
-    mean_excess, mean_excess_of_peak = hours_share * excess_sums.sum(), excess_sums.sum() / n_peaks
-    squared_deviation = (excess_sums - mean_excess) ** 2 / np.maximum(
-        2.0 * mean_excess * mean_excess_of_peak, MIN_DIVISOR
+    expected_excess_sums, mean_excess_of_peaks = hours_share * excess_sums.sum(), excess_sums.sum() / n_peaks
+    squared_deviation = (excess_sums - expected_excess_sums) ** 2 / np.maximum(
+        2.0 * expected_excess_sums * mean_excess_of_peaks, MIN_DIVISOR
     )
     return max(float(squared_deviation.sum()) / (len(held_out_peaks_and_hours) - 1), 1.0)
 
 
 def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarmsPerHour:
     """False alarms an hour at a threshold not below the tail's level."""
-    shape, scale, weight = _pareto_posterior(tail)
+    shape, scale, grid_probability = _pareto_posterior(tail)
     false_alarm_rates = (
         _exceedance_probability(threshold - tail.tail_start_level, shape, scale)[:, None]
         * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
-    by_rate, rate_probability = (
+    order_by_rate, rate_probability = (
         np.argsort(false_alarm_rates),
-        np.repeat(weight, len(_PEAK_RATE_QUANTILE_PROBABILITIES)) / len(_PEAK_RATE_QUANTILE_PROBABILITIES),
+        np.repeat(grid_probability, len(_PEAK_RATE_QUANTILE_PROBABILITIES))
+        / len(_PEAK_RATE_QUANTILE_PROBABILITIES),
     )
     quantile_index = np.searchsorted(
-        np.cumsum(rate_probability[by_rate]),
+        np.cumsum(rate_probability[order_by_rate]),
         np.array(_CREDIBLE_INTERVAL_PROBABILITIES) - _PROBABILITY_ROUNDING,
     )
-    low, high = false_alarm_rates[by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
+    low, high = false_alarm_rates[order_by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
     return ExpectedFalseAlarmsPerHour(float(false_alarm_rates @ rate_probability), float(low), float(high))
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """The threshold at which this rate of false alarms is expected; the level of the tail if the rate there
     is lower."""
-    shape, scale, weight = _pareto_posterior(tail)
-    mean_peak_rate = float(_peaks_per_hour_quantiles(tail).mean())
+    shape, scale, grid_probability = _pareto_posterior(tail)
+    mean_peaks_per_hour = float(_peaks_per_hour_quantiles(tail).mean())
 
     def has_too_many_alarms(excess: float) -> bool:
         return (
-            mean_peak_rate * float(_exceedance_probability(excess, shape, scale) @ weight)
+            mean_peaks_per_hour * float(_exceedance_probability(excess, shape, scale) @ grid_probability)
             > false_alarms_per_hour
         )
 
@@ -182,12 +188,12 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     from scipy.stats import genpareto
 
     excess = np.array(tail.excess_over_level)
-    scales = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
-    shape, scale = (part.ravel() for part in np.meshgrid(_SHAPE_GRID, scales, indexing="ij"))
+    scale_grid = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
+    shape, scale = (grid.ravel() for grid in np.meshgrid(_SHAPE_GRID, scale_grid, indexing="ij"))
     log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.overdispersion
     log_posterior -= 0.5 * (shape / _SHAPE_PRIOR_SD) ** 2
-    weight = np.exp(log_posterior - log_posterior.max())
-    return shape, scale, weight / weight.sum()
+    grid_probability = np.exp(log_posterior - log_posterior.max())
+    return shape, scale, grid_probability / grid_probability.sum()
 
 
 def _exceedance_probability(excess: float, shape: Floats, scale: Floats) -> Floats:

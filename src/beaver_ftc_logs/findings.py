@@ -234,7 +234,10 @@ def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, d
     if not len(shares):
         return float("inf")
     change = settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
-    return float(np.log(settings.alarm_probability / (1.0 - settings.alarm_probability)) - np.log(change))
+    return float(
+        np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
+        - np.log(change)
+    )
 
 
 def _smallest_detectable_losses(

@@ -30,18 +30,22 @@ UNFITTED_LABEL_CHANGE_MARGIN_S = 1.5
 """Labels are good to about a second: what lies nearer to a change is not fitted."""
 MIN_LABEL_DURATION_S = 3.0
 """A label that holds for less is the edge of another."""
-RATE_LAG_CANDIDATES = (1, 2, 3, 4)
-COMMAND_LAG_CANDIDATES = (2, 3, 4, 6)
+RATE_LAG_COUNT_CANDIDATES = (1, 2, 3, 4)
+COMMAND_LAG_COUNT_CANDIDATES = (2, 3, 4, 6)
 _NEWEY_WEST_MAX_LAG_S = 2.0
 _MIN_RATE_SPREAD_RAD_S = 1e-6
 _UNFITTED_MARGIN_BEFORE_FAILURE_S = 1.0
-_ALARM_PROBABILITY, _ALARM_PROBABILITY_HOLD_S, _EFFECTIVE_SAMPLE_SHARE_UNLABELLED = 0.995, 0.3, 0.9
+_FAULT_PROBABILITY_FOR_ALARM, _ALARM_CONFIRMATION_TIME_S, _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED = (
+    0.995,
+    0.3,
+    0.9,
+)
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
 With parts enough that are not fitted, the rate of false alarms decides instead."""
 _DEFAULT_FALSE_ALARMS_PER_HOUR = 1.0
 _TRIM_DRIFT_AVERAGING_SPANS_S = (2.0, 8.0)
 """Spans whose means tell the drift of the trim from the residual's colour."""
-_EFFECTIVE_SAMPLE_SHARE = 0.8
+_EFFECTIVE_SAMPLE_SHARE_LABELLED = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
 _FILTER_SETTINGS_FOR_OTHER_DAYS: dict[str, Any] = {
     "trim_sd": 0.1,
@@ -68,11 +72,11 @@ _GAIN_WINDOW_S, AUTOREGRESSIVE_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
-_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
+_MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
 same way, the first on seed 1 of five aircraft."""
-_GYRO_NOISE_FACTOR, _GUST_NOISE_FACTOR = 1.7, 2.5
+_GYRO_NOISE_INFLATION_OTHER_LAWS, _GUST_NOISE_INFLATION_OTHER_LAWS = 1.7, 2.5
 """In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
 Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
 _MAX_WINDOW_NOISE_INFLATION = 200.0
@@ -115,10 +119,13 @@ def _compute_once(
     compute: Callable[[], CachedResult],
 ) -> CachedResult:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
-    cache, key = usable_flights[0].result_cache, (*result_key, *map(id, usable_flights))
-    if key not in cache:
-        cache[key] = (tuple(usable_flights), compute())  # held: an id is of one object while this lives
-    return cache[key][1]  # type: ignore[return-value]
+    cached_results, cache_key = usable_flights[0].result_cache, (*result_key, *map(id, usable_flights))
+    if cache_key not in cached_results:
+        cached_results[cache_key] = (
+            tuple(usable_flights),
+            compute(),
+        )  # held: an id is of one object while this lives
+    return cached_results[cache_key][1]  # type: ignore[return-value]
 
 
 def flights_with_usable_rows(flights: Sequence[Samples]) -> list[FlightWithUsableRows]:
@@ -132,18 +139,18 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
     if samples.logged_failures:
         is_usable &= (
             samples.t_s
-            < min(event.t_s for event in samples.logged_failures) - _UNFITTED_MARGIN_BEFORE_FAILURE_S
+            < min(failure.t_s for failure in samples.logged_failures) - _UNFITTED_MARGIN_BEFORE_FAILURE_S
         )
-    is_labelled = np.isfinite(samples.labels).any(axis=0)
-    if not is_labelled.any():
+    is_surface_labelled = np.isfinite(samples.labels).any(axis=0)
+    if not is_surface_labelled.any():
         return is_usable
-    labels = samples.labels[:, is_labelled]
+    labels = samples.labels[:, is_surface_labelled]
     is_usable &= np.isfinite(labels).all(axis=1)
     for begin, end in constant_stretches(labels):
         is_short = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
-        edge_samples = round(UNFITTED_LABEL_CHANGE_MARGIN_S / samples.dt_s)
-        is_usable[begin : end if is_short else begin + edge_samples] = False
-        is_usable[max(end - edge_samples, begin) : end] = False
+        n_margin_samples = round(UNFITTED_LABEL_CHANGE_MARGIN_S / samples.dt_s)
+        is_usable[begin : end if is_short else begin + n_margin_samples] = False
+        is_usable[max(end - n_margin_samples, begin) : end] = False
     return is_usable
 
 
@@ -151,37 +158,40 @@ def fit_model(
     usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, settings: FilterSettings | None = None
 ) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
-    history, lags = choose_model_order(usable_flights, vehicle)
-    model = _fit_model_of_order(usable_flights, vehicle, history, lags)
+    n_rate_lags, n_command_lags = choose_model_order(usable_flights, vehicle)
+    model = _fit_model_of_order(usable_flights, vehicle, n_rate_lags, n_command_lags)
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(usable_flights, model)})
     return _with_inflated_noise(usable_flights, model) if model.noise_models else model
 
 
 def fit_with_same_order(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
-    fitted = _fit_model_of_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    refitted_model = _fit_model_of_order(
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
     noise_inflation_by_ma_coefficients = {
-        tuple(one.ma_coefficients): one.covariance_inflation for one in model.noise_models
+        tuple(noise_model.ma_coefficients): noise_model.covariance_inflation
+        for noise_model in model.noise_models
     }
     return _with_noise_inflation(
-        fitted.model_copy(update={"settings": model.settings}), noise_inflation_by_ma_coefficients
+        refitted_model.model_copy(update={"settings": model.settings}), noise_inflation_by_ma_coefficients
     )
 
 
 def _with_noise_inflation(
     model: Model, noise_inflation_by_ma_coefficients: dict[tuple[float, ...], float]
 ) -> Model:
-    colours = [
-        one.model_copy(
+    noise_models = [
+        noise_model.model_copy(
             update={
                 "covariance_inflation": noise_inflation_by_ma_coefficients.get(
-                    tuple(one.ma_coefficients), 1.0
+                    tuple(noise_model.ma_coefficients), 1.0
                 )
             }
         )
-        for one in model.noise_models
+        for noise_model in model.noise_models
     ]
-    return model.model_copy(update={"noise_models": colours})
+    return model.model_copy(update={"noise_models": noise_models})
 
 
 def _cross_validation_fits(
@@ -191,20 +201,22 @@ def _cross_validation_fits(
 ) -> Iterator[tuple[Model, Sequence[FlightWithUsableRows]]]:
     """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
     held-out flights. effect_share_explained_by_others: of all flights, as in `FittedRanges`."""
-    for fitted, held_out in _cross_validation_splits(usable_flights):
-        part_model = fit_with_same_order(fitted, model)
-        fit = fit_least_squares_of_order(fitted, model.vehicle, model.n_rate_lags, model.n_command_lags)
-        gain_sd = group_gain_standard_error(fit, model).tolist()
-        part_ranges = FittedRanges(
-            commands=[], rates=[], gain_sd=gain_sd, tied=effect_share_explained_by_others
+    for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
+        fold_model = fit_with_same_order(fitted_flights, model)
+        rate_regression = fit_least_squares_of_order(
+            fitted_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
         )
-        yield part_model.model_copy(update={"fitted_ranges": part_ranges}), held_out
+        gain_standard_errors = group_gain_standard_error(rate_regression, model).tolist()
+        fitted_ranges = FittedRanges(
+            commands=[], rates=[], gain_sd=gain_standard_errors, tied=effect_share_explained_by_others
+        )
+        yield fold_model.model_copy(update={"fitted_ranges": fitted_ranges}), held_out_flights
 
 
 def choose_model_order(usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle) -> tuple[int, int]:
     """Past samples of rates and commands by the Bayesian information criterion."""
-    scores = bic_by_order(usable_flights, vehicle)
-    return min(scores, key=lambda order: scores[order])
+    bic_of_order = bic_by_order(usable_flights, vehicle)
+    return min(bic_of_order, key=lambda order: bic_of_order[order])
 
 
 def bic_by_order(
@@ -215,40 +227,51 @@ def bic_by_order(
     Every order's regressors are among those of the largest: one matrix of products serves all.
     """
     regressors, rates, _ = stacked_regression_data(
-        usable_flights, vehicle, max(RATE_LAG_CANDIDATES), max(COMMAND_LAG_CANDIDATES)
+        usable_flights, vehicle, max(RATE_LAG_COUNT_CANDIDATES), max(COMMAND_LAG_COUNT_CANDIDATES)
     )
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
-    regressor_products, cross_products, rate_products = (
+    regressor_gram, regressor_rate_products, rate_gram = (
         (regressors / regressor_rms).T @ (regressors / regressor_rms),
         (regressors / regressor_rms).T @ rates,
         rates.T @ rates,
     )
-    scores = {}
-    for history in RATE_LAG_CANDIDATES:
-        for lags in COMMAND_LAG_CANDIDATES:
-            columns = _regressor_columns_of_order(vehicle, history, lags)
+    bic_of_order = {}
+    for n_rate_lags in RATE_LAG_COUNT_CANDIDATES:
+        for n_command_lags in COMMAND_LAG_COUNT_CANDIDATES:
+            order_columns = _regressor_columns_of_order(vehicle, n_rate_lags, n_command_lags)
             coefficients = np.linalg.lstsq(
-                regressor_products[np.ix_(columns, columns)], cross_products[columns], rcond=1e-12
+                regressor_gram[np.ix_(order_columns, order_columns)],
+                regressor_rate_products[order_columns],
+                rcond=1e-12,
             )[0]
-            log_det = np.linalg.slogdet(
-                (rate_products - cross_products[columns].T @ coefficients) / len(rates)
+            log_residual_determinant = np.linalg.slogdet(
+                (rate_gram - regressor_rate_products[order_columns].T @ coefficients) / len(rates)
             )[1]
-            scores[history, lags] = len(rates) * log_det + 3 * len(columns) * np.log(len(rates))
-    return scores
+            bic_of_order[n_rate_lags, n_command_lags] = len(rates) * log_residual_determinant + 3 * len(
+                order_columns
+            ) * np.log(len(rates))
+    return bic_of_order
 
 
 def _regressor_columns_of_order(vehicle: Vehicle, n_rate_lags: int, n_command_lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
-    first_signal, n_signals = 1 + 3 * max(RATE_LAG_CANDIDATES), len(vehicle.signal_regressor_names)
-    first_command = first_signal + n_signals * vehicle.n_signal_lags(max(RATE_LAG_CANDIDATES))
-    group_starts = [
-        first_command + group * max(COMMAND_LAG_CANDIDATES)
+    first_signal_column, n_signals = (
+        1 + 3 * max(RATE_LAG_COUNT_CANDIDATES),
+        len(vehicle.signal_regressor_names),
+    )
+    first_command_column = first_signal_column + n_signals * vehicle.n_signal_lags(
+        max(RATE_LAG_COUNT_CANDIDATES)
+    )
+    group_first_columns = [
+        first_command_column + group * max(COMMAND_LAG_COUNT_CANDIDATES)
         for group in range(len(regression.group_surfaces_by_commands(vehicle)))
     ]
-    command_columns = [start + lag for start in group_starts for lag in range(n_command_lags)]
+    command_columns = [
+        first_column + lag for first_column in group_first_columns for lag in range(n_command_lags)
+    ]
     return [
         *range(1 + 3 * n_rate_lags),
-        *range(first_signal, first_signal + n_signals * vehicle.n_signal_lags(n_rate_lags)),
+        *range(first_signal_column, first_signal_column + n_signals * vehicle.n_signal_lags(n_rate_lags)),
         *command_columns,
     ]
 
@@ -257,10 +280,10 @@ def fit_least_squares_of_order(
     usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> regression.RateRegression:
     """Least squares of given order over all flights."""
-    what = ("order", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
+    result_key = ("order", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
     return _compute_once(
         usable_flights,
-        what,
+        result_key,
         lambda: _fit_least_squares_of_order_uncached(usable_flights, vehicle, n_rate_lags, n_command_lags),
     )
 
@@ -277,12 +300,14 @@ def _fit_least_squares_of_order_uncached(
             f"{10 * regressors.shape[1]} to fit "
             f"{regressors.shape[1]} coefficients an axis"
         )
-    still_axes = [
-        axis for axis, spread in zip("pqr", rates.std(axis=0), strict=True) if spread < _MIN_RATE_SPREAD_RAD_S
+    motionless_axes = [
+        axis
+        for axis, rate_sd in zip("pqr", rates.std(axis=0), strict=True)
+        if rate_sd < _MIN_RATE_SPREAD_RAD_S
     ]
-    if still_axes:
+    if motionless_axes:
         raise BadInput(
-            f"identify: rate {still_axes[0]} does not move, allowed: flights in which every rate does"
+            f"identify: rate {motionless_axes[0]} does not move, allowed: flights in which every rate does"
         )
     dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
     return regression.least_squares(regressors, rates, stretch_number, round(_NEWEY_WEST_MAX_LAG_S / dt_s))
@@ -295,37 +320,39 @@ def stacked_regression_data(
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
-    groups, max_lag = (
+    surface_groups, max_lag = (
         regression.group_surfaces_by_commands(vehicle),
-        max(RATE_LAG_CANDIDATES + COMMAND_LAG_CANDIDATES),
+        max(RATE_LAG_COUNT_CANDIDATES + COMMAND_LAG_COUNT_CANDIDATES),
     )
-    regressors, rates, stretch_numbers = [], [], []
+    regressors, flight_rates, stretch_numbers = [], [], []
     for flight_index, usable_flight in enumerate(usable_flights):
-        one, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
-        past, commands, is_predictable = regression.build_regressors(
-            one, groups, n_rate_lags, n_command_lags, True, n_signal_lags
+        samples, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
+        past_regressors, lagged_group_commands, is_predictable = regression.build_regressors(
+            samples, surface_groups, n_rate_lags, n_command_lags, True, n_signal_lags
         )
         is_usable = usable_flight.is_usable & is_predictable
         is_usable[:max_lag] = False
-        n_samples = len(past)
+        n_samples = len(past_regressors)
         regressors.append(
-            one.fit_weight
-            * np.column_stack([np.ones(n_samples), past, commands.reshape(n_samples, -1)])[is_usable]
+            samples.fit_weight
+            * np.column_stack(
+                [np.ones(n_samples), past_regressors, lagged_group_commands.reshape(n_samples, -1)]
+            )[is_usable]
         )
-        rates.append(one.fit_weight * one.rates[is_usable])
+        flight_rates.append(samples.fit_weight * samples.rates[is_usable])
         stretch_numbers.append(
             np.cumsum(np.diff(np.flatnonzero(is_usable), prepend=0) > 1) + 1_000_000 * flight_index
         )
-    return np.vstack(regressors), np.vstack(rates), np.concatenate(stretch_numbers)
+    return np.vstack(regressors), np.vstack(flight_rates), np.concatenate(stretch_numbers)
 
 
 def _fit_model_of_order(
     usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> Model:
-    what = ("model", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
+    result_key = ("model", vehicle.model_dump_json(), n_rate_lags, n_command_lags)
     return _compute_once(
         usable_flights,
-        what,
+        result_key,
         lambda: _fit_model_of_order_uncached(usable_flights, vehicle, n_rate_lags, n_command_lags),
     )
 
@@ -333,21 +360,21 @@ def _fit_model_of_order(
 def _fit_model_of_order_uncached(
     usable_flights: Sequence[FlightWithUsableRows], vehicle: Vehicle, n_rate_lags: int, n_command_lags: int
 ) -> Model:
-    fit = fit_least_squares_of_order(usable_flights, vehicle, n_rate_lags, n_command_lags)
-    names, groups = list(vehicle.surfaces), regression.group_surfaces_by_commands(vehicle)
-    first_command_row = len(fit.coefficients) - len(groups) * n_command_lags
-    shape = (len(groups), n_command_lags, 3)
+    rate_regression = fit_least_squares_of_order(usable_flights, vehicle, n_rate_lags, n_command_lags)
+    surface_names, surface_groups = list(vehicle.surfaces), regression.group_surfaces_by_commands(vehicle)
+    first_command_row = len(rate_regression.coefficients) - len(surface_groups) * n_command_lags
+    response_shape = (len(surface_groups), n_command_lags, 3)
     model = Model(
         vehicle=vehicle,
         rate_hz=1.0 / float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights])),
-        groups=[[names[i] for i in group] for group in groups],
+        groups=[[surface_names[i] for i in surface_indices] for surface_indices in surface_groups],
         history=n_rate_lags,
         lags=n_command_lags,
-        intercept=fit.coefficients[0].tolist(),
-        past=fit.coefficients[1:first_command_row].tolist(),
-        response=fit.coefficients[first_command_row:].reshape(shape).tolist(),
-        response_sd=fit.standard_errors[first_command_row:].reshape(shape).tolist(),
-        noise=fit.residual_covariance.tolist(),
+        intercept=rate_regression.coefficients[0].tolist(),
+        past=rate_regression.coefficients[1:first_command_row].tolist(),
+        response=rate_regression.coefficients[first_command_row:].reshape(response_shape).tolist(),
+        response_sd=rate_regression.standard_errors[first_command_row:].reshape(response_shape).tolist(),
+        noise=rate_regression.residual_covariance.tolist(),
     )
     return model.model_copy(update={"noise_models": _fit_noise_models(usable_flights, model)})
 
@@ -355,36 +382,40 @@ def _fit_model_of_order_uncached(
 def _fit_noise_models(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> list[NoiseModel]:
     """The colours that flights are whitened by, with the noise of each."""
     noise_models = []
-    for noise_ma_coefficients in sorted({one.samples.noise_ma_coefficients for one in usable_flights} - {()}):
-        residuals = [
-            one_step_residuals(model, one)
-            for one in usable_flights
-            if one.samples.noise_ma_coefficients == noise_ma_coefficients
+    for noise_ma_coefficients in sorted(
+        {usable_flight.samples.noise_ma_coefficients for usable_flight in usable_flights} - {()}
+    ):
+        rows_and_residuals = [
+            one_step_residuals(model, usable_flight)
+            for usable_flight in usable_flights
+            if usable_flight.samples.noise_ma_coefficients == noise_ma_coefficients
         ]
-        noise_models.append(_fit_noise_model(list(noise_ma_coefficients), residuals))
+        noise_models.append(_fit_noise_model(list(noise_ma_coefficients), rows_and_residuals))
     return noise_models
 
 
 def _fit_noise_model(
-    ma_coefficients: list[float], residuals: Sequence[tuple[NDArray[np.int64], Floats]]
+    ma_coefficients: list[float], rows_and_residuals: Sequence[tuple[NDArray[np.int64], Floats]]
 ) -> NoiseModel:
     """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
     and the remaining noise; without a predictor where too few do."""
-    parts = [e[begin:end] for rows, e in residuals for begin, end in _consecutive_runs(rows)]
-    predicted_residuals = [part[AUTOREGRESSIVE_ORDER:] for part in parts]
-    if sum(map(len, predicted_residuals)) < 10 * 3 * AUTOREGRESSIVE_ORDER:
-        return NoiseModel(average=ma_coefficients, noise=np.cov(np.vstack(parts).T).tolist())
+    residual_runs = [
+        residual[begin:end] for rows, residual in rows_and_residuals for begin, end in _consecutive_runs(rows)
+    ]
+    target_residuals = [run[AUTOREGRESSIVE_ORDER:] for run in residual_runs]
+    if sum(map(len, target_residuals)) < 10 * 3 * AUTOREGRESSIVE_ORDER:
+        return NoiseModel(average=ma_coefficients, noise=np.cov(np.vstack(residual_runs).T).tolist())
     regressors = np.vstack([
-        np.hstack([part[AUTOREGRESSIVE_ORDER - j : len(part) - j]
-                   for j in range(1, AUTOREGRESSIVE_ORDER + 1)])
-        for part in parts if len(part) > AUTOREGRESSIVE_ORDER
+        np.hstack([run[AUTOREGRESSIVE_ORDER - lag : len(run) - lag]
+                   for lag in range(1, AUTOREGRESSIVE_ORDER + 1)])
+        for run in residual_runs if len(run) > AUTOREGRESSIVE_ORDER
     ])  # fmt: skip
-    residual_rows = np.vstack(predicted_residuals)
-    coefficients = np.linalg.lstsq(regressors, residual_rows, rcond=None)[0]
+    stacked_targets = np.vstack(target_residuals)
+    ar_coefficients = np.linalg.lstsq(regressors, stacked_targets, rcond=None)[0]
     return NoiseModel(
         average=ma_coefficients,
-        before=coefficients.tolist(),
-        noise=np.cov((residual_rows - regressors @ coefficients).T).tolist(),
+        before=ar_coefficients.tolist(),
+        noise=np.cov((stacked_targets - regressors @ ar_coefficients).T).tolist(),
     )
 
 
@@ -393,57 +424,68 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
 
     A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
     """
-    hours = (
+    usable_hours = (
         sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
         / 3600.0
     )
-    changes, repairs, levels = 0, 0, {}
-    names = list(model.vehicle.surfaces)
+    n_changes, n_repairs, levels = 0, 0, {}
+    surface_names = list(model.vehicle.surfaces)
     for group in model.groups:
-        column = names.index(group[0])
-        label_levels = (
-            [_labelled_levels_in_order(usable_flight, column) for usable_flight in usable_flights]
+        surface_index = surface_names.index(group[0])
+        level_sequences = (
+            [_labelled_levels_in_order(usable_flight, surface_index) for usable_flight in usable_flights]
             if len(group) == 1
             else []
         )
         levels["+".join(group)] = sorted(
-            {level for flight in label_levels for level in flight if level < 1.0}
+            {level for level_sequence in level_sequences for level in level_sequence if level < 1.0}
         )
-        changes += sum(max(len(flight) - 1, 0) for flight in label_levels)
-        repairs += sum(int(level == 1.0) for flight in label_levels for level in flight[1:])
-    levels = {name: found for name, found in levels.items() if found}
-    air_moves = model.vehicle.moving_air
+        n_changes += sum(max(len(level_sequence) - 1, 0) for level_sequence in level_sequences)
+        n_repairs += sum(
+            int(level == 1.0) for level_sequence in level_sequences for level in level_sequence[1:]
+        )
+    levels = {group_name: group_levels for group_name, group_levels in levels.items() if group_levels}
+    may_air_move = model.vehicle.moving_air
     delays_s = [
-        share / model.rate_hz for share in ((0.0,) if air_moves else _COMMAND_DELAY_CANDIDATES_SAMPLES)
+        delay_samples / model.rate_hz
+        for delay_samples in ((0.0,) if may_air_move else _COMMAND_DELAY_CANDIDATES_SAMPLES)
     ]
     law_settings = (
-        _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if air_moves else {})
+        _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if may_air_move else {})
         if model.vehicle.other_laws
         else {}
     )
     if not levels:
-        trim_walk = _trim_drift_sd(usable_flights, model)
-        usual_model = model.model_copy(
-            update={"settings": FilterSettings(trim_walk=trim_walk, **law_settings)}
+        trim_random_walk_sd = _estimate_trim_random_walk_sd(usable_flights, model)
+        model_with_trim_drift = model.model_copy(
+            update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **law_settings)}
         )
-        max_power = (
-            (1.0 if air_moves else _EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
+        max_effective_sample_share = (
+            (1.0 if may_air_move else _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
             if law_settings
-            else _EFFECTIVE_SAMPLE_SHARE_UNLABELLED
+            else _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED
         )
-        power = min(max_power, 1.0 / gain_error_overdispersion(usable_flights, usual_model))
-        alarm = {"alarm": _ALARM_PROBABILITY, "hold_s": _ALARM_PROBABILITY_HOLD_S}
-        return FilterSettings(**alarm, **law_settings, power=power, trim_walk=trim_walk, delays_s=delays_s)
+        effective_sample_share = min(
+            max_effective_sample_share, 1.0 / gain_error_overdispersion(usable_flights, model_with_trim_drift)
+        )
+        alarm_settings = {"alarm": _FAULT_PROBABILITY_FOR_ALARM, "hold_s": _ALARM_CONFIRMATION_TIME_S}
+        return FilterSettings(
+            **alarm_settings,
+            **law_settings,
+            power=effective_sample_share,
+            trim_walk=trim_random_walk_sd,
+            delays_s=delays_s,
+        )
     return FilterSettings(
         levels=levels,
         changes_per_hour=float(
-            np.sqrt((changes + 1) / hours * FilterSettings().effectiveness_changes_per_hour)
+            np.sqrt((n_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour)
         ),
         **(_FILTER_SETTINGS_FOR_OTHER_DAYS | law_settings),
         delays_s=delays_s,
-        repair_share=(repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
-        / (changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
-        power=_EFFECTIVE_SAMPLE_SHARE,
+        repair_share=(n_repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
+        / (n_changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
+        power=_EFFECTIVE_SAMPLE_SHARE_LABELLED,
     )
 
 
@@ -457,59 +499,69 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
-    squares = n_gains = float(len(model.groups))
-    for part_model, left_out in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
+    samples_and_usable = [
+        (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
+    ]
+    squared_error_sum = n_gains = float(len(model.groups))
+    for fold_model, held_out_flights in _cross_validation_fits(
+        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
-        has_known_effect = np.array(trust.is_group_effect_known(part_model))
-        for one in left_out:
-            responses, residual = _standardized_responses_and_residual(part_model, one)
+        has_known_effect = np.array(trust.is_group_effect_known(fold_model))
+        for held_out in held_out_flights:
+            responses, residual = _standardized_responses_and_residual(fold_model, held_out)
             responses = responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
-            squared_error, rank = _normalized_squared_gain_error_and_rank(
-                responses, residual.ravel(), _prior_gain_covariance(part_model, has_known_effect)
+            squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+                responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
             )
-            squares, n_gains = squares + squared_error, n_gains + rank
-    return squares / n_gains
+            squared_error_sum, n_gains = squared_error_sum + squared_error, n_gains + n_determined_gains
+    return squared_error_sum / n_gains
 
 
 def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
-    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
-    ratios_of_noise: dict[tuple[float, ...], list[float]] = {}
-    for part_model, left_out in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
+    samples_and_usable = [
+        (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
+    ]
+    inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
+    for fold_model, held_out_flights in _cross_validation_fits(
+        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
-        has_known_effect = np.array(trust.is_group_effect_known(part_model))
+        has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         gain_covariance: Floats = np.asarray(
-            np.kron(_prior_gain_covariance(part_model, has_known_effect), np.ones((3, 3))), dtype=float
+            np.kron(_prior_gain_covariance(fold_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
-        for one in left_out:
-            responses, residual = _standardized_responses_and_residual(part_model, one)
+        for one in held_out_flights:
+            responses, residual = _standardized_responses_and_residual(fold_model, one)
             responses = responses[:, :, has_known_effect].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * one.samples.dt_s / _GAIN_WINDOW_S), 1)
-            for part in np.array_split(np.arange(len(residual)), n_windows):
+            for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses, window_residual = (
-                    _without_mean(responses[part]),
-                    _without_mean(residual[part]),
+                    _without_mean(responses[window_rows]),
+                    _without_mean(residual[window_rows]),
                 )
-                squares, rank = _normalized_squared_gain_error_and_rank(
+                squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
                     gain_covariance,
                 )
-                ratios_of_noise.setdefault(one.samples.noise_ma_coefficients, []).append(
-                    min(squares / max(rank, 1), _MAX_WINDOW_NOISE_INFLATION)
+                inflations_by_ma_coefficients.setdefault(one.samples.noise_ma_coefficients, []).append(
+                    min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_NOISE_INFLATION)
                 )
     noise_inflation_by_ma_coefficients = {
-        colour: max(float(np.mean(ratio)), 1.0) for colour, ratio in ratios_of_noise.items()
+        ma_coefficients: max(float(np.mean(inflations)), 1.0)
+        for ma_coefficients, inflations in inflations_by_ma_coefficients.items()
     }
     if model.vehicle.other_laws:
         noise_inflation_by_ma_coefficients = {
-            one: size * (_GYRO_NOISE_FACTOR if _is_gyro_noise_spectrum(one) else _GUST_NOISE_FACTOR)
-            for one, size in noise_inflation_by_ma_coefficients.items()
+            one: inflation
+            * (
+                _GYRO_NOISE_INFLATION_OTHER_LAWS
+                if _is_gyro_noise_spectrum(one)
+                else _GUST_NOISE_INFLATION_OTHER_LAWS
+            )
+            for one, inflation in noise_inflation_by_ma_coefficients.items()
         }
     return _with_noise_inflation(model, noise_inflation_by_ma_coefficients)
 
@@ -521,8 +573,8 @@ def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
 
 def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    state_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
-    return np.asarray(state_covariance[0, 0] + np.diag(np.diag(state_covariance)[1:][has_known_effect]))
+    gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
+    return np.asarray(gain_covariance[0, 0] + np.diag(np.diag(gain_covariance)[1:][has_known_effect]))
 
 
 def _normalized_squared_gain_error_and_rank(
@@ -531,12 +583,17 @@ def _normalized_squared_gain_error_and_rank(
     """Squares of the gains of a residual (m,) on responses (m, G), in their covariance and what lies between
     flights, and how many gains there are."""
     information, score = responses.T @ responses, responses.T @ residual
-    gains = np.linalg.lstsq(information, score, rcond=_RANK_TOLERANCE)[0]
-    inflated_identity = (
-        np.eye(len(gains)) + gain_covariance @ information
+    gain_errors = np.linalg.lstsq(information, score, rcond=_RANK_TOLERANCE)[0]
+    identity_plus_prior_information = (
+        np.eye(len(gain_errors)) + gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
-    squares = max(float(score @ np.linalg.lstsq(inflated_identity, gains, rcond=_RANK_TOLERANCE)[0]), 0.0)
-    return squares, int(np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information)))
+    squared_error = max(
+        float(
+            score @ np.linalg.lstsq(identity_plus_prior_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
+        ),
+        0.0,
+    )
+    return squared_error, int(np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information)))
 
 
 def _standardized_responses_and_residual(
@@ -545,14 +602,14 @@ def _standardized_responses_and_residual(
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
     _, residual, rate_responses = whitened_residual_and_responses(model, held_out)
-    whitening = np.linalg.inv(
+    whitening_matrix = np.linalg.inv(
         np.linalg.cholesky(
             np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
         )
     ).T
     responses, standardized_residual = (
-        np.einsum("nga,ab->nbga", rate_responses, whitening),
-        residual @ whitening,
+        np.einsum("nga,ab->nbga", rate_responses, whitening_matrix),
+        residual @ whitening_matrix,
     )
     return _without_mean(responses), _without_mean(standardized_residual)
 
@@ -562,55 +619,59 @@ def _without_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _trim_drift_sd(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> list[float]:
+def _estimate_trim_random_walk_sd(
+    usable_flights: Sequence[FlightWithUsableRows], model: Model
+) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
     c / n differ from the next with the variance 2 c / n + 2 n w / 3: two n tell w from c.
     """
-    squares, counts, span_samples = (
+    squared_difference_sums, n_differences, span_samples = (
         np.zeros((2, 3)),
         np.zeros(2),
         np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz),
     )
-    for fitted, held_out in _cross_validation_splits(usable_flights):
-        part_model = fit_with_same_order(fitted, model)
-        for one in held_out:
-            rows, residual, _ = whitened_residual_and_responses(part_model, one)
-            noise = np.array(
-                part_model.with_noise_model(one.samples.noise_ma_coefficients).residual_covariance
+    for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
+        fold_model = fit_with_same_order(fitted_flights, model)
+        for held_out in held_out_flights:
+            rows, residual, _ = whitened_residual_and_responses(fold_model, held_out)
+            noise_covariance = np.array(
+                fold_model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance
             )
-            standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise), MIN_DIVISOR))
+            standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise_covariance), MIN_DIVISOR))
             for begin, end in _consecutive_runs(rows):
-                for i, short_span in enumerate(span_samples.astype(int).tolist()):
-                    means = (
-                        standardized_residual[begin:end][: (end - begin) // short_span * short_span]
-                        .reshape(-1, short_span, 3)
+                for i, span in enumerate(span_samples.astype(int).tolist()):
+                    span_means = (
+                        standardized_residual[begin:end][: (end - begin) // span * span]
+                        .reshape(-1, span, 3)
                         .mean(axis=1)
                     )
-                    squares[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
-                    counts[i] += max(len(means) - 1, 0)
-    usual_drift = np.array(FilterSettings().trim_random_walk_sd)
-    if not counts.all():
-        return usual_drift.tolist()
-    short_variance, long_variance = squares / counts[:, None]
+                    squared_difference_sums[i] += (np.diff(span_means, axis=0) ** 2).sum(axis=0)
+                    n_differences[i] += max(len(span_means) - 1, 0)
+    default_sd = np.array(FilterSettings().trim_random_walk_sd)
+    if not n_differences.all():
+        return default_sd.tolist()
+    short_span_variance, long_span_variance = squared_difference_sums / n_differences[:, None]
     short_span, long_span = span_samples
     random_walk_variance = (
-        1.5 * (long_span * long_variance - short_span * short_variance) / (long_span**2 - short_span**2)
+        1.5
+        * (long_span * long_span_variance - short_span * short_span_variance)
+        / (long_span**2 - short_span**2)
     )
-    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), usual_drift).tolist()
+    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), default_sd).tolist()
 
 
 def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Begin and end of what of increasing places follows one another."""
-    edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
-    return list(pairwise(edges))
+    run_edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
+    return list(pairwise(run_edges))
 
 
 def _labelled_levels_in_order(usable_flight: FlightWithUsableRows, surface_index: int) -> list[float]:
     """The levels of one surface's label in their order, edges left out."""
-    values = usable_flight.samples.labels[:, surface_index][usable_flight.is_usable]
-    return [round(level, 6) for level, _ in groupby(values[np.isfinite(values)].tolist())]
+    labels = usable_flight.samples.labels[:, surface_index][usable_flight.is_usable]
+    return [round(level, 6) for level, _ in groupby(labels[np.isfinite(labels)].tolist())]
 
 
 def validation_folds(
@@ -618,16 +679,19 @@ def validation_folds(
 ) -> list[tuple[list[FlightWithUsableRows], FlightWithUsableRows, str]]:
     """Return the fitted flights, the held-out one and its name, for each fold."""
     if len(usable_flights) > 1:
-        fitted_flights = [
-            [other for other in usable_flights if other is not held_out] for held_out in usable_flights
+        fitted_flights_by_fold = [
+            [usable_flight for usable_flight in usable_flights if usable_flight is not held_out]
+            for held_out in usable_flights
         ]
         return [
-            (fitted, held_out, held_out.samples.name)
-            for fitted, held_out in zip(fitted_flights, usable_flights, strict=True)
+            (fitted_flights, held_out, held_out.samples.name)
+            for fitted_flights, held_out in zip(fitted_flights_by_fold, usable_flights, strict=True)
         ]
-    (only,) = usable_flights
-    first, second = _compute_once(usable_flights, ("halves",), lambda: _split_in_halves(only))
-    return [([first], second, "second half"), ([second], first, "first half")]
+    (only_flight,) = usable_flights
+    first_half, second_half = _compute_once(
+        usable_flights, ("halves",), lambda: _split_in_halves(only_flight)
+    )
+    return [([first_half], second_half, "second half"), ([second_half], first_half, "first half")]
 
 
 def _split_in_halves(
@@ -636,10 +700,10 @@ def _split_in_halves(
     """Split the usable samples of a flight into two halves."""
     usable_rows = np.flatnonzero(usable_flight.is_usable)
     middle_row = int(usable_rows[len(usable_rows) // 2]) if len(usable_rows) else 0
-    is_early = np.arange(len(usable_flight.is_usable)) < middle_row
+    is_first_half = np.arange(len(usable_flight.is_usable)) < middle_row
     return FlightWithUsableRows(
-        usable_flight.samples, usable_flight.is_usable & is_early
-    ), FlightWithUsableRows(usable_flight.samples, usable_flight.is_usable & ~is_early)
+        usable_flight.samples, usable_flight.is_usable & is_first_half
+    ), FlightWithUsableRows(usable_flight.samples, usable_flight.is_usable & ~is_first_half)
 
 
 def add_fitted_ranges_and_alarm_threshold(
@@ -647,72 +711,82 @@ def add_fitted_ranges_and_alarm_threshold(
 ) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
     and at which evidence of a fault they would alarm as often as declared."""
-    flights = [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights]
-    scale, misread_log_likelihood, parts, gain_deviations = (
+    samples_and_usable = [
+        (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
+    ]
+    max_noise_variance_scale, max_column_mistake_gain, held_out_peaks_and_hours, squared_gain_deviations = (
         1.0,
         0.0,
         list[extremes.PeaksAndHours](),
         list[Floats](),
     )
-    for part_model, held_out in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(flights, model).tolist()
+    for fold_model, held_out_flights in _cross_validation_fits(
+        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
-        for one in held_out:
-            noise_scale, part = _noise_scale_and_healthy_alarm_peaks(part_model, one)
-            scale = max(scale, noise_scale)
-            if len(parts) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
-                misread_log_likelihood = max(
-                    misread_log_likelihood, _max_column_mistake_log_likelihood_gain(part_model, one)
+        for held_out in held_out_flights:
+            noise_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(fold_model, held_out)
+            max_noise_variance_scale = max(max_noise_variance_scale, noise_scale)
+            if len(held_out_peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
+                max_column_mistake_gain = max(
+                    max_column_mistake_gain, _max_column_mistake_log_likelihood_gain(fold_model, held_out)
                 )
-            parts.append(part)
+            held_out_peaks_and_hours.append(peaks_and_hours)
             if len(usable_flights) > 1 and model.vehicle.other_laws:
-                gain_deviations.append(_squared_gain_deviation(part_model, one))
-    fit = fit_least_squares_of_order(usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags)
-    gain_variance = np.zeros(len(model.groups))
+                squared_gain_deviations.append(_squared_gain_deviation(fold_model, held_out))
+    rate_regression = fit_least_squares_of_order(
+        usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
+    )
+    gain_variance_between_laws = np.zeros(len(model.groups))
     if model.vehicle.other_laws:
-        gain_variance = _gain_variance_between_laws(
-            _max_gain_bias_under_one_law(usable_flights, model), gain_deviations
+        gain_variance_between_laws = _gain_variance_between_laws(
+            _max_gain_bias_under_one_law(usable_flights, model), squared_gain_deviations
         )
     gain_standard_errors = np.minimum(
-        np.sqrt(group_gain_standard_error(fit, model) ** 2 + gain_variance), _MAX_GAIN_SD
+        np.sqrt(group_gain_standard_error(rate_regression, model) ** 2 + gain_variance_between_laws),
+        _MAX_GAIN_SD,
     )
-    column_gain_errors = gain_standard_error_by_column(fit, model, float(gain_variance.max()))
-    fitted_ranges = trust.fitted_ranges(flights, model, gain_standard_errors, scale).model_copy(
-        update={"gain_standard_error_by_column": column_gain_errors}
+    column_gain_standard_errors = gain_standard_error_by_column(
+        rate_regression, model, float(gain_variance_between_laws.max())
     )
-    asked_per_hour = model.vehicle.false_alarms_per_hour
+    fitted_ranges = trust.fitted_ranges(
+        samples_and_usable, model, gain_standard_errors, max_noise_variance_scale
+    ).model_copy(update={"gain_standard_error_by_column": column_gain_standard_errors})
+    requested_false_alarms_per_hour = model.vehicle.false_alarms_per_hour
     false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
-        if asked_per_hour is None and not model.settings.likely_effectiveness_levels_by_group
-        else asked_per_hour
+        if requested_false_alarms_per_hour is None and not model.settings.likely_effectiveness_levels_by_group
+        else requested_false_alarms_per_hour
     )
-    tail = extremes.fit_peak_tail(parts)
-    if tail is None and asked_per_hour is not None:
-        minutes = _total_healthy_minutes(parts)
-        says = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
-        missing_minutes = extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 60.0 / asked_per_hour - minutes
+    peak_tail = extremes.fit_peak_tail(held_out_peaks_and_hours)
+    if peak_tail is None and requested_false_alarms_per_hour is not None:
+        healthy_minutes = _total_healthy_minutes(held_out_peaks_and_hours)
+        reason = f"{healthy_minutes:.1f} min of health left out have too few peaks of the evidence to tell"
+        missing_minutes = (
+            extremes.EXPECTED_COUNT_RULED_OUT_BY_NO_ALARM * 60.0 / requested_false_alarms_per_hour
+            - healthy_minutes
+        )
         raise BadInput(
-            f"identify: false_alarms_per_hour {asked_per_hour:g}: {says}, allowed: "
+            f"identify: false_alarms_per_hour {requested_false_alarms_per_hour:g}: {reason}, allowed: "
             f"{missing_minutes:.0f} min more"
         )
-    has_threshold = bool(tail or model.vehicle.other_laws)
-    threshold = (
-        _choose_alarm_threshold(tail, false_alarms_per_hour, model)
-        if false_alarms_per_hour and has_threshold
+    can_set_threshold = bool(peak_tail or model.vehicle.other_laws)
+    alarm_threshold = (
+        _choose_alarm_threshold(peak_tail, false_alarms_per_hour, model)
+        if false_alarms_per_hour and can_set_threshold
         else None
     )
-    settings = {"false_alarms_per_hour": false_alarms_per_hour, "alarm_threshold": threshold}
+    alarm_settings = {"false_alarms_per_hour": false_alarms_per_hour, "alarm_threshold": alarm_threshold}
     return model.model_copy(
         update={
             "fitted_ranges": fitted_ranges.model_copy(
                 update={
-                    "alarm_peak_tail": tail,
-                    "max_column_mistake_log_likelihood_gain": misread_log_likelihood,
+                    "alarm_peak_tail": peak_tail,
+                    "max_column_mistake_log_likelihood_gain": max_column_mistake_gain,
                 }
             ),
-            "settings": model.settings.model_copy(update=settings),
+            "settings": model.settings.model_copy(update=alarm_settings),
             "identification_results": dict(
-                _cross_validate_alarm_threshold(parts, false_alarms_per_hour, model)
+                _cross_validate_alarm_threshold(held_out_peaks_and_hours, false_alarms_per_hour, model)
             ),
         }
     )
@@ -727,24 +801,28 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
     """
     if not model.noise_models:
         return np.zeros(len(model.groups))
-    lacking_share = 0.0
-    for colour in model.noise_models:
+    unmodelled_variance_share = 0.0
+    for noise_model in model.noise_models:
         flight_residuals = [
-            one_step_residuals(model, one)[1]
-            for one in usable_flights
-            if list(one.samples.noise_ma_coefficients) == colour.ma_coefficients
+            one_step_residuals(model, usable_flight)[1]
+            for usable_flight in usable_flights
+            if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
-        chance_share = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if colour.ar_coefficients else 0.0
+        share_by_chance = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
         log_variance_ratio = (
-            np.linalg.slogdet(np.array(colour.residual_covariance))[1]
+            np.linalg.slogdet(np.array(noise_model.residual_covariance))[1]
             - np.linalg.slogdet(np.cov(residuals.T))[1]
         )
-        lacking_share = max(lacking_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - chance_share)
+        unmodelled_variance_share = max(
+            unmodelled_variance_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - share_by_chance
+        )
     effect_power = trust.effect_power_unexplained_by_others(
-        [(one.samples, one.is_usable) for one in usable_flights], model
+        [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights], model
     )
-    return np.minimum(np.sqrt(3.0 * lacking_share / np.maximum(effect_power, MIN_DIVISOR)), _MAX_GAIN_SD)
+    return np.minimum(
+        np.sqrt(3.0 * unmodelled_variance_share / np.maximum(effect_power, MIN_DIVISOR)), _MAX_GAIN_SD
+    )
 
 
 def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Floats:
@@ -755,34 +833,36 @@ def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Flo
     squared_deviation = np.full(responses.shape[1], np.nan)
     has_known_effect = np.array(trust.is_group_effect_known(model)) & (responses.any(axis=0))
     information = responses[:, has_known_effect].T @ responses[:, has_known_effect]
-    inverse = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
-    gains = inverse @ (responses[:, has_known_effect].T @ residual.ravel())
+    gain_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
+    gain_errors = gain_covariance @ (responses[:, has_known_effect].T @ residual.ravel())
     if has_known_effect.any():  # a part without a residual shows the effect of no group
         squared_deviation[has_known_effect] = np.maximum(
-            gains**2 - np.diag(inverse) * max(float((residual**2).mean()), 1.0), 0.0
+            gain_errors**2 - np.diag(gain_covariance) * max(float((residual**2).mean()), 1.0), 0.0
         )
     return squared_deviation
 
 
-def _gain_variance_between_laws(prior_gain_sd: Floats, squared_deviations: Sequence[Floats]) -> Floats:
+def _gain_variance_between_laws(prior_gain_sd: Floats, squared_gain_deviations: Sequence[Floats]) -> Floats:
     """Variance of each group's gain from a flight to one of another law, (G,).
 
     prior_gain_sd: how far another flight's gains may be before any is left out, which counts as one flight;
-    squared_deviations: squares of how far those of flights left out were.
+    squared_gain_deviations: squares of how far those of flights left out were.
     """
-    return np.asarray(np.nanmean([prior_gain_sd**2, *squared_deviations], axis=0))
+    return np.asarray(np.nanmean([prior_gain_sd**2, *squared_gain_deviations], axis=0))
 
 
 def _choose_alarm_threshold(
     tail: extremes.PeakTail | None, false_alarms_per_hour: float, model: Model
 ) -> float:
     """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
-    theory_factor = (
+    lorden_bound_factor = (
         (1.0 if model.vehicle.moving_air else _THRESHOLD_FACTOR_OTHER_LAWS)
         if model.vehicle.other_laws
         else 0.0
     )
-    min_threshold = theory_factor * extremes.threshold_by_lorden_bound(model.rate_hz, false_alarms_per_hour)
+    min_threshold = lorden_bound_factor * extremes.threshold_by_lorden_bound(
+        model.rate_hz, false_alarms_per_hour
+    )
     return (
         max(extremes.threshold_for_false_alarms(tail, false_alarms_per_hour), min_threshold)
         if tail is not None
@@ -793,10 +873,10 @@ def _choose_alarm_threshold(
 def _max_column_mistake_log_likelihood_gain(model: Model, held_out: FlightWithUsableRows) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    gain_of_mistake, _ = trust.log_likelihood_gain_of_corrections(
+    log_likelihood_gain_by_mistake, _ = trust.log_likelihood_gain_of_corrections(
         replace(held_out.samples, rates=rates), model
     )
-    return max(0.0, *gain_of_mistake.values()) if gain_of_mistake else 0.0
+    return max(0.0, *log_likelihood_gain_by_mistake.values()) if log_likelihood_gain_by_mistake else 0.0
 
 
 def _total_healthy_minutes(held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours]) -> float:
@@ -810,22 +890,24 @@ def _cross_validate_alarm_threshold(
 ) -> Document:
     """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
     others ask for, and how often."""
-    tails = [
+    tails_of_others = [
         extremes.fit_peak_tail([*held_out_peaks_and_hours[:i], *held_out_peaks_and_hours[i + 1 :]])
         for i in range(len(held_out_peaks_and_hours))
     ]
-    if false_alarms_per_hour is None or len(held_out_peaks_and_hours) < 2 or not all(tails):
+    if false_alarms_per_hour is None or len(held_out_peaks_and_hours) < 2 or not all(tails_of_others):
         return {}
-    thresholds = [_choose_alarm_threshold(tail, false_alarms_per_hour, model) for tail in tails if tail]
-    n_alarms_by_part = [
-        int((peaks >= limit).sum())
-        for (peaks, _), limit in zip(held_out_peaks_and_hours, thresholds, strict=True)
+    thresholds = [
+        _choose_alarm_threshold(tail, false_alarms_per_hour, model) for tail in tails_of_others if tail
+    ]
+    n_alarms_by_flight = [
+        int((peaks >= threshold).sum())
+        for (peaks, _), threshold in zip(held_out_peaks_and_hours, thresholds, strict=True)
     ]
     return {
         "parts": len(held_out_peaks_and_hours),
         "minutes": _total_healthy_minutes(held_out_peaks_and_hours),
-        "alarmed": sum(count > 0 for count in n_alarms_by_part),
-        "alarms": sum(n_alarms_by_part),
+        "alarmed": sum(n_alarms > 0 for n_alarms in n_alarms_by_flight),
+        "alarms": sum(n_alarms_by_flight),
     }
 
 
@@ -840,14 +922,15 @@ def _noise_scale_and_healthy_alarm_peaks(
     is_healthy = (
         held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
     )
-    rows = np.flatnonzero(is_healthy)
-    page_sums = [
-        page_cusum(evidence_increments[rows[begin:end]], np.inf) for begin, end in _consecutive_runs(rows)
+    healthy_rows = np.flatnonzero(is_healthy)
+    page_sum_runs = [
+        page_cusum(evidence_increments[healthy_rows[begin:end]], np.inf)
+        for begin, end in _consecutive_runs(healthy_rows)
     ]
-    peaks = np.concatenate([extremes.peaks_between_zeros(one) for one in page_sums])
+    peaks = np.concatenate([extremes.peaks_between_zeros(page_sum) for page_sum in page_sum_runs])
     return float(noise_scale[held_out.is_usable].max(initial=1.0)), (
         peaks,
-        len(rows) * held_out.samples.dt_s / 3600.0,
+        len(healthy_rows) * held_out.samples.dt_s / 3600.0,
     )
 
 
@@ -856,62 +939,73 @@ def _cross_validation_splits(
 ) -> list[tuple[list[FlightWithUsableRows], list[FlightWithUsableRows]]]:
     """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
     if len(usable_flights) == 1:
-        return [(fitted, [held_out]) for fitted, held_out, _ in validation_folds(usable_flights)]
+        return [
+            (fitted_flights, [held_out]) for fitted_flights, held_out, _ in validation_folds(usable_flights)
+        ]
     n_splits = min(len(usable_flights), _MAX_CROSS_VALIDATION_SPLITS)
-    left_out_indices = [
-        [i for i in range(len(usable_flights)) if i % n_splits == turn] for turn in range(n_splits)
+    held_out_indices_by_split = [
+        [i for i in range(len(usable_flights)) if i % n_splits == split] for split in range(n_splits)
     ]
     return [
         (
-            [one for i, one in enumerate(usable_flights) if i not in left_out],
-            [usable_flights[i] for i in left_out],
+            [usable_flight for i, usable_flight in enumerate(usable_flights) if i not in held_out_indices],
+            [usable_flights[i] for i in held_out_indices],
         )
-        for left_out in left_out_indices
+        for held_out_indices in held_out_indices_by_split
     ]
 
 
-def group_gain_standard_error(fit: regression.RateRegression, model: Model) -> Floats:
+def group_gain_standard_error(rate_regression: regression.RateRegression, model: Model) -> Floats:
     """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
     effect is made up by the past, as an elevator's by alpha, its sum is not known, and its factor is.
 
     Responses b with errors of covariance V tell their factor with the variance 1 / (b' V^-1 b).
     """
-    groups, lags = len(model.groups), model.n_command_lags
-    first_command_row = len(fit.coefficients) - groups * lags
-    noise_sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
-    summed_response_sd, information = np.zeros(groups), np.full(groups, MIN_DIVISOR)
-    for group_index in range(groups):
-        group_rows = slice(
-            first_command_row + group_index * lags, first_command_row + (group_index + 1) * lags
+    n_groups, n_command_lags = len(model.groups), model.n_command_lags
+    first_command_row = len(rate_regression.coefficients) - n_groups * n_command_lags
+    noise_sd = np.sqrt(np.maximum(np.diag(rate_regression.residual_covariance), MIN_DIVISOR))
+    relative_sd_of_summed_response, response_factor_information = (
+        np.zeros(n_groups),
+        np.full(n_groups, MIN_DIVISOR),
+    )
+    for group_index in range(n_groups):
+        group_coefficient_rows = slice(
+            first_command_row + group_index * n_command_lags,
+            first_command_row + (group_index + 1) * n_command_lags,
         )
         coefficient_error_correlation, standardized_errors = (
-            fit.coefficient_error_correlation[group_rows, group_rows],
-            fit.standard_errors[group_rows] / noise_sd,
+            rate_regression.coefficient_error_correlation[group_coefficient_rows, group_coefficient_rows],
+            rate_regression.standard_errors[group_coefficient_rows] / noise_sd,
         )
-        summed_response = fit.coefficients[group_rows].sum(axis=0) / noise_sd
-        variance = np.einsum(
+        summed_response = rate_regression.coefficients[group_coefficient_rows].sum(axis=0) / noise_sd
+        summed_response_variance = np.einsum(
             "la,lm,ma->a", standardized_errors, coefficient_error_correlation, standardized_errors
         )
-        summed_response_sd[group_index] = np.sqrt(summed_response**2 @ np.maximum(variance, 0.0)) / max(
-            float(summed_response @ summed_response), MIN_DIVISOR
-        )
+        relative_sd_of_summed_response[group_index] = np.sqrt(
+            summed_response**2 @ np.maximum(summed_response_variance, 0.0)
+        ) / max(float(summed_response @ summed_response), MIN_DIVISOR)
         standardized_response = (
-            fit.coefficients[group_rows] / noise_sd / np.maximum(standardized_errors, MIN_DIVISOR)
+            rate_regression.coefficients[group_coefficient_rows]
+            / noise_sd
+            / np.maximum(standardized_errors, MIN_DIVISOR)
         )
-        information[group_index] += np.einsum(
+        response_factor_information[group_index] += np.einsum(
             "la,lm,ma->",
             standardized_response,
             np.linalg.pinv(coefficient_error_correlation, rcond=_RANK_TOLERANCE),
             standardized_response,
         )
     return np.minimum(
-        1.0 / np.sqrt(information) if model.vehicle.other_laws else summed_response_sd, _MAX_GAIN_SD
+        1.0 / np.sqrt(response_factor_information)
+        if model.vehicle.other_laws
+        else relative_sd_of_summed_response,
+        _MAX_GAIN_SD,
     )
 
 
 def gain_standard_error_by_column(
-    fit: regression.RateRegression, model: Model, gain_variance: float
+    rate_regression: regression.RateRegression, model: Model, gain_variance: float
 ) -> dict[str, float]:
     """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
     `group_gain_standard_error` of a whole response; K coefficients of nothing but errors have the information
@@ -919,27 +1013,27 @@ def gain_standard_error_by_column(
     ties commands to these columns.
     """
     noise_inflation, noise_sd = (
-        max((one.covariance_inflation for one in model.noise_models), default=1.0),
-        np.sqrt(np.diag(fit.residual_covariance)),
+        max((noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0),
+        np.sqrt(np.diag(rate_regression.residual_covariance)),
     )
-    sd_of_column = {}
-    for name, (rows, coefficients) in trust.cross_axis_coefficients(model).items():
-        coefficient_rows = [1 + row for row in rows]
+    standard_error_of_column = {}
+    for name, (past_rows, coefficients) in trust.cross_axis_coefficients(model).items():
+        coefficient_rows = [1 + row for row in past_rows]
         standardized_coefficients = coefficients / np.maximum(
-            fit.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
+            rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
         )
-        inverse = np.linalg.pinv(
-            fit.coefficient_error_correlation[np.ix_(coefficient_rows, coefficient_rows)],
+        inverse_error_correlation = np.linalg.pinv(
+            rate_regression.coefficient_error_correlation[np.ix_(coefficient_rows, coefficient_rows)],
             rcond=_RANK_TOLERANCE,
         )
         information = np.einsum(
-            "la,lm,ma->", standardized_coefficients, inverse, standardized_coefficients
+            "la,lm,ma->", standardized_coefficients, inverse_error_correlation, standardized_coefficients
         ) - np.count_nonzero(coefficients)
-        sd_of_column[name] = min(
+        standard_error_of_column[name] = min(
             float(np.sqrt(noise_inflation / max(information, MIN_DIVISOR) + gain_variance)),
             _MAX_COLUMN_GAIN_SD,
         )
-    return sd_of_column
+    return standard_error_of_column
 
 
 def explained_variance_by_fold(
@@ -947,8 +1041,11 @@ def explained_variance_by_fold(
 ) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
     return [
-        {"left_out": name, **one_step_prediction_quality(fit_with_same_order(fitted, model), held_out)}
-        for fitted, held_out, name in validation_folds(usable_flights)
+        {
+            "left_out": held_out_name,
+            **one_step_prediction_quality(fit_with_same_order(fitted_flights, model), held_out),
+        }
+        for fitted_flights, held_out, held_out_name in validation_folds(usable_flights)
     ]
 
 
@@ -956,25 +1053,27 @@ def score_folds_and_choose_credible_mass(
     usable_flights: Sequence[FlightWithUsableRows], model: Model
 ) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
-    entries: list[Document] = []
+    fold_entries: list[Document] = []
     coverage_by_mass: list[list[float]] = []
-    for fitted, held_out, name in validation_folds(usable_flights):
-        part_model = fit_with_same_order(fitted, model)
-        entry: Document = {"left_out": name, **one_step_prediction_quality(part_model, held_out)}
+    for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
+        fold_model = fit_with_same_order(fitted_flights, model)
+        entry: Document = {"left_out": held_out_name, **one_step_prediction_quality(fold_model, held_out)}
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            by_mass = _diagnosis_rows_by_credible_mass(part_model, held_out)
-            entry["score"] = score_against_labels(by_mass[model.settings.credible_mass], labels)
+            diagnosis_rows_by_mass = _diagnosis_rows_by_credible_mass(fold_model, held_out)
+            entry["score"] = score_against_labels(
+                diagnosis_rows_by_mass[model.settings.credible_mass], labels
+            )
             coverage_by_mass.append(
                 [
-                    score_against_labels(by_mass[mass], labels)["held_by_bounds"]
+                    score_against_labels(diagnosis_rows_by_mass[mass], labels)["held_by_bounds"]
                     for mass in _CREDIBLE_MASS_CANDIDATES
                 ]
             )
-        entries.append(entry)
+        fold_entries.append(entry)
     if not coverage_by_mass:
-        return entries, model.settings.credible_mass
-    return entries, _CREDIBLE_MASS_CANDIDATES[
+        return fold_entries, model.settings.credible_mass
+    return fold_entries, _CREDIBLE_MASS_CANDIDATES[
         int(np.argmin(np.abs(np.mean(coverage_by_mass, axis=0) - _CREDIBLE_COVERAGE_GOAL)))
     ]
 
@@ -984,15 +1083,15 @@ def _diagnosis_rows_by_credible_mass(
 ) -> dict[float, DiagnosisRows]:
     bank = build_hypothesis_bank(model)
     posterior, _, _ = hypothesis_posterior(held_out.samples, model, bank)
-    settings = [
-        model.settings.model_copy(update={"credible_mass": m})
-        for m in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}
+    settings_per_mass = [
+        model.settings.model_copy(update={"credible_mass": mass})
+        for mass in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}
     ]
     return {
-        one.credible_mass: rows_of_posterior(
-            held_out.samples, model.model_copy(update={"settings": one}), bank, posterior
+        settings.credible_mass: rows_of_posterior(
+            held_out.samples, model.model_copy(update={"settings": settings}), bank, posterior
         )
-        for one in settings
+        for settings in settings_per_mass
     }
 
 
@@ -1015,18 +1114,18 @@ def whitened_residual_and_responses(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
-    is_predictable, unexplained, responses = regression.whitened_rates_and_responses(
+    is_predictable, unexplained_rates, responses = regression.whitened_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
     intercept = model.whitened_intercept(usable_flight.samples.noise_ma_coefficients)
-    return rows, (unexplained - responses.sum(axis=1) - intercept)[rows], responses[rows]
+    return rows, (unexplained_rates - responses.sum(axis=1) - intercept)[rows], responses[rows]
 
 
 def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    is_predictable, unexplained, responses = regression.unexplained_rates_and_responses(
+    is_predictable, unexplained_rates, responses = regression.unexplained_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
-    return rows, (unexplained - responses.sum(axis=1) - np.array(model.intercept))[rows]
+    return rows, (unexplained_rates - responses.sum(axis=1) - np.array(model.intercept))[rows]

@@ -130,7 +130,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
     for what the surface does [Ljung1999, section 13.4].
     """
-    rate_and_command_lags = max(fitting.RATE_LAG_CANDIDATES), max(fitting.RATE_LAG_CANDIDATES)
+    rate_and_command_lags = max(fitting.RATE_LAG_COUNT_CANDIDATES), max(fitting.RATE_LAG_COUNT_CANDIDATES)
     if not vehicle.moving_air:
         return list(flights)
     noise_averages = [_choose_noise_ma_coefficients(one, vehicle, rate_and_command_lags) for one in flights]

@@ -126,7 +126,7 @@ class FilterSettings(Section):
         description="memory of the running scale of the residual, s",
         alias="noise_memory_s",
     )
-    alarm_probability: Number = Field(
+    fault_probability_for_alarm: Number = Field(
         0.5, gt=0, lt=1, description="probability of a fault that raises the alarm", alias="alarm"
     )
     alarm_confirmation_time_s: Number = Field(
@@ -297,17 +297,17 @@ class Model(Section):
     )
 
     @model_validator(mode="after")
-    def _check_consistent(self) -> "Model":
-        rows = 3 * self.n_rate_lags + len(self.vehicle.signal_regressor_names) * self.vehicle.n_signal_lags(
-            self.n_rate_lags
-        )
-        says = (
-            f"has {len(self.past_coefficients)} rows, allowed: {rows}, as `identify` writes them: "
+    def _check_shapes_groups_and_covariances(self) -> "Model":
+        n_past_rows = 3 * self.n_rate_lags + len(
+            self.vehicle.signal_regressor_names
+        ) * self.vehicle.n_signal_lags(self.n_rate_lags)
+        reason = (
+            f"has {len(self.past_coefficients)} rows, allowed: {n_past_rows}, as `identify` writes them: "
             "identify it again"
         )
-        file_mistakes: list[Conflict] = [(("past",), says)] * (len(self.past_coefficients) != rows)
-        file_mistakes += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
-        refuse(file_mistakes)  # before any of it is computed with
+        mistakes: list[Conflict] = [(("past",), reason)] * (len(self.past_coefficients) != n_past_rows)
+        mistakes += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
+        refuse(mistakes)  # before any of it is computed with
         refuse(self._invalid_covariances_or_errors())
         return self
 
@@ -317,75 +317,78 @@ class Model(Section):
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):
                 if name not in self.vehicle.surfaces or name in seen_surfaces:
-                    what = "is in two groups" if name in seen_surfaces else "is no surface of the vehicle"
-                    yield ("groups", i, k), f"{name!r:.60} {what}, allowed: each surface once"
+                    reason = "is in two groups" if name in seen_surfaces else "is no surface of the vehicle"
+                    yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
                 seen_surfaces.add(name)
-        known = ["+".join(group) for group in self.groups]
+        group_names = ["+".join(group) for group in self.groups]
         for name in self.settings.likely_effectiveness_levels_by_group:
-            if name not in known:
-                says = f"{name!r:.60} is no group, allowed: {', '.join(known)}"
-                yield ("settings", "levels", name), says
+            if name not in group_names:
+                level_reason = f"{name!r:.60} is no group, allowed: {', '.join(group_names)}"
+                yield ("settings", "levels", name), level_reason
         for k, delay_s in enumerate(self.settings.command_delay_candidates_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
     def _shape_mistakes(self, n_past_rows: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
-        count = len(self.groups)
+        n_groups = len(self.groups)
         expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
             (("past",), self.past_coefficients, (n_past_rows, 3)),
-            (("response",), self.command_response, (count, self.n_command_lags, 3)),
-            (("response_sd",), self.command_response_standard_error, (count, self.n_command_lags, 3)),
+            (("response",), self.command_response, (n_groups, self.n_command_lags, 3)),
+            (("response_sd",), self.command_response_standard_error, (n_groups, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
         ]
-        for i, colour in enumerate(self.noise_models):
-            at = ("colours", i)
-            lengths = -(-len(colour.ar_coefficients) // 3) * 3
+        for i, noise_model in enumerate(self.noise_models):
+            location_of_noise_model = ("colours", i)
+            n_ar_rows = -(-len(noise_model.ar_coefficients) // 3) * 3
             expected_shapes += [
-                ((*at, "noise"), colour.residual_covariance, (3, 3)),
-                ((*at, "before"), colour.ar_coefficients, (lengths, 3)),
+                ((*location_of_noise_model, "noise"), noise_model.residual_covariance, (3, 3)),
+                ((*location_of_noise_model, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
             ]
-            if colour.ma_coefficients[0] != 1.0:
-                yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (fitted := self.fitted_ranges) is not None:
-            optional: list[tuple[str, object, tuple[int, ...]]] = [
-                ("commands", fitted.command_ranges, (len(fitted.command_ranges), 2)),
-                ("rates", fitted.rate_ranges_rad_s, (3, 2)),
-                ("airspeed", fitted.airspeed_range_mps, (2,)), ("spread", fitted.rate_sd_rad_s, (3,)),
-                ("correlation", fitted.group_command_correlation, (count, count)),
-                ("tied", fitted.effect_share_explained_by_others, (count,)),
-                ("gain_sd", fitted.group_gain_standard_error, (count,)),
+            if noise_model.ma_coefficients[0] != 1.0:
+                yield (*location_of_noise_model, "average"), "does not begin with 1, allowed: 1, c1, ..."
+        if (fitted_ranges := self.fitted_ranges) is not None:
+            optional_shapes: list[tuple[str, object, tuple[int, ...]]] = [
+                ("commands", fitted_ranges.command_ranges, (len(fitted_ranges.command_ranges), 2)),
+                ("rates", fitted_ranges.rate_ranges_rad_s, (3, 2)),
+                ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
+                ("spread", fitted_ranges.rate_sd_rad_s, (3,)),
+                ("correlation", fitted_ranges.group_command_correlation, (n_groups, n_groups)),
+                ("tied", fitted_ranges.effect_share_explained_by_others, (n_groups,)),
+                ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
             ]  # fmt: skip
-            expected_shapes += [(("fitted", key), given, shape) for key, given, shape in optional if given]
-        for where, given, shape in expected_shapes:
-            if not _has_shape(given, shape):
-                size = " x ".join(map(str, shape))
-                yield where, f"has another shape, allowed: {size} numbers"
+            expected_shapes += [
+                (("fitted", key), array, shape) for key, array, shape in optional_shapes if array
+            ]
+        for location, array, shape in expected_shapes:
+            if not _has_shape(array, shape):
+                shape_text = " x ".join(map(str, shape))
+                yield location, f"has another shape, allowed: {shape_text} numbers"
 
     def _invalid_covariances_or_errors(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
         covariances: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
         covariances += [
-            (("colours", i, "noise"), colour.residual_covariance)
-            for i, colour in enumerate(self.noise_models)
+            (("colours", i, "noise"), noise_model.residual_covariance)
+            for i, noise_model in enumerate(self.noise_models)
         ]
-        for where, given in covariances:
-            noise = np.array(given)
-            if abs(noise - noise.T).max() > 1e-6 * abs(noise).max():
-                yield where, "is not symmetric, allowed: a covariance"
+        for location, covariance_rows in covariances:
+            covariance = np.array(covariance_rows)
+            if abs(covariance - covariance.T).max() > 1e-6 * abs(covariance).max():
+                yield location, "is not symmetric, allowed: a covariance"
                 continue
-            least, *_, largest = np.linalg.eigvalsh(noise)
-            if least <= 0.0 or largest > _MAX_CONDITION_NUMBER * least:
+            min_eigenvalue, *_, max_eigenvalue = np.linalg.eigvalsh(covariance)
+            if min_eigenvalue <= 0.0 or max_eigenvalue > _MAX_CONDITION_NUMBER * min_eigenvalue:
                 yield (
-                    where,
+                    location,
                     "is singular or nearly so, allowed: a covariance, conditioned to "
                     f"{_MAX_CONDITION_NUMBER:g}",
                 )
         if np.min(self.command_response_standard_error) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
-        fitted = self.fitted_ranges
-        if fitted is not None and any(
-            value < 0.0 for value in (*fitted.group_gain_standard_error, *fitted.rate_sd_rad_s)
+        fitted_ranges = self.fitted_ranges
+        if fitted_ranges is not None and any(
+            value < 0.0 for value in (*fitted_ranges.group_gain_standard_error, *fitted_ranges.rate_sd_rad_s)
         ):
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
@@ -399,39 +402,45 @@ class Model(Section):
 
         ma_coefficients: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        known = [
-            np.array(one.residual_covariance)
-            for one in self.noise_models
-            if one.ma_coefficients == list(ma_coefficients)
+        matching_covariances = [
+            np.array(noise_model.residual_covariance)
+            for noise_model in self.noise_models
+            if noise_model.ma_coefficients == list(ma_coefficients)
         ]
-        if not known:
+        if not matching_covariances:
             return self
         return self.model_copy(
-            update={"residual_covariance": (self.noise_inflation(ma_coefficients) * known[0]).tolist()}
+            update={
+                "residual_covariance": (
+                    self.noise_inflation(ma_coefficients) * matching_covariances[0]
+                ).tolist()
+            }
         )
 
     def noise_inflation(self, ma_coefficients: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
         return next(
             (
-                float(one.covariance_inflation)
-                for one in self.noise_models
-                if one.ma_coefficients == list(ma_coefficients)
+                float(noise_model.covariance_inflation)
+                for noise_model in self.noise_models
+                if noise_model.ma_coefficients == list(ma_coefficients)
             ),
             1.0,
         )
 
     def residual_ar_coefficients(self, ma_coefficients: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        known = [
-            one.ar_coefficients for one in self.noise_models if one.ma_coefficients == list(ma_coefficients)
+        matching_coefficients = [
+            noise_model.ar_coefficients
+            for noise_model in self.noise_models
+            if noise_model.ma_coefficients == list(ma_coefficients)
         ]
-        return np.reshape(np.array(known[0] if known else []), (-1, 3, 3))
+        return np.reshape(np.array(matching_coefficients[0] if matching_coefficients else []), (-1, 3, 3))
 
     def whitened_intercept(self, ma_coefficients: Sequence[float]) -> Floats:
         """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
-        constant = np.array(self.intercept)
-        return np.asarray(constant - constant @ self.residual_ar_coefficients(ma_coefficients).sum(axis=0))
+        intercept = np.array(self.intercept)
+        return np.asarray(intercept - intercept @ self.residual_ar_coefficients(ma_coefficients).sum(axis=0))
 
     def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
@@ -443,14 +452,14 @@ class Model(Section):
         )
 
 
-def _has_shape(given: object, shape: tuple[int, ...]) -> bool:
+def _has_shape(nested_lists: object, shape: tuple[int, ...]) -> bool:
     """Whether nested lists have these lengths, each."""
     if not shape:
-        return not isinstance(given, list)
+        return not isinstance(nested_lists, list)
     return (
-        isinstance(given, list)
-        and len(given) == shape[0]
-        and all(_has_shape(one, shape[1:]) for one in given)
+        isinstance(nested_lists, list)
+        and len(nested_lists) == shape[0]
+        and all(_has_shape(element, shape[1:]) for element in nested_lists)
     )
 
 

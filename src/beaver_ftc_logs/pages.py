@@ -47,7 +47,8 @@ def load_template(name: str) -> "Template":
 def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]) -> str:
     """The report as HTML text."""
     no_alarm_text = (
-        f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}."
+        "The probability of a fault stayed below the alarm level of "
+        f"{model.settings.fault_probability_for_alarm}."
     )
     model_text = (
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "

@@ -21,18 +21,20 @@ from beaver_ftc_logs.vehicle import Vehicle
 _PARALLEL_TOLERANCE = 1e-9
 _RIDGE_SHARE = 1e-10
 _RANK_TOLERANCE = 1e-12
-_N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_STANDARD_ERRORS = 4, 60, 4.0
+_N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_WIDTH_STANDARD_ERRORS = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
 
 
 def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
     """Surfaces by what excites them: those in one group get proportional commands."""
-    rows = mixer_matrix(vehicle)
+    mixer_rows = mixer_matrix(vehicle)
     groups: list[list[int]] = []
-    for i, row in enumerate(rows):
+    for i, mixer_row in enumerate(mixer_rows):
         for group in groups:
-            other = rows[group[0]]
-            if (row @ other) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (row @ row) * (other @ other):
+            first_row_of_group = mixer_rows[group[0]]
+            if (mixer_row @ first_row_of_group) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (
+                mixer_row @ mixer_row
+            ) * (first_row_of_group @ first_row_of_group):
                 group.append(i)
                 break
         else:
@@ -42,14 +44,14 @@ def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
 
 def build_regressors(
     samples: Samples,
-    groups: list[list[int]],
+    surface_groups: list[list[int]],
     n_rate_lags: int,
     n_command_lags: int,
     scales_by_labels: bool,
     n_signal_lags: int = 1,
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of the groups at lags 1
-    to L, and whether all of it is known and no gap lies within, (n,).
+    """The regressors of each sample: the past (n, 3 h + X f), the commands (n, G, L) of surface_groups at
+    lags 1 to L, and whether all of it is known and no gap lies within, (n,).
 
     scales_by_labels: multiply each surface's command by its labelled effectiveness (1 where there is no
     label). n_signal_lags: past samples f of the signals.
@@ -57,18 +59,22 @@ def build_regressors(
     surface_commands = samples.commands
     if scales_by_labels:
         surface_commands = surface_commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    grouped = np.column_stack([surface_commands[:, group].sum(axis=1) for group in groups])
-    rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, n_rate_lags + 1)]
-    past = np.column_stack(
-        [*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, n_signal_lags + 1))]
+    group_commands = np.column_stack([surface_commands[:, group].sum(axis=1) for group in surface_groups])
+    lagged_rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, n_rate_lags + 1)]
+    past_regressors = np.column_stack(
+        [*lagged_rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, n_signal_lags + 1))]
     )
-    commands = np.stack([_delay_rows(grouped, k, np.nan) for k in range(1, n_command_lags + 1)], axis=1)
-    is_known = np.isfinite(past).all(axis=1) & np.isfinite(commands).all(axis=(1, 2))
-    is_known &= np.isfinite(samples.rates).all(axis=1)
-    is_known &= samples.stretch_number == _delay_rows(
+    lagged_group_commands = np.stack(
+        [_delay_rows(group_commands, k, np.nan) for k in range(1, n_command_lags + 1)], axis=1
+    )
+    is_predictable = np.isfinite(past_regressors).all(axis=1) & np.isfinite(lagged_group_commands).all(
+        axis=(1, 2)
+    )
+    is_predictable &= np.isfinite(samples.rates).all(axis=1)
+    is_predictable &= samples.stretch_number == _delay_rows(
         samples.stretch_number, max(n_rate_lags, n_command_lags), -1
     )
-    return past, commands.transpose(0, 2, 1), is_known
+    return past_regressors, lagged_group_commands.transpose(0, 2, 1), is_predictable
 
 
 def _delay_rows(values: np.ndarray, lag: int, fill_value: float) -> np.ndarray:
@@ -79,16 +85,18 @@ def _delay_rows(values: np.ndarray, lag: int, fill_value: float) -> np.ndarray:
 
 def surface_indices_by_group(model: Model) -> list[list[int]]:
     """The model's groups as positions of their surfaces."""
-    names = list(model.vehicle.surfaces)
-    return [[names.index(name) for name in group] for group in model.groups]
+    surface_names = list(model.vehicle.surfaces)
+    return [[surface_names.index(name) for name in group] for group in model.groups]
 
 
-def group_values_by_surface(values: Floats, model: Model) -> Floats:
+def group_values_by_surface(group_values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     group_of_surface = np.full(len(model.vehicle.surfaces), -1)
-    for group, members in enumerate(surface_indices_by_group(model)):
-        group_of_surface[members] = group
-    return np.asarray(np.take(np.column_stack([values, np.ones(len(values))]), group_of_surface, axis=1))
+    for group, surface_indices in enumerate(surface_indices_by_group(model)):
+        group_of_surface[surface_indices] = group
+    return np.asarray(
+        np.take(np.column_stack([group_values, np.ones(len(group_values))]), group_of_surface, axis=1)
+    )
 
 
 def unexplained_rates_and_responses(
@@ -99,16 +107,22 @@ def unexplained_rates_and_responses(
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    order = (
+    regressor_order = (
         model.n_rate_lags,
         model.n_command_lags,
         scales_by_labels,
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
-    past, commands, is_predictable = build_regressors(samples, surface_indices_by_group(model), *order)
-    _, past_coefficients, response, _ = model.coefficient_arrays()
-    unexplained = samples.rates - np.einsum("nm,mr->nr", past, past_coefficients)
-    return is_predictable, unexplained, np.einsum("ngl,glr->ngr", commands, response)
+    past_regressors, lagged_group_commands, is_predictable = build_regressors(
+        samples, surface_indices_by_group(model), *regressor_order
+    )
+    _, past_coefficients, command_response, _ = model.coefficient_arrays()
+    unexplained_rates = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
+    return (
+        is_predictable,
+        unexplained_rates,
+        np.einsum("ngl,glr->ngr", lagged_group_commands, command_response),
+    )
 
 
 def whitened_rates_and_responses(
@@ -116,31 +130,37 @@ def whitened_rates_and_responses(
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
     """As `unexplained_rates_and_responses`, less the prediction of each residual from those before it by the
     flight's noise model: a healthy flight leaves a white residual."""
-    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model, scales_by_labels)
-    predictor, is_whitened = (
+    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(
+        samples, model, scales_by_labels
+    )
+    ar_coefficients, is_predictable_whitened = (
         model.residual_ar_coefficients(samples.noise_ma_coefficients),
         is_predictable.copy(),
     )
-    for lag in range(1, len(predictor) + 1):
-        is_whitened &= _delay_rows(is_predictable, lag, False)
+    for lag in range(1, len(ar_coefficients) + 1):
+        is_predictable_whitened &= _delay_rows(is_predictable, lag, False)
     return (
-        is_whitened,
-        subtract_noise_prediction(unexplained, predictor),
-        subtract_noise_prediction(responses, predictor),
+        is_predictable_whitened,
+        subtract_noise_prediction(unexplained_rates, ar_coefficients),
+        subtract_noise_prediction(responses, ar_coefficients),
     )
 
 
-def subtract_noise_prediction(values: Floats, predictor: Floats) -> Floats:
-    """Values (n, ..., 3) less their prediction from the L before each; predictor (L, 3, 3): coefficients."""
+def subtract_noise_prediction(values: Floats, ar_coefficients: Floats) -> Floats:
+    """Values (n, ..., 3) less their prediction from the L before each; ar_coefficients (L, 3, 3)."""
     remainder = values.copy()
-    if not len(predictor) or not values.size:
+    if not len(ar_coefficients) or not values.size:
         return remainder
     series, remaining_series = (
-        np.moveaxis(of.reshape(len(values), -1, 3), 0, -1) for of in (values, remainder)
+        np.moveaxis(array.reshape(len(values), -1, 3), 0, -1) for array in (values, remainder)
     )
-    for (r, s), taps in zip(np.ndindex(3, 3), predictor.reshape(-1, 9).T, strict=True):
-        for one, of in zip(np.ascontiguousarray(series[:, r]), remaining_series[:, s], strict=True):
-            of[1:] -= np.convolve(one, taps)[: len(one) - 1]
+    for (source_axis, target_axis), taps in zip(
+        np.ndindex(3, 3), ar_coefficients.reshape(-1, 9).T, strict=True
+    ):
+        for source_series, target_series in zip(
+            np.ascontiguousarray(series[:, source_axis]), remaining_series[:, target_axis], strict=True
+        ):
+            target_series[1:] -= np.convolve(source_series, taps)[: len(source_series) - 1]
     return remainder
 
 
@@ -158,61 +178,68 @@ class RateRegression:
 
 
 def least_squares(
-    regressors: Floats, rates: Floats, stretch_number: NDArray[np.int64], max_lag: int
+    regressors: Floats, rates: Floats, stretch_number: NDArray[np.int64], newey_west_max_lag: int
 ) -> RateRegression:
     """Ordinary least squares of rates (n, 3) on regressors (n, m), with Newey-West standard errors over
-    `max_lag` lags.
+    `newey_west_max_lag` lags.
 
     stretch_number (n,): products of residuals are formed within one gap-free stretch only. Directions that
     the regressors do not excite get the least coefficients that fit, and a column of nothing but rounding
     gets 0.
     """
     regressor_rms = np.sqrt((regressors**2).mean(axis=0))
-    scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
-    scaled_regressors = regressors / scale
-    inverse: Floats = np.asarray(
+    regressor_scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
+    scaled_regressors = regressors / regressor_scale
+    inverse_gram: Floats = np.asarray(
         np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_RIDGE_SHARE), dtype=np.float64
     )
-    coefficients = inverse @ (scaled_regressors.T @ rates)
+    coefficients = inverse_gram @ (scaled_regressors.T @ rates)
     residuals = rates - scaled_regressors @ coefficients
     degrees_of_freedom = max(len(rates) - regressors.shape[1], 1)
     residual_covariance = residuals.T @ residuals / degrees_of_freedom
-    white_errors = np.sqrt(np.maximum(np.outer(np.diag(inverse), np.diag(residual_covariance)), 0.0))
-    newey_west_errors = np.column_stack(
+    white_standard_errors = np.sqrt(
+        np.maximum(np.outer(np.diag(inverse_gram), np.diag(residual_covariance)), 0.0)
+    )
+    newey_west_standard_errors = np.column_stack(
         [
             _newey_west_standard_errors(
-                scaled_regressors, residuals[:, axis], inverse, stretch_number, max_lag
+                scaled_regressors, residuals[:, axis], inverse_gram, stretch_number, newey_west_max_lag
             )
             for axis in range(rates.shape[1])
         ]
     )
-    error_inflation = np.divide(
-        newey_west_errors, white_errors, out=np.ones_like(newey_west_errors), where=white_errors > 0
+    standard_error_inflation = np.divide(
+        newey_west_standard_errors,
+        white_standard_errors,
+        out=np.ones_like(newey_west_standard_errors),
+        where=white_standard_errors > 0,
     )
-    regressor_rms = np.sqrt(np.maximum(np.diag(inverse), MIN_DIVISOR))
+    inverse_gram_root = np.sqrt(np.maximum(np.diag(inverse_gram), MIN_DIVISOR))
     return RateRegression(
-        coefficients / scale[:, None], residual_covariance,
-        newey_west_errors / scale[:, None], error_inflation,
-        inverse / np.outer(regressor_rms, regressor_rms),
+        coefficients / regressor_scale[:, None], residual_covariance,
+        newey_west_standard_errors / regressor_scale[:, None], standard_error_inflation,
+        inverse_gram / np.outer(inverse_gram_root, inverse_gram_root),
     )  # fmt: skip
 
 
 def _newey_west_standard_errors(
     scaled_regressors: Floats,
     residual: Floats,
-    inverse: Floats,
+    inverse_gram: Floats,
     stretch_number: NDArray[np.int64],
     max_lag: int,
 ) -> Floats:
     """Standard errors that hold for autocorrelated residuals: Bartlett weights over `max_lag` lags."""
-    scores, width = scaled_regressors * residual[:, None], max_lag + 1
-    edges = [0, *(np.flatnonzero(np.diff(stretch_number)) + 1).tolist(), len(stretch_number)]
+    score_contributions, bartlett_width = scaled_regressors * residual[:, None], max_lag + 1
+    stretch_edges = [0, *(np.flatnonzero(np.diff(stretch_number)) + 1).tolist(), len(stretch_number)]
     score_covariance = np.zeros((scaled_regressors.shape[1], scaled_regressors.shape[1]))
-    for begin, end in pairwise(edges):  # Bartlett's weights are those of products of running sums
-        cumulated = np.cumsum(np.pad(scores[begin:end], ((width, width - 1), (0, 0))), axis=0)
-        window_sums = cumulated[width:] - cumulated[:-width]
-        score_covariance += window_sums.T @ window_sums / width
-    return np.sqrt(np.maximum(np.diag(inverse @ score_covariance @ inverse), 0.0))
+    for begin, end in pairwise(stretch_edges):  # Bartlett's weights are those of products of running sums
+        cumulated_scores = np.cumsum(
+            np.pad(score_contributions[begin:end], ((bartlett_width, bartlett_width - 1), (0, 0))), axis=0
+        )
+        window_sums = cumulated_scores[bartlett_width:] - cumulated_scores[:-bartlett_width]
+        score_covariance += window_sums.T @ window_sums / bartlett_width
+    return np.sqrt(np.maximum(np.diag(inverse_gram @ score_covariance @ inverse_gram), 0.0))
 
 
 def coefficient_upper_bounds(
@@ -223,16 +250,16 @@ def coefficient_upper_bounds(
     as in `FilterSettings`."""
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
     scaled_regressors = regressors / regressor_rms
-    inverse = np.linalg.inv(
+    inverse_gram = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
         + _RIDGE_SHARE * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
-    coefficients = inverse @ (scaled_regressors.T @ outputs)
-    squared_residual = (outputs - scaled_regressors @ coefficients) ** 2
+    coefficients = inverse_gram @ (scaled_regressors.T @ outputs)
+    squared_residuals = (outputs - scaled_regressors @ coefficients) ** 2
     standard_error = np.sqrt(
-        np.maximum(np.diag(inverse), 0.0) * squared_residual.mean() / effective_sample_share
+        np.maximum(np.diag(inverse_gram), 0.0) * squared_residuals.mean() / effective_sample_share
     )
-    return (coefficients + BOUND_STANDARD_ERRORS * standard_error) / regressor_rms, squared_residual
+    return (coefficients + BOUND_WIDTH_STANDARD_ERRORS * standard_error) / regressor_rms, squared_residuals
 
 
 def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
@@ -243,18 +270,25 @@ def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] 
 
 def variance_inflation_factors(regressors: Floats) -> Floats:
     """How much each column's coefficient's variance is inflated by the others: 1 alone, inf dependent."""
-    centred = regressors - regressors.mean(axis=0)
-    column_norm = np.sqrt((centred**2).sum(axis=0))
-    factors = np.full(regressors.shape[1], np.inf)
-    varies = column_norm > 1e-12
-    correlation = (centred[:, varies] / column_norm[varies]).T @ (centred[:, varies] / column_norm[varies])
-    values, vectors = np.linalg.eigh(correlation)
-    is_independent, squared_vectors = values > _RANK_TOLERANCE * values.max(initial=0.0), vectors**2
-    inflated = (squared_vectors[:, is_independent] / values[is_independent]).sum(axis=1)
-    factors[varies] = np.where(
-        squared_vectors[:, ~is_independent].sum(axis=1) > _RANK_TOLERANCE, np.inf, inflated
+    centred_regressors = regressors - regressors.mean(axis=0)
+    column_norm = np.sqrt((centred_regressors**2).sum(axis=0))
+    inflation_factors = np.full(regressors.shape[1], np.inf)
+    is_varying = column_norm > 1e-12
+    correlation = (centred_regressors[:, is_varying] / column_norm[is_varying]).T @ (
+        centred_regressors[:, is_varying] / column_norm[is_varying]
     )
-    return factors
+    eigenvalues, eigenvectors = np.linalg.eigh(correlation)
+    is_nonzero_eigenvalue, squared_eigenvectors = (
+        eigenvalues > _RANK_TOLERANCE * eigenvalues.max(initial=0.0),
+        eigenvectors**2,
+    )
+    finite_factors = (
+        squared_eigenvectors[:, is_nonzero_eigenvalue] / eigenvalues[is_nonzero_eigenvalue]
+    ).sum(axis=1)
+    inflation_factors[is_varying] = np.where(
+        squared_eigenvectors[:, ~is_nonzero_eigenvalue].sum(axis=1) > _RANK_TOLERANCE, np.inf, finite_factors
+    )
+    return inflation_factors
 
 
 def power_spectral_density(
@@ -264,7 +298,7 @@ def power_spectral_density(
     from scipy import signal
 
     n_per_segment = min(segment_samples, len(residuals))
-    frequency_hz, density = signal.welch(
+    frequency_hz, power_density = signal.welch(
         residuals, fs=1.0 / dt_s, nperseg=n_per_segment, axis=0, detrend="constant"
     )
-    return frequency_hz, density
+    return frequency_hz, power_density

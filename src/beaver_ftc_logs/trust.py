@@ -190,7 +190,7 @@ def is_group_gain_known(model: Model) -> list[bool]:
     ):
         return has_known_effect
     return [
-        known_effect and regression.BOUND_STANDARD_ERRORS * gain_sd < 1.0
+        known_effect and regression.BOUND_WIDTH_STANDARD_ERRORS * gain_sd < 1.0
         for known_effect, gain_sd in zip(
             has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
         )
@@ -385,7 +385,7 @@ def _min_plausible_column_gain(model: Model, column_name: str) -> float:
         if model.fitted_ranges is not None
         else 0.0
     )
-    min_gain = 1.0 - regression.BOUND_STANDARD_ERRORS * gain_sd
+    min_gain = 1.0 - regression.BOUND_WIDTH_STANDARD_ERRORS * gain_sd
     return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
 
 

@@ -236,7 +236,7 @@ def test_settings_by_hand(fitted):
         fitting.flights_with_usable_rows([small.flight(TAIL, 400)]), TAIL
     )
     assert (
-        stuck.alarm_probability,
+        stuck.fault_probability_for_alarm,
         stuck.alarm_confirmation_time_s,
         stuck.likely_effectiveness_levels_by_group,
     ) == (
@@ -245,7 +245,7 @@ def test_settings_by_hand(fitted):
         {},
     )
     assert 0.0 < stuck.effective_sample_share <= 0.9
-    given = settings.model_copy(update={"alarm_probability": 0.7})
+    given = settings.model_copy(update={"fault_probability_for_alarm": 0.7})
     usable_flights = fitting.flights_with_usable_rows([small.flight(MODEL, 300)])
     assert fitting.fit_model(usable_flights, MODEL.vehicle, given).settings == given
     assert fitting.fit_with_same_order(usable_flights, fitted).settings == settings

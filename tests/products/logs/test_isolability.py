@@ -108,5 +108,8 @@ def test_the_smallest_loss_by_its_closed_form(wing, wing_folder, wing_model):
         )
         change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(
-            np.log(settings.alarm_probability / (1.0 - settings.alarm_probability) / change), rel=1e-9
+            np.log(
+                settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm) / change
+            ),
+            rel=1e-9,
         )

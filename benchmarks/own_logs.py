@@ -39,7 +39,7 @@ from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_with_aircraft_model, load_aircraft_and_declared_errors
 from beaver_ftc_logs.diagnose import DiagnosisRows, diagnose
-from beaver_ftc_logs.identification import identify, scale_commands_by_dynamic_pressure
+from beaver_ftc_logs.identification import identify, scale_by_dynamic_pressure_if_better
 from beaver_ftc_logs.model import Model, as_text
 from beaver_ftc_logs.samples import load_flights_for_fit, read_for_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
@@ -178,7 +178,7 @@ def identified(of: Campaign, logs: list[Log]) -> Model:
     faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
     vehicle = vehicle.model_copy(update={"faults": faults})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
-    found = identify(*scale_commands_by_dynamic_pressure(load_flights_for_fit(named, vehicle), vehicle))
+    found = identify(*scale_by_dynamic_pressure_if_better(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(as_text(found))
 
 

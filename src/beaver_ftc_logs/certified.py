@@ -20,14 +20,16 @@ def write_certificate(aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisR
     """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
     scheme than ours diagnosed."""
     stretches_with_alarm = (
-        values for values in aircraft_inputs.gap_free_stretches if rows.faulty[values[0] : values[1]].any()
+        stretch
+        for stretch in aircraft_inputs.gap_free_stretches
+        if rows.faulty[stretch[0] : stretch[1]].any()
     )
     start, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
-    inputs = [np.ascontiguousarray(values[start:end]) for values in aircraft_inputs.input_arrays]
+    stretch_inputs = [np.ascontiguousarray(stretch[start:end]) for stretch in aircraft_inputs.input_arrays]
     diagnosis = aircraft_inputs.diagnosis
 
     def step_frames() -> Iterator[int]:
-        for sample_index, sample in enumerate(zip(*inputs, strict=True)):
+        for sample_index, sample in enumerate(zip(*stretch_inputs, strict=True)):
             diagnosis.step(*sample)
             yield sample_index
 

@@ -62,7 +62,7 @@ def identify(
     from beaver_ftc_logs.identification import (
         identification_text,
         identify,
-        scale_commands_by_dynamic_pressure,
+        scale_by_dynamic_pressure_if_better,
     )
     from beaver_ftc_logs.model import as_text
     from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
@@ -74,7 +74,7 @@ def identify(
     vehicle_file = load_vehicle(vehicle)
     if false_alarms_per_hour is not None:
         vehicle_file = with_false_alarm_rate(vehicle_file, false_alarms_per_hour)
-    loaded_flights, vehicle_file = scale_commands_by_dynamic_pressure(
+    loaded_flights, vehicle_file = scale_by_dynamic_pressure_if_better(
         load_flights_for_fit(flights, vehicle_file, reader), vehicle_file
     )
     model = identify(loaded_flights, vehicle_file)

@@ -14,20 +14,22 @@ from beaver_ftc_logs.recording import Floats
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
 UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE = 0.15
 """Share of healthy flight in which the energy height falls as fast as without power."""
-_CLIMB_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
+_ENERGY_HEIGHT_WINDOW_S, _ENGINE_NAMING_DELAY_S = 5.0, 3.0
 
 
-def energy_height_rate_mps(
+def compute_energy_height_rate_mps(
     t_s: Floats, altitude_m: Floats, airspeed_mps: Floats, stretch_number: np.ndarray
 ) -> Floats:
     """Rate of the energy height over the last seconds, m/s, (n,); nan before they have passed."""
     energy_height_m = altitude_m + airspeed_mps**2 / (2.0 * GRAVITY_MPS2)
-    window_begin = np.searchsorted(t_s, t_s - _CLIMB_WINDOW_S, side="right") - 1
-    is_within_run = (window_begin >= 0) & (stretch_number[np.maximum(window_begin, 0)] == stretch_number)
-    window_begin = np.maximum(window_begin, 0)
-    window_s = np.where(is_within_run, t_s - t_s[window_begin], 1.0)
+    window_begin_row = np.searchsorted(t_s, t_s - _ENERGY_HEIGHT_WINDOW_S, side="right") - 1
+    is_window_gap_free = (window_begin_row >= 0) & (
+        stretch_number[np.maximum(window_begin_row, 0)] == stretch_number
+    )
+    window_begin_row = np.maximum(window_begin_row, 0)
+    window_s = np.where(is_window_gap_free, t_s - t_s[window_begin_row], 1.0)
     return np.asarray(
-        np.where(is_within_run, (energy_height_m - energy_height_m[window_begin]) / window_s, np.nan)
+        np.where(is_window_gap_free, (energy_height_m - energy_height_m[window_begin_row]) / window_s, np.nan)
     )
 
 
@@ -46,24 +48,30 @@ def withdraw_surfaces_after_engine_failure(
     row in which the energy height falls as without power until it rises. A row uses nothing later than its
     time.
     """
-    kept_names = isolated_surfaces.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        evidence_begin = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
+    names = isolated_surfaces.copy()
+    alarm_edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
+    for begin, end in zip(alarm_edges[::2].tolist(), alarm_edges[1::2].tolist(), strict=True):
+        evidence_begin_row = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
         is_falling, is_rising = (
-            energy_height_rate_mps[evidence_begin:end] <= unpowered_energy_height_rate_mps,
-            energy_height_rate_mps[evidence_begin:end] > 0.0,
+            energy_height_rate_mps[evidence_begin_row:end] <= unpowered_energy_height_rate_mps,
+            energy_height_rate_mps[evidence_begin_row:end] > 0.0,
         )
-        row_index = np.arange(end - evidence_begin)
-        last_fall, last_rise = (
+        row_index = np.arange(end - evidence_begin_row)
+        last_falling_row, last_rising_row = (
             np.maximum.accumulate(np.where(one, row_index, -1)) for one in (is_falling, is_rising)
         )
-        is_doubted = (last_fall > last_rise)[begin - evidence_begin :]
-        falling_share = np.cumsum(is_falling[begin - evidence_begin :]) / np.arange(1, end - begin + 1)
-        is_lasting = (
-            is_doubted & (falling_share > 0.5) & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_S)
+        may_engine_have_failed = (last_falling_row > last_rising_row)[begin - evidence_begin_row :]
+        falling_share = np.cumsum(is_falling[begin - evidence_begin_row :]) / np.arange(1, end - begin + 1)
+        is_engine_named = (
+            may_engine_have_failed
+            & (falling_share > 0.5)
+            & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_S)
         )
-        doubted_names = np.where(np.logical_or.accumulate(is_lasting) & is_doubted, ENGINE, UNKNOWN_SURFACE)
-        is_early = t_s[begin:end] - t_s[evidence_begin] < _CLIMB_WINDOW_S
-        kept_names[begin:end] = np.where(is_doubted | is_early, doubted_names, isolated_surfaces[begin:end])
-    return kept_names
+        engine_names = np.where(
+            np.logical_or.accumulate(is_engine_named) & may_engine_have_failed, ENGINE, UNKNOWN_SURFACE
+        )
+        is_within_evidence_window = t_s[begin:end] - t_s[evidence_begin_row] < _ENERGY_HEIGHT_WINDOW_S
+        names[begin:end] = np.where(
+            may_engine_have_failed | is_within_evidence_window, engine_names, isolated_surfaces[begin:end]
+        )
+    return names

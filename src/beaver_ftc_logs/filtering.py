@@ -31,7 +31,7 @@ from beaver_ftc_logs.samples import Samples, first_samples, whiten_samples
 _MODEL_EVIDENCE_MEMORY_S = 600.0
 _MIN_HYPOTHESIS_PROBABILITY = 1e-15
 _SQUARED_RESIDUAL_CLIP_PER_AXIS = 3.0
-_RESIDUAL_SUM_SPANS_S, _SCALE_WINDOW_S = (0.0, 0.1), 2.0
+_RESIDUAL_SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
 _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS = 0.93
 """Mean of the clipped square of a residual per axis when the scale is right."""
@@ -52,12 +52,12 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    noise_model_of_flight, delays_s = (
+    model_with_flight_noise, delays_s = (
         model.with_noise_model(samples.noise_ma_coefficients),
         model.settings.command_delay_candidates_s,
     )
     bank_runs = [
-        _run_bank_on_flight(_with_command_delay(samples, delay_s), noise_model_of_flight, bank)
+        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_flight_noise, bank)
         for delay_s in delays_s
     ]
     return _average_bank_runs(
@@ -70,39 +70,51 @@ def _posterior_averaged_over_noise_models(
 ) -> tuple[Floats, Floats, Floats]:
     """The average over the noise models. The bank is run with each up to the last sample at which its weight
     is not negligible: within a second most become far less likely than another, and stay so."""
-    whitened_flights = [
+    flights_and_models = [
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
     log_likelihoods = [
         _noise_model_log_likelihood(flight, single_model, single_model.noise_models[0])
-        for flight, single_model in whitened_flights
+        for flight, single_model in flights_and_models
     ]
-    weights = _model_probabilities_with_forgetting(log_likelihoods, model.rate_hz)
-    kept_weights = np.where(np.asarray(weights) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, weights)
-    kept_weights /= kept_weights.sum(axis=0)
-    last_samples = [int(np.flatnonzero(weight).max(initial=-1)) + 1 for weight in kept_weights]
+    noise_model_probabilities = _model_probabilities_with_forgetting(log_likelihoods, model.rate_hz)
+    kept_probabilities = np.where(
+        np.asarray(noise_model_probabilities) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, noise_model_probabilities
+    )
+    kept_probabilities /= kept_probabilities.sum(axis=0)
+    n_run_samples = [
+        int(np.flatnonzero(probability).max(initial=-1)) + 1 for probability in kept_probabilities
+    ]
     bank_runs = [
         _run_bank_on_flight(
-            first_samples(flight, count), single_model.with_noise_model(flight.noise_ma_coefficients), bank
+            first_samples(flight, n_samples),
+            single_model.with_noise_model(flight.noise_ma_coefficients),
+            bank,
         )
-        for (flight, single_model), count in zip(whitened_flights, last_samples, strict=True) if count
-    ]  # fmt: skip
+        for (flight, single_model), n_samples in zip(flights_and_models, n_run_samples, strict=True)
+        if n_samples
+    ]
     return _average_bank_runs(
-        [weight for weight, count in zip(kept_weights, last_samples, strict=True) if count], bank_runs
+        [
+            probability
+            for probability, n_samples in zip(kept_probabilities, n_run_samples, strict=True)
+            if n_samples
+        ],
+        bank_runs,
     )
 
 
 def _average_bank_runs(
-    weights: Sequence[Floats], runs: Sequence[BankRunResult]
+    weights: Sequence[Floats], bank_runs: Sequence[BankRunResult]
 ) -> tuple[Floats, Floats, Floats]:
     """Weighted average of runs; weights (n,) each. A run may be shorter than n where its weight stays 0."""
     averages: list[Floats] = []
     for output_index in range(3):
-        shape = (len(weights[0]), *runs[0][output_index].shape[1:])
+        shape = (len(weights[0]), *bank_runs[0][output_index].shape[1:])
         average = np.zeros(shape)
-        for weight, run in zip(weights, runs, strict=True):
-            output = run[output_index]
+        for weight, bank_run in zip(weights, bank_runs, strict=True):
+            output = bank_run[output_index]
             average[: len(output)] += weight[: len(output)].reshape(-1, *[1] * (output.ndim - 1)) * output
         averages.append(average)
     return averages[0], averages[1], averages[2]
@@ -136,7 +148,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         _MIN_HYPOTHESIS_PROBABILITY,
         1.0 - _MIN_HYPOTHESIS_PROBABILITY,
     )
-    change_to_fault = (
+    change_to_fault_probability = (
         bank.change_probability_per_sample
         * bank.transition_share[bank.is_fault_hypothesis].sum()
         / bank.transition_share.sum()
@@ -144,7 +156,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
     predicted_probability = np.concatenate(
         [
             [bank.prior_probability[bank.is_fault_hypothesis].sum()],
-            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1] + change_to_fault,
+            (1.0 - bank.change_probability_per_sample) * fault_probability[:-1] + change_to_fault_probability,
         ]
     )
     return np.asarray(
@@ -172,11 +184,13 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """
     if delay_s == 0.0:
         return samples
-    delay_share, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
+    delay_in_samples, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
     neighbouring_commands = np.vstack(
         [commands[:1], commands[:-1]] if delay_s > 0 else [commands[1:], commands[-1:]]
     )
-    return replace(samples, commands=(1.0 - delay_share) * commands + delay_share * neighbouring_commands)
+    return replace(
+        samples, commands=(1.0 - delay_in_samples) * commands + delay_in_samples * neighbouring_commands
+    )
 
 
 def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
@@ -185,24 +199,38 @@ def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate
     from scipy.signal import lfilter
 
     forgetting_factor = np.exp(-1.0 / (_MODEL_EVIDENCE_MEMORY_S * rate_hz))
-    cumulated = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
-    weights = np.exp(cumulated - cumulated.max(axis=0))
-    return np.asarray(weights / weights.sum(axis=0))
+    cumulated_log_likelihoods = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
+    relative_likelihoods = np.exp(cumulated_log_likelihoods - cumulated_log_likelihoods.max(axis=0))
+    return np.asarray(relative_likelihoods / relative_likelihoods.sum(axis=0))
 
 
 def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRunResult:
     """The result of `run_bank` for one flight."""
-    ok, *parts = whitened_rates_and_responses(samples, model)
-    unexplained, answers = (np.ascontiguousarray(np.nan_to_num(part)) for part in parts)
-    noise = build_residual_noise(model, samples.noise_ma_coefficients)
-    least = np.zeros(len(ok))
-    if model.vehicle.other_laws:
-        residual = np.where(ok[:, None], unexplained - noise.intercept_rad_s - answers.sum(axis=1), 0.0)
-        least = recent_noise_variance_scale(residual, ok, noise.covariance, model.rate_hz)
-    found: BankRunResult = run_bank(
-        unexplained, answers, ok, bank, build_trim_and_gain_state_model(model), noise, least
+    is_predictable, *rates_and_responses = whitened_rates_and_responses(samples, model)
+    unexplained_rates, group_responses = (
+        np.ascontiguousarray(np.nan_to_num(array)) for array in rates_and_responses
     )
-    return found
+    noise = build_residual_noise(model, samples.noise_ma_coefficients)
+    min_noise_variance_scales = np.zeros(len(is_predictable))
+    if model.vehicle.other_laws:
+        residual = np.where(
+            is_predictable[:, None],
+            unexplained_rates - noise.intercept_rad_s - group_responses.sum(axis=1),
+            0.0,
+        )
+        min_noise_variance_scales = recent_noise_variance_scale(
+            residual, is_predictable, noise.covariance, model.rate_hz
+        )
+    bank_run: BankRunResult = run_bank(
+        unexplained_rates,
+        group_responses,
+        is_predictable,
+        bank,
+        build_trim_and_gain_state_model(model),
+        noise,
+        min_noise_variance_scales,
+    )
+    return bank_run
 
 
 def recent_noise_variance_scale(
@@ -214,88 +242,94 @@ def recent_noise_variance_scale(
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
-    white = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
-    total = np.cumsum(np.vstack([np.zeros((1, 3)), white]), axis=0)
-    known = np.concatenate([[0], np.cumsum(is_usable)])
-    end = np.arange(1, len(white) + 1)
-    found = np.zeros(len(white))
+    whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
+    cumulated_residual = np.cumsum(np.vstack([np.zeros((1, 3)), whitened_residual]), axis=0)
+    cumulated_usable = np.concatenate([[0], np.cumsum(is_usable)])
+    window_end = np.arange(1, len(whitened_residual) + 1)
+    max_variance_ratio = np.zeros(len(whitened_residual))
     for span_s in _RESIDUAL_SUM_SPANS_S:
-        begin = np.maximum(end - max(round(span_s * rate_hz), 1), 0)
-        square = ((total[end] - total[begin]) ** 2).sum(axis=1) / (
-            3.0 * np.maximum(known[end] - known[begin], 1)
+        window_begin = np.maximum(window_end - max(round(span_s * rate_hz), 1), 0)
+        squared_sum = ((cumulated_residual[window_end] - cumulated_residual[window_begin]) ** 2).sum(
+            axis=1
+        ) / (3.0 * np.maximum(cumulated_usable[window_end] - cumulated_usable[window_begin], 1))
+        cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum)])
+        window_begin = np.maximum(window_end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
+        max_variance_ratio = np.maximum(
+            max_variance_ratio,
+            (cumulated_squares[window_end] - cumulated_squares[window_begin]) / (window_end - window_begin),
         )
-        sums = np.concatenate([[0.0], np.cumsum(square)])
-        begin = np.maximum(end - max(round(_SCALE_WINDOW_S * rate_hz), 1), 0)
-        found = np.maximum(found, (sums[end] - sums[begin]) / (end - begin))
-    return found
+    return max_variance_ratio
 
 
 @kernel
 def run_bank(
-    unexplained_rates, group_responses, is_usable, bank, state_model, noise, recent_noise_variance_scale
+    unexplained_rates, group_responses, is_usable, bank, state_model, noise, min_noise_variance_scales
 ):
-    """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and evidence (n,).
-
-    Evidence is the log likelihood of a sample given all before it, times effective_sample_share.
+    """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and sample_log_likelihoods
+    (n,): the log likelihood of a sample given all before it, times effective_sample_share.
 
     Shapes: unexplained_rates (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the sample may
     be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
-    recent_noise_variance_scale (n,): lower bound of the scale of the noise.
+    min_noise_variance_scales (n,): lower bound of the scale of the noise.
     """
     n, n_hypotheses, n_states = (
         len(unexplained_rates),
         len(bank.transition_share),
         len(state_model.initial_mean),
     )
-    no_response = n_hypotheses - 1
-    probabilities = bank.prior_probability.copy()
+    no_response_index = n_hypotheses - 1
+    hypothesis_probabilities = bank.prior_probability.copy()
     state_means = np.zeros((n_hypotheses, n_states))
     state_covariances = np.zeros((n_hypotheses, n_states, n_states))
     state_means[:] = state_model.initial_mean
     state_covariances[:] = state_model.initial_covariance
     posterior = np.zeros((n, n_hypotheses))
     mean_states = np.zeros((n, n_states))
-    scales = np.zeros(n)
-    evidence = np.zeros(n)
-    scale = 1.0
+    noise_variance_scales = np.zeros(n)
+    sample_log_likelihoods = np.zeros(n)
+    noise_variance_scale = 1.0
     for k in range(n):
-        prior = _mix_hypotheses(
-            probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
+        prior_probabilities = _mix_hypotheses(
+            hypothesis_probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
         )
         _relax_to_model(state_means, state_covariances, state_model)
-        state_means[no_response], state_covariances[no_response] = (
+        state_means[no_response_index], state_covariances[no_response_index] = (
             state_model.initial_mean,
             state_model.initial_covariance,
         )  # while nothing answers, nothing is learnt
         if is_usable[k]:
-            probabilities, square, evidence[k] = _correct_hypotheses(
-                prior,
-                state_means,
-                state_covariances,
-                unexplained_rates[k],
-                group_responses[k],
-                bank,
-                noise,
-                max(scale, recent_noise_variance_scale[k]),
+            hypothesis_probabilities, clipped_squared_residual, sample_log_likelihoods[k] = (
+                _correct_hypotheses(
+                    prior_probabilities,
+                    state_means,
+                    state_covariances,
+                    unexplained_rates[k],
+                    group_responses[k],
+                    bank,
+                    noise,
+                    max(noise_variance_scale, min_noise_variance_scales[k]),
+                )
             )
             _limit_states(
                 state_means,
                 state_model.initial_mean - state_model.max_deviation,
                 state_model.initial_mean + state_model.max_deviation,
             )
-            scale *= np.exp(
-                (1.0 - probabilities[no_response])
-                * (square / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
+            noise_variance_scale *= np.exp(
+                (1.0 - hypothesis_probabilities[no_response_index])
+                * (clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
                 / noise.scale_memory_samples
             )
-            scale = min(max(scale, noise.min_variance_scale), noise.max_variance_scale)
+            noise_variance_scale = min(
+                max(noise_variance_scale, noise.min_variance_scale), noise.max_variance_scale
+            )
         else:
-            probabilities = prior
-        posterior[k] = probabilities
-        scales[k] = scale
+            hypothesis_probabilities = prior_probabilities
+        posterior[k] = hypothesis_probabilities
+        noise_variance_scales[k] = noise_variance_scale
         for h in range(n_hypotheses):
-            mean_states[k] += probabilities[h] * state_means[h]
-    return posterior, mean_states, scales, evidence
+            mean_states[k] += hypothesis_probabilities[h] * state_means[h]
+    return posterior, mean_states, noise_variance_scales, sample_log_likelihoods
 
 
 @kernel
@@ -315,16 +349,16 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
                     state_covariances[h, i, j]
                     + (state_means[h, i] - mixed_mean[i]) * (state_means[h, j] - mixed_mean[j])
                 )
-    prior = np.empty(n_hypotheses)
-    total = 0.0
+    prior_probabilities = np.empty(n_hypotheses)
+    prior_sum = 0.0
     for h in range(n_hypotheses):
-        prior[h] = (
+        prior_probabilities[h] = (
             stay_probability * probabilities[h]
             + bank.change_probability_per_sample * bank.transition_share[h]
         )
-        total += prior[h]
+        prior_sum += prior_probabilities[h]
         _merge_gaussians(
-            stay_probability * probabilities[h] / prior[h],
+            stay_probability * probabilities[h] / prior_probabilities[h],
             state_means[h],
             state_covariances[h],
             mixed_mean,
@@ -332,7 +366,7 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
             bank.rate_offset_variance[h],
             random_walk_variance,
         )
-    return prior / total
+    return prior_probabilities / prior_sum
 
 
 @kernel
@@ -396,13 +430,13 @@ def _correct_hypotheses(
     """Kalman correction of every hypothesis by one sample; state_means and state_covariances are replaced.
 
     Returns the posterior probabilities (H,), the clipped squared residual averaged over them (in the
-    covariance without its inflation), and the evidence of the sample.
+    covariance without its inflation), and the log likelihood of the sample.
     """
     n_hypotheses, n_states = state_means.shape
     log_likelihood = np.empty(n_hypotheses)
-    squares = np.empty(n_hypotheses)
+    squared_residuals = np.empty(n_hypotheses)
     zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
-    covariance, dof = noise.covariance * noise_variance_scale, noise.t_degrees_of_freedom
+    noise_covariance, dof = noise.covariance * noise_variance_scale, noise.t_degrees_of_freedom
     for h in range(n_hypotheses):
         sensitivity = _state_sensitivity(
             bank.effectiveness[h],
@@ -412,29 +446,29 @@ def _correct_hypotheses(
             n_states,
         )
         if h == n_hypotheses - 1:
-            squares[h], log_det = _update_gaussian(
-                zero_mean, zero_covariance, unexplained_rates, sensitivity, covariance, noise
+            squared_residuals[h], log_determinant = _update_gaussian(
+                zero_mean, zero_covariance, unexplained_rates, sensitivity, noise_covariance, noise
             )
         else:
-            squares[h], log_det = _update_gaussian(
-                state_means[h], state_covariances[h], unexplained_rates, sensitivity, covariance, noise
+            squared_residuals[h], log_determinant = _update_gaussian(
+                state_means[h], state_covariances[h], unexplained_rates, sensitivity, noise_covariance, noise
             )
-        square = min(squares[h], noise.max_squared_residual)
+        limited_squared_residual = min(squared_residuals[h], noise.max_squared_residual)
         log_likelihood[h] = noise.effective_sample_share * (
-            -0.5 * (dof + 3.0) * np.log(1.0 + square / dof) - 0.5 * log_det
+            -0.5 * (dof + 3.0) * np.log(1.0 + limited_squared_residual / dof) - 0.5 * log_determinant
         )
     max_log_likelihood = log_likelihood.max()
     probabilities = np.maximum(
         prior_probabilities * np.exp(log_likelihood - max_log_likelihood), _MIN_HYPOTHESIS_PROBABILITY
     )
-    total = probabilities.sum()
-    probabilities /= total
-    clipped = 0.0
+    probability_sum = probabilities.sum()
+    probabilities /= probability_sum
+    mean_clipped_squared_residual = 0.0
     for h in range(n_hypotheses):
-        clipped += probabilities[h] * min(
-            noise.covariance_inflation * squares[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
+        mean_clipped_squared_residual += probabilities[h] * min(
+            noise.covariance_inflation * squared_residuals[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
         )
-    return probabilities, clipped, max_log_likelihood + np.log(total)
+    return probabilities, mean_clipped_squared_residual, max_log_likelihood + np.log(probability_sum)
 
 
 @kernel
@@ -469,45 +503,51 @@ def _update_gaussian(
     The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
     """
     n_states, dof = len(state_mean), noise.t_degrees_of_freedom
-    cross = np.zeros((n_states, 3))
+    cross_covariance = np.zeros((n_states, 3))
     residual_covariance = noise_covariance.copy()
     residual = unexplained_rates.copy()
     for i in range(n_states):
         for j in range(3):
             residual[j] -= state_mean[i] * state_sensitivity[i, j]
             for k in range(n_states):
-                cross[i, j] += state_covariance[i, k] * state_sensitivity[k, j]
+                cross_covariance[i, j] += state_covariance[i, k] * state_sensitivity[k, j]
     for i in range(n_states):
         for j in range(3):
             for k in range(3):
-                residual_covariance[j, k] += state_sensitivity[i, j] * cross[i, k]
-    inverse, determinant = _invert_symmetric(residual_covariance)
-    gain = np.zeros((n_states, 3))
-    square = 0.0
+                residual_covariance[j, k] += state_sensitivity[i, j] * cross_covariance[i, k]
+    inverse_residual_covariance, determinant = _invert_symmetric(residual_covariance)
+    kalman_gain = np.zeros((n_states, 3))
+    squared_residual = 0.0
     for j in range(3):
         for k in range(3):
-            square += residual[j] * inverse[j, k] * residual[k]
+            squared_residual += residual[j] * inverse_residual_covariance[j, k] * residual[k]
             for i in range(n_states):
-                gain[i, j] += cross[i, k] * inverse[k, j]
-    gain *= min(1.0, (dof + 3.0) / (dof + square)) if square < noise.max_squared_residual else 0.0
+                kalman_gain[i, j] += cross_covariance[i, k] * inverse_residual_covariance[k, j]
+    kalman_gain *= (
+        min(1.0, (dof + 3.0) / (dof + squared_residual))
+        if squared_residual < noise.max_squared_residual
+        else 0.0
+    )
     for j in range(3):
         for i in range(n_states):
-            state_mean[i] += gain[i, j] * residual[j]
+            state_mean[i] += kalman_gain[i, j] * residual[j]
             # symmetric by construction: an asymmetry from rounding would grow without bound
             for k in range(i + 1):
-                state_covariance[i, k] -= gain[i, j] * cross[k, j]
+                state_covariance[i, k] -= kalman_gain[i, j] * cross_covariance[k, j]
                 state_covariance[k, i] = state_covariance[i, k]
-    return square, np.log(determinant)
+    return squared_residual, np.log(determinant)
 
 
 @kernel
 def _invert_symmetric(matrix):
     """Inverse and determinant of a symmetric (3, 3) matrix, by its cofactors."""
-    c = np.empty((3, 3))
+    adjugate = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
             d, e = (j + 1) % 3, (j + 2) % 3
-            c[j, i] = matrix[a, d] * matrix[b, e] - matrix[a, e] * matrix[b, d]
-    determinant = matrix[0, 0] * c[0, 0] + matrix[0, 1] * c[1, 0] + matrix[0, 2] * c[2, 0]
-    return c / determinant, determinant
+            adjugate[j, i] = matrix[a, d] * matrix[b, e] - matrix[a, e] * matrix[b, d]
+    determinant = (
+        matrix[0, 0] * adjugate[0, 0] + matrix[0, 1] * adjugate[1, 0] + matrix[0, 2] * adjugate[2, 0]
+    )
+    return adjugate / determinant, determinant

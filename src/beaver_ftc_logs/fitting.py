@@ -748,7 +748,7 @@ def add_fitted_ranges_and_alarm_threshold(
     column_gain_standard_errors = gain_standard_error_by_column(
         rate_regression, model, float(gain_variance_between_laws.max())
     )
-    fitted_ranges = trust.fitted_ranges(
+    fitted_ranges = trust.compute_fitted_ranges(
         samples_and_usable, model, gain_standard_errors, max_noise_variance_scale
     ).model_copy(update={"gain_standard_error_by_column": column_gain_standard_errors})
     requested_false_alarms_per_hour = model.vehicle.false_alarms_per_hour

@@ -25,8 +25,10 @@ def residual_predictor_by_yule_walker(
     deviation of a gyro."""
     autocovariance = _residual_autocovariance(model, process_covariance, gyro_noise_rad_s, n_lags)
     lags = np.arange(n_lags)
-    blocks = np.array([[_autocovariance_at_lag(autocovariance, int(j - i)) for j in lags] for i in lags])
-    lag_covariance = blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
+    covariance_blocks = np.array(
+        [[_autocovariance_at_lag(autocovariance, int(j - i)) for j in lags] for i in lags]
+    )
+    lag_covariance = covariance_blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
     cross_covariance = np.concatenate([_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in lags])
     coefficients = np.linalg.solve(lag_covariance, cross_covariance)
     return np.asarray(coefficients), np.asarray(autocovariance[0] - cross_covariance.T @ coefficients)
@@ -39,11 +41,11 @@ def _residual_autocovariance(
     past_coefficients = np.array(model.past_coefficients)[: 3 * model.n_rate_lags].reshape(
         model.n_rate_lags, 3, 3
     )
-    average_coefficients = np.concatenate([np.eye(3)[None], -past_coefficients.transpose(0, 2, 1)])
+    ma_coefficients = np.concatenate([np.eye(3)[None], -past_coefficients.transpose(0, 2, 1)])
     autocovariance = np.zeros((max(n_lags, model.n_rate_lags) + 1, 3, 3))
-    for lag in range(len(average_coefficients)):
+    for lag in range(len(ma_coefficients)):
         autocovariance[lag] = gyro_noise_rad_s**2 * np.einsum(
-            "jab,jcb->ac", average_coefficients[lag:], average_coefficients[: len(average_coefficients) - lag]
+            "jab,jcb->ac", ma_coefficients[lag:], ma_coefficients[: len(ma_coefficients) - lag]
         )
     autocovariance[0] += process_covariance
     return autocovariance[: n_lags + 1]

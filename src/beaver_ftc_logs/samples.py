@@ -254,7 +254,7 @@ def _sampled_energy_height_rate_mps(
         return None
     t_s, stretch_number, step_s = time_base
     altitude, airspeed = (values_and_age_at(column, t_s, step_s)[0] for column in logged_columns)
-    return energy.energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
+    return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
 def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:

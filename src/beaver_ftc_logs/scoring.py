@@ -24,13 +24,13 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
     is_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
-    last_rows = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
-    judged_fields = {
+    sample_of_row = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
+    labelled_fields = {
         name: getattr(rows, name).compress(is_labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(rows, **judged_fields), samples.labels[last_rows].compress(is_labelled, axis=1)
+        replace(rows, **labelled_fields), samples.labels[sample_of_row].compress(is_labelled, axis=1)
     )
 
 
@@ -108,10 +108,12 @@ def score_against_failures(
 
 def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray) -> dict[str, float]:
     """Return the names after the failure, as shares of the rows with an alarm."""
-    names, count = np.unique(rows.isolated_surfaces[alarm_rows_after].astype(str), return_counts=True)
+    names, n_rows_of_name = np.unique(
+        rows.isolated_surfaces[alarm_rows_after].astype(str), return_counts=True
+    )
     return {
         str(name): float(share)
-        for name, share in zip(names, count / max(len(alarm_rows_after), 1), strict=True)
+        for name, share in zip(names, n_rows_of_name / max(len(alarm_rows_after), 1), strict=True)
     }
 
 
@@ -122,14 +124,16 @@ def _is_right_group(
     name."""
     name_endings = tuple(f"_{surface}" for surface in surfaces)
     failed_groups = {
-        index
-        for index, group in enumerate(groups)
+        group_index
+        for group_index, group in enumerate(groups)
         for name in group
         if name in surfaces or name.endswith(name_endings)
     }
-    names = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
-    if not failed_groups or not names:
+    share_of_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
+    if not failed_groups or not share_of_name:
         return None
-    longest_name = set(max(names, key=lambda name: names[name]).split("+"))
-    named_groups = {index for index, group in enumerate(groups) if longest_name & set(group)}
+    most_frequent_surfaces = set(max(share_of_name, key=lambda name: share_of_name[name]).split("+"))
+    named_groups = {
+        group_index for group_index, group in enumerate(groups) if most_frequent_surfaces & set(group)
+    }
     return bool(named_groups) and named_groups <= failed_groups

@@ -21,7 +21,7 @@ from beaver_ftc_logs.regression import coefficient_upper_bounds, split_into_flig
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 EFFECTIVENESS_BOUND_WINDOW_S = 1.0
 _LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
-_EFFECTIVE_SAMPLE_SHARE_LABELLED = 0.4
+_EFFECTIVE_SAMPLE_SHARE = 0.4
 _DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
@@ -99,7 +99,7 @@ def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> F
         theta, _ = coefficient_upper_bounds(
             regressors[part].reshape(3 * len(part), -1),
             scaled_innovation[part].ravel(),
-            _EFFECTIVE_SAMPLE_SHARE_LABELLED,
+            _EFFECTIVE_SAMPLE_SHARE,
         )
         max_gains = np.maximum(max_gains, 1.0 + theta[3:])
     return max_gains

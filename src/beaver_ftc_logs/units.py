@@ -32,9 +32,9 @@ def units_of_kind(kind: str) -> list[str]:
 
 def nearest_unit(kind: str, factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    ratios = {
+    ratio_of_unit = {
         name: max(factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / factor)
         for name in units_of_kind(kind)
     }
-    best = min(ratios, key=lambda name: ratios[name])
-    return best if ratios[best] <= max_ratio else None
+    nearest = min(ratio_of_unit, key=lambda name: ratio_of_unit[name])
+    return nearest if ratio_of_unit[nearest] <= max_ratio else None

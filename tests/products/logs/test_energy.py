@@ -36,14 +36,14 @@ WING = {
     ],
 )
 def test_the_energy_height_climbs_as_mechanics_says(altitude, airspeed, expected):
-    climb = energy.energy_height_rate_mps(T_S, altitude, airspeed, ONE)
+    climb = energy.compute_energy_height_rate_mps(T_S, altitude, airspeed, ONE)
     assert np.isnan(climb[T_S < 4.9]).all()
     np.testing.assert_allclose(climb[T_S > 5.05], expected, atol=1e-9)
 
 
 def test_a_gap_ends_what_is_known():
     run = (T_S >= 10.0).astype(int)
-    climb = energy.energy_height_rate_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
+    climb = energy.compute_energy_height_rate_mps(T_S, -2.0 * T_S, np.full(len(T_S), 20.0), run)
     assert np.isnan(climb[(T_S >= 10.0) & (T_S < 14.9)]).all()
     np.testing.assert_allclose(climb[T_S > 15.05], -2.0)
 

@@ -449,7 +449,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     def fitted_ranges(used, model, sd, scale):
         return copied({"of": (sd.tolist(), scale)})
 
-    monkeypatch.setattr(fitting.trust, "fitted_ranges", fitted_ranges)
+    monkeypatch.setattr(fitting.trust, "compute_fitted_ranges", fitted_ranges)
     monkeypatch.setattr(fitting.extremes, "fit_peak_tail", lambda parts: None)
     vehicle = SimpleNamespace(false_alarms_per_hour=None, other_laws=False)
     settings = SimpleNamespace(

@@ -17,7 +17,7 @@ from beaver_ftc_logs.identification import (
     identify,
     regressor_names,
     residual_spectrum,
-    scale_commands_by_dynamic_pressure,
+    scale_by_dynamic_pressure_if_better,
 )
 from beaver_ftc_logs.pages import load_template
 from beaver_ftc_logs.samples import Samples, scale_by_dynamic_pressure
@@ -43,15 +43,15 @@ def pressed(flight, seed=3):
 
 def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
     flight, its = small.flight(MODEL, 1100), MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    (anew,), described = scale_commands_by_dynamic_pressure([pressed(flight)], its)
+    (anew,), described = scale_by_dynamic_pressure_if_better([pressed(flight)], its)
     assert described.reference_airspeed_mps == pytest.approx(20.0, rel=0.02)
     ratio = (20.0 / described.reference_airspeed_mps) ** 2
     assert anew.commands == pytest.approx(ratio * flight.commands)
     wind = replace(flight, airspeed=pressed(flight).airspeed)
     for plain in ([wind], [flight]):
-        assert scale_commands_by_dynamic_pressure(plain, its) == (plain, its)
+        assert scale_by_dynamic_pressure_if_better(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
-    assert scale_commands_by_dynamic_pressure([pressed(flight)], told)[1] == told
+    assert scale_by_dynamic_pressure_if_better([pressed(flight)], told)[1] == told
 
 
 def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
@@ -60,12 +60,12 @@ def test_under_other_laws_each_surface_has_its_own_power_of_the_airspeed():
     by_speed = (flown.airspeed / 20.0)[:, None] ** np.array([[1.0, 2.0]])
     mixed = replace(flown, commands=flight.commands / by_speed)
     told = its.model_copy(update={"other_laws": True})
-    (anew,), described = scale_commands_by_dynamic_pressure([mixed], told)
+    (anew,), described = scale_by_dynamic_pressure_if_better([mixed], told)
     assert described.airspeed_powers == {"right": 1.0}
     ratio = 20.0 / described.reference_airspeed_mps
     assert anew.commands == pytest.approx(flight.commands * ratio ** np.array([1.0, 2.0]))
-    assert scale_commands_by_dynamic_pressure([flown], told)[1].airspeed_powers == {}
-    assert scale_commands_by_dynamic_pressure([mixed], its)[1].airspeed_powers == {}
+    assert scale_by_dynamic_pressure_if_better([flown], told)[1].airspeed_powers == {}
+    assert scale_by_dynamic_pressure_if_better([mixed], its)[1].airspeed_powers == {}
     said = identification_text(
         MODEL.model_copy(update={"vehicle": described, "identification_results": SAYS_LITTLE})
     )
@@ -85,7 +85,7 @@ def test_the_reference_is_the_median_of_all_airspeeds_that_are_known(monkeypatch
     )
     monkeypatch.setattr(identification, "_min_bic", lambda flown, of: 0.0)
     its = MODEL.vehicle.model_copy(update={"airspeed": "V"})
-    assert scale_commands_by_dynamic_pressure(flights, its) == (flights, its)
+    assert scale_by_dynamic_pressure_if_better(flights, its) == (flights, its)
     assert asked == [12.5, 12.5]
 
 

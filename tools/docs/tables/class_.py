@@ -20,9 +20,9 @@ def _live() -> list[tuple[str, str]]:
     weak, jam, trailing = (bf.fly(name, log=False) for name in names)
     modes = " → ".join(change["mode"] for change in weak.metrics["supervisor"])
     found, left = weak.detection, ", ".join(trailing.metrics["isolation"]["candidates"])
-    typed = f"{jam.isolation.type} after {jam.metrics['isolation']['type_delay_s']:.2f} s"
+    typed = f"type {jam.isolation.type} after {jam.metrics['isolation']['type_delay_s']:.2f} s"
     return [
-        ("1a", f"on {found.axis}, after {found.delay_s:.2f} s; {weak.isolation.fault}; {modes}"),
+        ("1a", f"axis {found.axis}, after {found.delay_s:.2f} s; {weak.isolation.fault}; {modes}"),
         ("1b", f"{jam.isolation.fault} after {jam.isolation.delay_s:.2f} s; {typed}"),
         ("1c", f"{trailing.isolation.fault}; remaining types: {left or trailing.isolation.type}"),
     ]
@@ -38,9 +38,9 @@ def _paper() -> list[tuple[str, str]]:
     )
     delay_s = published.detection.delay_s
     return [
-        ("2a", f"{errors[0]:.2f} deg/s under the nominal law, {errors[1]:.2f} when the flap takes over"),
+        ("2a", f"`nominal` {errors[0]:.2f} deg/s; `fault-tolerant-published` {errors[1]:.2f} deg/s"),
         ("2b", f"{threshold:.4f} rad/s at the last frame of the log"),
-        ("2c", f"alarm after {delay_s:.2f} s, named {published.isolation.fault}"),
+        ("2c", f"alarm after {delay_s:.2f} s; {published.isolation.fault}"),
     ]
 
 

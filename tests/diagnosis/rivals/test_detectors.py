@@ -288,14 +288,14 @@ def test_the_multiple_models_alarm_by_the_odds_of_any_fault():
     """Beside evens the statistic is zero; odds of e^alarm are one, and no alarm yet."""
     models = plugin_class(DETECTORS, "multiple-models")()
     models.reset(context(alarm=2.0))
-    assert models.mode_probability.sum() == pytest.approx(1.0, abs=1e-14)
-    assert models.mode_probability[0] <= 1.0
+    assert models.mode_probabilities.sum() == pytest.approx(1.0, abs=1e-14)
+    assert models.mode_probabilities[0] <= 1.0
     for odds, statistic in ((1.0, 0.0), (np.exp(1.0), 0.5), (np.exp(-2.0), -1.0)):
-        models.mode_probability[:] = odds / (1.0 + odds) / (len(models.mode_probability) - 1)
-        models.mode_probability[0] = 1.0 / (1.0 + odds)
+        models.mode_probabilities[:] = odds / (1.0 + odds) / (len(models.mode_probabilities) - 1)
+        models.mode_probabilities[0] = 1.0 / (1.0 + odds)
         assert models.verdict().statistic == pytest.approx(statistic)
         assert not models.verdict().detected
-    models.mode_probability[0] = 1.0 / (1.0 + np.exp(2.1))
+    models.mode_probabilities[0] = 1.0 / (1.0 + np.exp(2.1))
     assert models.verdict().detected
 
 

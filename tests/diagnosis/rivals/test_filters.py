@@ -183,7 +183,7 @@ def test_multiple_models_name_the_surface_that_their_probabilities_add_up_to(los
     imm.options, imm.detected = {"alarm": 2.0, "isolate": 0.8}, False
     imm.context = SimpleNamespace(leaders=("aileron", "elevator", "rudder"))
     healthy = 1.0 - np.sum(losses) - unknown
-    imm.mode_probability = np.array([healthy, *np.ravel(losses), unknown])
+    imm.mode_probabilities = np.array([healthy, *np.ravel(losses), unknown])
     found = imm.verdict()
     assert found.statistic == pytest.approx(np.log((1.0 - healthy) / healthy) / 2.0)
     assert found.detected is says.pop("detected", True)

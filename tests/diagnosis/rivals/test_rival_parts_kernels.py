@@ -181,7 +181,7 @@ def monitored(*scores, t_s=9.0, **options):
     """A monitor whose pairs (roll, pitch, yaw) score so."""
     monitor = RlsMonitor()
     monitor.reset(context(alarm=4.0, warm_up_s=4.0, **options))
-    monitor.pairs = [Scores(*of) for of in scores]
+    monitor.prediction_tests = [Scores(*of) for of in scores]
     return monitor, [monitor.step(seen(t_s=t_s), np.zeros(4)) for _ in scores[0]]
 
 
@@ -200,8 +200,8 @@ def test_a_monitor_forgets_and_averages_over_its_times_and_doubts_a_gyro():
     monitor = RlsMonitor()
     monitor.reset(context(GUSTY, forgetting_s=2.0, score_s=0.5, floor_rad_s=0.004))
     floors = np.hypot(0.004, GUSTY.gyro_rad_s)
-    assert [pair._min_error_std for pair in monitor.pairs] == pytest.approx(list(floors))
-    assert monitor.pairs[0]._averaging_decay == pytest.approx(exp(-DT / 0.5))
+    assert [pair._min_error_std for pair in monitor.prediction_tests] == pytest.approx(list(floors))
+    assert monitor.prediction_tests[0]._averaging_decay == pytest.approx(exp(-DT / 0.5))
 
 
 class Curved:

@@ -234,7 +234,7 @@ def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     assert on(commanded_surface.bias_deflection_range, fdi, surface, BIAS) == pytest.approx((LOW, -0.35))
     commands["min_healthy_position"][0] = commands["max_healthy_position"][0] = 0.0
     assert commanded_surface.bias_interval(fdi, 0, BIAS) == pytest.approx((-0.17, -0.15))
-    assert types.parameter_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
+    assert types.midpoint_parameter_estimate(fdi, 0, BIAS) == pytest.approx(-0.16)
     surface["feasible_sets"]["high"][BIAS] = np.inf
     assert commanded_surface.bias_interval(fdi, 0, BIAS) is None
 
@@ -410,7 +410,7 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     )
     fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert on(held_surface.min_runaway_travel, fdi, surface, frame) == pytest.approx(way)
+        assert on(held_surface.min_runaway_distance, fdi, surface, frame) == pytest.approx(way)
         assert on(held_surface.min_runaway_up_deflection, fdi, surface, frame) == pytest.approx(0.1 + way)
         assert on(held_surface.max_runaway_down_deflection, fdi, surface, frame) == pytest.approx(0.2 - way)
     assert on(held_surface.min_runaway_up_deflection, fdi, surface, 99) == HIGH
@@ -542,7 +542,7 @@ def test_a_return_goes_by_the_actuator(instants):
     for _ in range(instants):
         path.append(place)
         place -= min(0.5 * place, 0.1)
-    assert on(held_surface.mean_return_position, fdi, surface, 0.3) == pytest.approx(
+    assert on(held_surface.simulate_return_in_frame, fdi, surface, 0.3) == pytest.approx(
         (np.mean(path), place, 0.0)
     )
 
@@ -559,7 +559,7 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
     surface["judged_observation"]["weighted_mean_error_per_position_range"] = (
         0.25 * (G.max() - G.min()) / G.mean()
     )
-    mean, _, room = on(held_surface.mean_return_position, fdi, surface, held)
+    mean, _, room = on(held_surface.simulate_return_in_frame, fdi, surface, held)
     assert abs(shown - mean) <= room + 1e-15
     (
         surface["judged_observation"]["healthy_position"],
@@ -570,23 +570,23 @@ def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G,
         shown - 1e-12,
         shown + 1e-12,
     )
-    assert on(held_surface.return_explains_frame, fdi, surface, STUCK)
+    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
 
 
 def test_a_return_keeps_where_it_agrees_and_ends_where_it_does_not():
     fdi, surface = released(judged=(0.22, 0.28))
-    assert on(held_surface.return_explains_frame, fdi, surface, STUCK)
+    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
     held = surface["release"]
     assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
         (0.22, 0.28)
     )
     for judged in ((0.31, 0.4), (0.1, 0.19)):
         fdi, surface = released(judged=judged)
-        assert not on(held_surface.return_explains_frame, fdi, surface, STUCK)
+        assert not on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK)
         assert not held_surface.is_release_possible(surface, held_surface.LATER_RELEASE, STUCK)
     fdi, surface = released(low=0.1, high=0.1, judged=(0.0, 0.2), command=0.1)
     assert not on(
-        held_surface.return_explains_frame, fdi, surface, STUCK
+        held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK
     )  # it is back: no release explains that anything is wrong
 
 
@@ -606,7 +606,7 @@ def test_a_return_has_the_room_that_an_uneven_effectiveness_gives_it(length, ins
             0.05,
         )
         surface["judged_observation"]["weighted_mean_error_per_position_range"] = 0.2
-        assert on(held_surface.return_explains_frame, fdi, surface, STUCK) == there
+        assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK) == there
 
 
 def test_what_is_let_go_joins_the_later_releases_and_is_carried_on():
@@ -766,7 +766,7 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
             path.append(place)
             place = extreme(way(place, [order])[1], start)
         room = UNEVEN * np.ptp(path)
-        assert on(held_surface.mean_return_position, fdi, surface, start, side) == pytest.approx(
+        assert on(held_surface.simulate_return_in_frame, fdi, surface, start, side) == pytest.approx(
             (np.mean(path), place, room)
         )
         for wait in range(len(ORDERS)):  # held so long, then let go
@@ -779,7 +779,7 @@ def test_let_go_at_any_instant_a_surface_lies_between_the_ways_that_stay_on_one_
 def test_a_release_within_the_block_explains_what_lies_between_with_some_room(end, inside):
     fdi, surface = within_block(ORDERS)
     start, side = (0.2, -1) if end == "low" else (0.3, 1)
-    mean, _, room = on(held_surface.mean_return_position, fdi, surface, start, side)
+    mean, _, room = on(held_surface.simulate_return_in_frame, fdi, surface, start, side)
     assert room > 1e-3
     edge = mean + side * room
     beyond = edge - side * 1e-6 if inside else edge + side * 1e-6
@@ -787,7 +787,7 @@ def test_a_release_within_the_block_explains_what_lies_between_with_some_room(en
         (-1.0, beyond) if end == "low" else (beyond, 1.0)
     )
     assert on(held_surface.release_within_block_explains_block, fdi, surface, STUCK) == inside
-    assert on(held_surface.return_explains_frame, fdi, surface, STUCK) == inside
+    assert on(held_surface.drop_refuted_releases_and_test_return, fdi, surface, STUCK) == inside
     held = surface["release"]["held_position_min"][STUCK] <= surface["release"]["held_position_max"][STUCK]
     assert held == inside, "what explains nothing is forgotten"
     fdi["types"]["config"]["frames_per_block"] = 1
@@ -806,7 +806,9 @@ def test_after_a_block_releases_within_it_join_the_later_ones(joined):
     if joined:
         held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK] = 0.25, 0.251
     on(held_surface.propagate_returns, fdi, surface, STUCK)
-    low, high = (on(held_surface.mean_return_position, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1)))
+    low, high = (
+        on(held_surface.simulate_return_in_frame, fdi, surface, *of)[1] for of in ((0.2, -1), (0.3, 1))
+    )
     assert (held["return_position_low"][1, STUCK], held["return_position_high"][1, STUCK]) == pytest.approx(
         (low, high)
     )
@@ -828,7 +830,7 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     held, start = surface["release"], 0.2 if side == "low" else 0.3
     surface["judged_observation"]["weighted_mean_error_per_position_range"], path = UNEVEN, way(start, ORDERS)
     mean = path[:-1].mean()
-    assert on(held_surface.mean_return_position, fdi, surface, start) == pytest.approx(
+    assert on(held_surface.simulate_return_in_frame, fdi, surface, start) == pytest.approx(
         (mean, path[-1], UNEVEN * np.ptp(path[:-1]))
     )
     room = max(UNEVEN * np.ptp(way(other, ORDERS)[:-1]) for other in (0.2, 0.3))

@@ -307,14 +307,14 @@ def test_what_is_done_about_a_surface(kinds, accommodation_mode):
 
 
 def test_the_surface_at_fault():
-    assert on(verdict.surface_at_fault, new_case()) == NOT_ISOLATED
-    assert on(verdict.surface_at_fault, new_case(**NOBODY_ELSE)) == RUDDER
-    assert on(verdict.surface_at_fault, new_case(rudder=None, **NOBODY_ELSE)) == UNANTICIPATED
+    assert on(verdict.find_surface_at_fault, new_case()) == NOT_ISOLATED
+    assert on(verdict.find_surface_at_fault, new_case(**NOBODY_ELSE)) == RUDDER
+    assert on(verdict.find_surface_at_fault, new_case(rudder=None, **NOBODY_ELSE)) == UNANTICIPATED
     pitch = {"aileron": None, "rudder": None, "flap": None}
-    assert on(verdict.surface_at_fault, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
-    assert on(verdict.surface_at_fault, new_case(elevator=(OSCILLATORY,), **pitch)) == NOT_ISOLATED
+    assert on(verdict.find_surface_at_fault, new_case(elevator=(STUCK,), **pitch)) == ELEVATOR
+    assert on(verdict.find_surface_at_fault, new_case(elevator=(OSCILLATORY,), **pitch)) == NOT_ISOLATED
     lateral = dict(NOBODY_ELSE)
-    assert on(verdict.surface_at_fault, new_case(rudder=(OSCILLATORY,), **lateral)) == RUDDER
+    assert on(verdict.find_surface_at_fault, new_case(rudder=(OSCILLATORY,), **lateral)) == RUDDER
 
 
 @pytest.mark.parametrize(
@@ -341,7 +341,7 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
     assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
-        assert on(verdict.surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
+        assert on(verdict.find_surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
     fdi["types"]["surface"]["status"]["may_be_sole_fault"][FLAP] = 0
     assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
@@ -380,12 +380,15 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
 def test_the_law_acts_on_the_likeliest_before_all_doubt_is_gone():
     fdi = new_case(**NOBODY_ELSE)
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == RUDDER
-    assert on(verdict.presumed_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
-    assert on(verdict.presumed_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
-    assert on(verdict.presumed_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED) == NO_SURFACE
+    assert on(verdict.find_presumed_faulty_surface, fdi, fdi["verdict"]["isolated_estimator"]) == RUDDER
+    assert on(verdict.find_presumed_faulty_surface, _open(new_case()), NOT_ISOLATED) == ELEVATOR
+    assert on(verdict.find_presumed_faulty_surface, _open(new_case(elevator=None)), NOT_ISOLATED) == FLAP
+    assert (
+        on(verdict.find_presumed_faulty_surface, _open(new_case(elevator=None, flap=None)), NOT_ISOLATED)
+        == NO_SURFACE
+    )
     fdi["verdict"]["isolated_estimator"] = 4 + FLAP
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == FLAP
+    assert on(verdict.find_presumed_faulty_surface, fdi, fdi["verdict"]["isolated_estimator"]) == FLAP
 
 
 def _open(fdi):
@@ -1276,9 +1279,9 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
 def test_the_one_named_is_acted_upon_though_others_are_possible():
     fdi = new_case()
     fdi["verdict"]["isolated_estimator"] = 0  # the estimator of the aileron's loss
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == AILERON
+    assert on(verdict.find_presumed_faulty_surface, fdi, fdi["verdict"]["isolated_estimator"]) == AILERON
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
-    assert on(verdict.presumed_surface, fdi, fdi["verdict"]["isolated_estimator"]) == ELEVATOR
+    assert on(verdict.find_presumed_faulty_surface, fdi, fdi["verdict"]["isolated_estimator"]) == ELEVATOR
 
 
 def test_without_anybody_to_act_upon_there_is_no_lead():
@@ -1293,7 +1296,7 @@ def test_without_anybody_to_act_upon_there_is_no_lead():
 def test_the_first_surface_is_named_where_a_constant_explains_it_alone():
     fdi = new_case(aileron=(CONSTANT_LOSS,), elevator=(VARYING_LOSS,), rudder=None, flap=None)
     assert on(verdict.sole_possible_surface, fdi, False) == SEVERAL_SURFACES
-    assert on(verdict.surface_at_fault, fdi) == AILERON
+    assert on(verdict.find_surface_at_fault, fdi) == AILERON
 
 
 @pytest.mark.parametrize(("s", "outside"), [(AILERON, 0), (RUDDER, 1), (NO_SURFACE, 0), (NO_SURFACE, 1)])

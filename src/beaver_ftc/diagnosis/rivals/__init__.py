@@ -25,8 +25,8 @@ from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS
 
 TUNED_FILE = Path(__file__).with_name("tuned.json")
-EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE = "exact", "actuators", "errors"
-FLIGHT_GRADES = (EXACT_GRADE, ACTUATORS_GRADE, ERRORS_GRADE)
+EXACT_GRADE, LAGGING_ACTUATORS_GRADE, DECLARED_ERRORS_GRADE = "exact", "actuators", "errors"
+FLIGHT_GRADES = (EXACT_GRADE, LAGGING_ACTUATORS_GRADE, DECLARED_ERRORS_GRADE)
 # key in TUNED_FILE of each group of plug-ins
 TUNED_FILE_KEY_BY_PLUGIN_GROUP = {DETECTORS: "detectors", LAWS: "laws"}
 
@@ -36,24 +36,28 @@ TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method 
 @cache
 def tuned_parameters() -> TunedValuesByGrade:
     """Return the parameters that `beaver-ftc compare --tune` chose, as shipped."""
-    grades: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
-    return grades
+    tuned_values_by_grade: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
+    return tuned_values_by_grade
 
 
 def flight_grade(has_errors: bool, ideal_actuators: bool) -> str:
     """Return the grade of a flight: with declared errors of sensors or air, with actuators that lag, or with
     neither."""
     if has_errors:
-        return ERRORS_GRADE
-    return EXACT_GRADE if ideal_actuators else ACTUATORS_GRADE
+        return DECLARED_ERRORS_GRADE
+    return EXACT_GRADE if ideal_actuators else LAGGING_ACTUATORS_GRADE
 
 
-def tuned_values(tuned: TunedValuesByGrade, grade: str, group: str, method: str) -> dict[str, float]:
+def tuned_values(
+    tuned_values_by_grade: TunedValuesByGrade, grade: str, plugin_group: str, method_name: str
+) -> dict[str, float]:
     """The values chosen for a method on a grade of flights; none if nothing was chosen there."""
-    values: dict[str, float] = (
-        tuned.get(grade, {}).get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[group], {}).get(method, {})
+    method_values: dict[str, float] = (
+        tuned_values_by_grade.get(grade, {})
+        .get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[plugin_group], {})
+        .get(method_name, {})
     )
-    return values
+    return method_values
 
 
 def rival_options(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
@@ -61,16 +65,18 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
 
     The last one counts. Raises BadInput for one it does not have.
     """
-    for option in context.options:
-        if option not in defaults:
-            raise BadInput(f"{name}: options.{option}: unknown option{suggestion(option, defaults)}")
+    for option_name in context.options:
+        if option_name not in defaults:
+            raise BadInput(
+                f"{name}: options.{option_name}: unknown option{suggestion(option_name, defaults)}"
+            )
     declared = context.declared
     grade = flight_grade(
         declared.noisy, not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
     )
     tuned_options = {
-        option: value
-        for group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
-        for option, value in tuned_values(tuned_parameters(), grade, group, name).items()
+        option_name: option_value
+        for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
+        for option_name, option_value in tuned_values(tuned_parameters(), grade, plugin_group, name).items()
     }
     return {**defaults, **tuned_options, **context.options}

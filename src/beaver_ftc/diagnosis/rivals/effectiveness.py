@@ -49,10 +49,12 @@ class EffectivenessFilter:
         self.leading_surfaces = list(context.leading)
         self.gust_states = GustStates(context)
         self.n_states = N_STATES_WITHOUT_GUSTS + self.gust_states.n_states
-        rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
+        measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.z = np.zeros(self.n_states)
-        self.P = np.diag(np.concatenate((rate_variance, [0.01] * 3, self.gust_states.initial_variance)))
-        self.R = np.diag(rate_variance)
+        self.P = np.diag(
+            np.concatenate((measured_rate_variance, [0.01] * 3, self.gust_states.initial_variance))
+        )
+        self.R = np.diag(measured_rate_variance)
         self.theta_walk_variance = self.options["drift_per_s"] ** 2 * context.dt_s
         self.averaging_decay = exp(-context.dt_s / self.options["misfit_s"])
         self.mean_innovation_square, self.detected, self.is_first_frame = 3.0, False, True
@@ -83,10 +85,14 @@ class EffectivenessFilter:
 
     def process_noise_variances(self, measured: Measured) -> np.ndarray:
         """Q (n,), the diagonal: of the rates from the declared bound, of theta a random walk, of the air."""
-        acceleration_size = unexplained_acceleration_size(self.context, measured.eta_bar)
-        rate_variance = (self.context.dt_s * self.options["noise"] * acceleration_size) ** 2
+        unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
+        rate_noise_variance = (self.context.dt_s * self.options["noise"] * unexplained_acceleration) ** 2
         return np.concatenate(
-            (rate_variance, np.full(3, self.theta_walk_variance), self.gust_states.process_noise_variance)
+            (
+                rate_noise_variance,
+                np.full(3, self.theta_walk_variance),
+                self.gust_states.process_noise_variance,
+            )
         )
 
     def wald_statistics(self) -> np.ndarray:
@@ -101,13 +107,22 @@ class EffectivenessFilter:
             return Verdict(statistic=statistic)
         effectiveness = np.ones(len(self.context.surfaces))
         effectiveness[self.leading_surfaces] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
-        most_significant = int(np.argmax(self.wald_statistics()))
-        if self.mean_innovation_square > 3.0 * self.options["misfit"] or self.z[3 + most_significant] > 0.0:
+        most_significant_axis = int(np.argmax(self.wald_statistics()))
+        if (
+            self.mean_innovation_square > 3.0 * self.options["misfit"]
+            or self.z[3 + most_significant_axis] > 0.0
+        ):
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
-        surface = self.leading_surfaces[most_significant]
-        theta, name = float(effectiveness[surface] - 1.0), self.context.surfaces[surface]
+        surface_index = self.leading_surfaces[most_significant_axis]
+        theta, surface_name = float(effectiveness[surface_index] - 1.0), self.context.surfaces[surface_index]
         return Verdict(
-            True, "pqr"[most_significant], name, "loss_of_effectiveness", theta, effectiveness, statistic
+            True,
+            "pqr"[most_significant_axis],
+            surface_name,
+            "loss_of_effectiveness",
+            theta,
+            effectiveness,
+            statistic,
         )
 
 
@@ -136,8 +151,8 @@ class AugmentedEkf(EffectivenessFilter):
         """F (n, n): [[1 + dt df/dx, dt G_s u_s], [0, 1]], and with the air [.., dt B] and its decay."""
         f, y, dt = self.context.model.f, measured.y, self.context.dt_s
         F = np.eye(self.n_states)
-        steps = _DIFFERENCE_STEP_RAD_S * np.eye(3)
-        f_at_steps = f(np.concatenate((measured.x + steps, measured.x - steps)), y)
+        rate_steps = _DIFFERENCE_STEP_RAD_S * np.eye(3)
+        f_at_steps = f(np.concatenate((measured.x + rate_steps, measured.x - rate_steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
         F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surfaces]
         F[:3, N_STATES_WITHOUT_GUSTS:] = self.gust_states.rate_effect
@@ -168,29 +183,31 @@ class AugmentedUkf(EffectivenessFilter):
 
     def propagate(self, measured: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
-        points, weights = sigma_points(self.z, self.P, self.options["spread"] + self.gust_states.n_states)
-        points = self.propagate_points(points, measured)
-        self.z = weights @ points
-        deviations = points - self.z
-        self.P = (deviations.T * weights) @ deviations
+        state_points, point_weights = sigma_points(
+            self.z, self.P, self.options["spread"] + self.gust_states.n_states
+        )
+        state_points = self.propagate_points(state_points, measured)
+        self.z = point_weights @ state_points
+        point_deviations = state_points - self.z
+        self.P = (point_deviations.T * point_weights) @ point_deviations
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
     def propagate_points(self, points: np.ndarray, measured: Measured) -> np.ndarray:
         """Each sigma point a frame later; f differs between points by its change from the measured state."""
         dt, f = self.context.dt_s, self.context.model.f
-        propagated = points.copy()
-        f_difference = f(points[:, :3], measured.y) - f(measured.x, measured.y)
+        propagated_points = points.copy()
+        f_change_from_measured = f(points[:, :3], measured.y) - f(measured.x, measured.y)
         loss_acceleration = np.array(
             [
                 measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES_WITHOUT_GUSTS]
                 for point in points
             ]
         )
-        propagated[:, :3] += dt * (measured.acceleration + f_difference + loss_acceleration)
+        propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_acceleration)
         if self.gust_states.n_states:
-            propagated[:, :3] += points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
-            propagated[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
-        return propagated
+            propagated_points[:, :3] += points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
+            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
+        return propagated_points
 
     def statistic(self, innovation_square: float) -> float:
         """g = max(0, g + (innovation_square - 3 allowance)) over the alarm level; 3 is what a healthy flight

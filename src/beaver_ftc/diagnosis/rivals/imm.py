@@ -35,15 +35,15 @@ def transition_matrix(stay_probability: float, n_modes: int) -> np.ndarray:
 
 
 def mix_states(
-    x: np.ndarray, P: np.ndarray, mode_probability: np.ndarray, transition_probabilities: np.ndarray
+    x: np.ndarray, P: np.ndarray, mode_probabilities: np.ndarray, transition_probabilities: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mixed states (M, n), covariances (M, n, n) and predicted probabilities (M,) [Blom1988, steps 1 and
     2]."""
-    predicted_probabilities = mode_probability @ transition_probabilities
-    mixing_weights = transition_probabilities * mode_probability[:, None] / predicted_probabilities[None, :]
+    predicted_probabilities = mode_probabilities @ transition_probabilities
+    mixing_weights = transition_probabilities * mode_probabilities[:, None] / predicted_probabilities[None, :]
     mixed_states = mixing_weights.T @ x
-    deviations = x[:, None, :] - mixed_states[None, :, :]
-    spread_covariances = P[:, None] + deviations[..., :, None] * deviations[..., None, :]
+    state_deviations = x[:, None, :] - mixed_states[None, :, :]
+    spread_covariances = P[:, None] + state_deviations[..., :, None] * state_deviations[..., None, :]
     return (
         mixed_states,
         np.einsum("ij,ijab->jab", mixing_weights, spread_covariances),
@@ -53,10 +53,10 @@ def mix_states(
 
 def posterior_probabilities(predicted_probabilities: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
     """Bayes' rule, in logarithms so that nothing underflows."""
-    log_weights = np.log(predicted_probabilities) + log_likelihoods
-    log_weights = np.exp(log_weights - log_weights.max())
-    log_weights = np.maximum(log_weights / log_weights.sum(), _MIN_MODE_PROBABILITY)
-    return log_weights / log_weights.sum()
+    log_posteriors = np.log(predicted_probabilities) + log_likelihoods
+    posteriors = np.exp(log_posteriors - log_posteriors.max())
+    posteriors = np.maximum(posteriors / posteriors.sum(), _MIN_MODE_PROBABILITY)
+    return posteriors / posteriors.sum()
 
 
 class InteractingMultipleModels:
@@ -77,14 +77,15 @@ class InteractingMultipleModels:
         self.context, self.options = context, rival_options(self.name, self.defaults, context)
         self.dt = context.dt_s
         self.transition_probabilities = transition_matrix(self.options["stay"], N_MODES)
-        self.mode_probability = np.full(N_MODES, _MIN_MODE_PROBABILITY)
-        self.mode_probability[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
+        self.mode_probabilities = np.full(N_MODES, _MIN_MODE_PROBABILITY)
+        self.mode_probabilities[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
         self.gust_states = GustStates(context)
-        rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
-        self.R = np.diag(rate_variance)
+        measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
+        self.R = np.diag(measured_rate_variance)
         self.x = np.zeros((N_MODES, 3 + self.gust_states.n_states))
         self.P = np.tile(
-            np.diag(np.concatenate((rate_variance, self.gust_states.initial_variance))), (N_MODES, 1, 1)
+            np.diag(np.concatenate((measured_rate_variance, self.gust_states.initial_variance))),
+            (N_MODES, 1, 1),
         )
         self.F = np.eye(3 + self.gust_states.n_states)
         self.F[:3, 3:], self.F[3:, 3:] = self.gust_states.rate_effect, np.diag(self.gust_states.decay_factor)
@@ -99,54 +100,60 @@ class InteractingMultipleModels:
             self.is_first_frame, self.x[:, :3] = False, measured.x
             return Verdict(statistic=0.0)
         x, P, predicted_probabilities = mix_states(
-            self.x, self.P, self.mode_probability, self.transition_probabilities
+            self.x, self.P, self.mode_probabilities, self.transition_probabilities
         )
         if self.gust_states.n_states:
             x, P = x @ self.F.T, self.F @ P @ self.F.T
             P[:, range(3, 6), range(3, 6)] += self.gust_states.process_noise_variance
         x[:, :3] += self.dt * self.accelerations(measured)
-        acceleration_size = unexplained_acceleration_size(self.context, measured.eta_bar)
+        unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
         P[:, :3, :3] += np.einsum(
-            "m,ij->mij", (self.dt * self.acceleration_noise_scale) ** 2, np.diag(acceleration_size**2)
+            "m,ij->mij", (self.dt * self.acceleration_noise_scale) ** 2, np.diag(unexplained_acceleration**2)
         )
         nu = measured.x - x[:, :3]
         self.x, self.P, S = update_state(x, P, nu, self.R)
-        self.mode_probability = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))
+        self.mode_probabilities = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))
         return self.verdict()
 
     def accelerations(self, measured: Measured) -> np.ndarray:
         """Compute each hypothesis' acceleration in the elapsed frame, (M, 3) rad/s2."""
-        accelerations = np.tile(measured.acceleration, (N_MODES, 1))
-        for m, (leader, theta) in enumerate(MODE_DEFINITIONS):
-            if leader is not None:
-                accelerations[m] += theta * measured.contribution[:, self.context.leading[leader]]
-        return accelerations
+        mode_accelerations = np.tile(measured.acceleration, (N_MODES, 1))
+        for m, (leading_axis, theta) in enumerate(MODE_DEFINITIONS):
+            if leading_axis is not None:
+                mode_accelerations[m] += theta * measured.contribution[:, self.context.leading[leading_axis]]
+        return mode_accelerations
 
     def verdict(self) -> Verdict:
         """The alarm by the odds of any fault; the surface by the sum of its hypotheses."""
-        healthy_probability = self.mode_probability[0]
+        healthy_probability = self.mode_probabilities[0]
         statistic = float(np.log((1.0 - healthy_probability) / healthy_probability) / self.options["alarm"])
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
         unknown_fault_probability, loss_mode_probabilities = (
-            float(self.mode_probability[-1]),
-            self.mode_probability[1:-1].reshape(3, len(LOSS_THETA_LEVELS)),
+            float(self.mode_probabilities[-1]),
+            self.mode_probabilities[1:-1].reshape(3, len(LOSS_THETA_LEVELS)),
         )
         surface_probabilities = loss_mode_probabilities.sum(axis=1)
         if unknown_fault_probability > self.options["isolate"]:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)
-        most_likely = int(np.argmax(surface_probabilities))
-        if surface_probabilities[most_likely] < self.options["isolate"]:
-            min_probability = 1.0 - self.options["isolate"]
+        most_likely_axis = int(np.argmax(surface_probabilities))
+        if surface_probabilities[most_likely_axis] < self.options["isolate"]:
+            min_candidate_probability = 1.0 - self.options["isolate"]
             candidates = tuple(
-                s
-                for s, p in zip(self.context.leaders, surface_probabilities, strict=True)
-                if p > min_probability
+                candidate_name
+                for candidate_name, probability in zip(
+                    self.context.leaders, surface_probabilities, strict=True
+                )
+                if probability > min_candidate_probability
             )
-            return Verdict(True, "pqr"[most_likely], statistic=statistic, candidates=candidates)
+            return Verdict(True, "pqr"[most_likely_axis], statistic=statistic, candidates=candidates)
         theta = float(
-            loss_mode_probabilities[most_likely] @ LOSS_THETA_LEVELS / surface_probabilities[most_likely]
+            loss_mode_probabilities[most_likely_axis]
+            @ LOSS_THETA_LEVELS
+            / surface_probabilities[most_likely_axis]
         )
-        name = self.context.leaders[most_likely]
-        return Verdict(True, "pqr"[most_likely], name, "loss_of_effectiveness", theta, None, statistic)
+        surface_name = self.context.leaders[most_likely_axis]
+        return Verdict(
+            True, "pqr"[most_likely_axis], surface_name, "loss_of_effectiveness", theta, None, statistic
+        )

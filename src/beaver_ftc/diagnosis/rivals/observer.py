@@ -44,12 +44,20 @@ class SurfaceFit:
 
     def best_surface(self) -> tuple[int, float, float]:
         """(surface, theta, mean misfit square of an axis) of the surface that fits best."""
-        theta = np.clip(self.cross_sums / np.maximum(self.regressor_square_sums, 1e-300), -1.0, 0.0)
-        misfit = (
-            self.residual_square_sum - 2.0 * theta * self.cross_sums + theta**2 * self.regressor_square_sums
+        theta_by_surface = np.clip(
+            self.cross_sums / np.maximum(self.regressor_square_sums, 1e-300), -1.0, 0.0
         )
-        best_surface = int(np.argmin(misfit))
-        return best_surface, float(theta[best_surface]), float(misfit[best_surface] / (3.0 * self.weight_sum))
+        misfit_by_surface = (
+            self.residual_square_sum
+            - 2.0 * theta_by_surface * self.cross_sums
+            + theta_by_surface**2 * self.regressor_square_sums
+        )
+        best_surface_index = int(np.argmin(misfit_by_surface))
+        return (
+            best_surface_index,
+            float(theta_by_surface[best_surface_index]),
+            float(misfit_by_surface[best_surface_index] / (3.0 * self.weight_sum)),
+        )
 
 
 def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
@@ -108,10 +116,10 @@ class ConstantThresholdObserver:
                 + self.dt_s * measured.contribution[:, self.leading_surfaces]
             )
         self.previous_rates = measured.x
-        threshold_share = np.abs(self.eps) / self.threshold
-        statistic = float(threshold_share.max())
+        residual_threshold_ratio = np.abs(self.eps) / self.threshold
+        statistic = float(residual_threshold_ratio.max())
         if statistic > 1.0 and self.alarm_at_s is None:
-            self.alarm_at_s, self.alarm_axis = measured.t_s, "pqr"[int(np.argmax(threshold_share))]
+            self.alarm_at_s, self.alarm_axis = measured.t_s, "pqr"[int(np.argmax(residual_threshold_ratio))]
             self.residual_since_alarm, self.filtered_effects = np.zeros(3), np.zeros((3, 3))
         if self.alarm_at_s is None:
             return Verdict(statistic=statistic)
@@ -124,7 +132,7 @@ class ConstantThresholdObserver:
         self.surface_fit.step(
             self.residual_since_alarm / self.threshold, self.filtered_effects / self.threshold[:, None]
         )
-        s, theta, misfit = self.surface_fit.best_surface()
+        surface_index, theta, misfit = self.surface_fit.best_surface()
         if misfit > 1.0:
             return Verdict(True, self.alarm_axis, "unanticipated", "unanticipated")
-        return Verdict(True, self.alarm_axis, self.leaders[s], "loss_of_effectiveness", theta)
+        return Verdict(True, self.alarm_axis, self.leaders[surface_index], "loss_of_effectiveness", theta)

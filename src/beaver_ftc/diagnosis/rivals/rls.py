@@ -86,7 +86,7 @@ class RlsMonitor:
         forgetting_factor = exp(-context.dt_s / self.options["forgetting_s"])
         averaging_decay = exp(-context.dt_s / self.options["score_s"])
         min_error_std = np.hypot(self.options["floor_rad_s"], context.declared.gyro_rad_s)
-        self.pairs = [
+        self.prediction_tests = [
             InputOutputPredictionTest(forgetting_factor, averaging_decay, float(min_error_std[i]))
             for i in range(3)
         ]
@@ -96,14 +96,16 @@ class RlsMonitor:
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Score every pair; the first beyond the limit is the fault."""
         scores = [
-            pair.step(float(command[s]), float(rate))
-            for pair, s, rate in zip(self.pairs, self.leading_surfaces, measured.x, strict=True)
+            prediction_test.step(float(command[surface_index]), float(rate))
+            for prediction_test, surface_index, rate in zip(
+                self.prediction_tests, self.leading_surfaces, measured.x, strict=True
+            )
         ]
         if measured.t_s < self.options["warm_up_s"]:
             return Verdict(statistic=0.0)
-        worst_pair = int(np.argmax(scores))
-        statistic = scores[worst_pair] / self.options["alarm"]
+        worst_axis = int(np.argmax(scores))
+        statistic = scores[worst_axis] / self.options["alarm"]
         if statistic > 1.0 and not self.verdict.detected:
-            surface = self.leaders[worst_pair]
-            self.verdict = Verdict(True, "pqr"[worst_pair], surface, candidates=(surface,))
+            surface_name = self.leaders[worst_axis]
+            self.verdict = Verdict(True, "pqr"[worst_axis], surface_name, candidates=(surface_name,))
         return self.verdict._replace(statistic=statistic)

@@ -31,18 +31,18 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
-def diagnosis_dtype(n: int, size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces; size: rooms of its record."""
+def diagnosis_dtype(n_surfaces: int, record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
+    """The stages of the diagnosis of an aircraft with n surfaces; record_size: rooms of its record."""
     return record(
-        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_error_map_boxes),
+        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n_surfaces, record_size.n_error_map_boxes),
         bank=filters.BANK_RECORD,
         fdae=filters.FDAE_RECORD,
-        verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
-        isolation=isolation.isolation_dtype(n),
-        types=registry.fault_types_dtype(n), statistical=statistical.statistical_dtype(size),
+        verdict=conclusions.conclusion_dtype(n_surfaces), layout=state.layout_dtype(n_surfaces),
+        isolation=isolation.isolation_dtype(n_surfaces),
+        types=registry.fault_types_dtype(n_surfaces), statistical=statistical.statistical_dtype(record_size),
         sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
         engine_monitor=monitors.ENGINE_MONITOR_RECORD,
-        plugin_verdict=state.plugin_verdict_dtype(n),
+        plugin_verdict=state.plugin_verdict_dtype(n_surfaces),
     )  # fmt: skip
 
 
@@ -82,8 +82,8 @@ def carry_over_to_restarted_diagnosis(fdi: np.void, previous_fdi: np.void, in_fl
         fdi["bank"]["output"]["max_residual_over_threshold_so_far"] = previous_fdi["bank"]["output"][
             "max_residual_over_threshold_so_far"
         ]
-    for gust in ("gust", "inertial_gust"):
-        fdi["statistical"][gust]["config"]["starts_in_flight"] = in_flight
+    for gust_record_name in ("gust", "inertial_gust"):
+        fdi["statistical"][gust_record_name]["config"]["starts_in_flight"] = in_flight
     fdi["sensor_monitor"]["memory"]["substep"] = 0
 
 
@@ -98,38 +98,46 @@ def record_isolated_surfaces(fdi, t):
     """Record at t s which surfaces are isolated: those of a pair, or the isolated one; none once a sensor is
     found broken."""
     conclusion, monitor = fdi.verdict, fdi.sensor_monitor
-    is_void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_isolated_surface
+    surface_conclusion_is_void = (
+        sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_isolated_surface
+    )
     sole_isolated_surface = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         is_isolated = (
             fdi.types.surface[s].status.is_isolated if fdi.types.pair.enabled else s == sole_isolated_surface
         )
-        conclusions.update_isolation_interval(conclusion, s, is_isolated and not is_void, t)
+        conclusions.update_isolation_interval(
+            conclusion, s, is_isolated and not surface_conclusion_is_void, t
+        )
 
 
 @kernel
-def built_in_detection_statistic(bank, alarm, authority, uses_statistical_estimates):
-    """The largest share of its threshold that the built-in detection reaches at this frame; alarm: `ALARM` of
-    the statistical detector; uses_statistical_estimates: whether its estimates count.
+def built_in_detection_statistic(filter_bank, statistical_alarm, alarm_authority, uses_statistical_estimates):
+    """The largest share of its threshold that the built-in detection reaches at this frame.
+
+    statistical_alarm: `ALARM` of the statistical detector; uses_statistical_estimates: whether its estimates
+    count.
 
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.
     """
-    statistical_score = alarm.score_over_alarm_level if uses_statistical_estimates else 0.0
-    if authority == STATISTICAL_DETECTOR:
-        return statistical_score
-    worst_case_share = max_residual_threshold_ratio(bank)
+    statistical_threshold_ratio = (
+        statistical_alarm.score_over_alarm_level if uses_statistical_estimates else 0.0
+    )
+    if alarm_authority == STATISTICAL_DETECTOR:
+        return statistical_threshold_ratio
+    worst_case_threshold_ratio = max_residual_threshold_ratio(filter_bank)
     return (
-        max(statistical_score, worst_case_share)
-        if worst_case_share > 1.0 or not uses_statistical_estimates
-        else statistical_score
+        max(statistical_threshold_ratio, worst_case_threshold_ratio)
+        if worst_case_threshold_ratio > 1.0 or not uses_statistical_estimates
+        else statistical_threshold_ratio
     )
 
 
-def _load_scheme(path: str) -> CompiledScheme:
+def _load_scheme(scheme_location: str) -> CompiledScheme:
     """The scheme at `module` or `module:NAME`; without a name SCHEME."""
-    module, _, name = path.partition(":")
-    scheme: CompiledScheme = getattr(import_module(module), name or "SCHEME")
+    module_name, _, variable_name = scheme_location.partition(":")
+    scheme: CompiledScheme = getattr(import_module(module_name), variable_name or "SCHEME")
     return scheme
 
 

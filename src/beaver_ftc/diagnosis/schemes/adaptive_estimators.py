@@ -83,7 +83,7 @@ def start_detection_filters(fdi, x):
 @kernel
 def update_isolation_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
-    config, bound, isolation_record, frame_means = (
+    config, bound_record, isolation_record, frame_means = (
         fdi.config,
         fdi.bound,
         fdi.isolation,
@@ -93,7 +93,7 @@ def update_isolation_estimators(fdi, prediction):
     isolation.update_all_fault_effects_and_reach(
         isolation_record,
         fdi.bank,
-        bound,
+        bound_record,
         config,
         is_detected,
         frame_means.G,
@@ -102,7 +102,7 @@ def update_isolation_estimators(fdi, prediction):
     )
     if is_detected:
         isolation.advance_estimators(
-            isolation_record, bound, prediction.x_before, frame_means.acceleration, config.dt
+            isolation_record, bound_record, prediction.x_before, frame_means.acceleration, config.dt
         )
 
 
@@ -139,19 +139,19 @@ def isolate_fault(fdi, measured, t, was_detected_before):
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
     a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
     """
-    variant, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
+    variant_index, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
     if not was_detected_before:
         isolation.start_estimators(fdi.isolation, fdi.bound.gyro_error_change_bound, measured.x)
-        begin_isolation_variant(variant, fdi)
-    sensors_are_sound = not sensor_monitor.surface_alarm_may_be_initial_error(
+        begin_isolation_variant(variant_index, fdi)
+    alarm_is_not_initial_error = not sensor_monitor.surface_alarm_may_be_initial_error(
         monitor, fdi.verdict.detected_at_s
     )
     if (
-        sensors_are_sound
+        alarm_is_not_initial_error
         and sensor_monitor.allows_surface_isolation(monitor, was_detected_before)
         and not fdi.engine_monitor.output.engine_failed
     ):
-        isolate_by_variant(variant, fdi, measured, t, was_detected_before)
+        isolate_by_variant(variant_index, fdi, measured, t, was_detected_before)
 
 
 @kernel
@@ -171,14 +171,16 @@ def update_and_test_if_possible_in_worst_case(fdi, fie, x, isolation_started_ear
 @kernel
 def update_and_test_if_likelihood_excludes(fdi, fie):
     """Whether the statistical detector excludes the loss of estimator fie, once it has raised its alarm."""
-    detector, config = fdi.statistical, fdi.config
-    if detector.alarm.detected_at_s < 0.0:
+    statistical_detector, config = fdi.statistical, fdi.config
+    if statistical_detector.alarm.detected_at_s < 0.0:
         return False
-    gust_can_hide_vane_error = fdi.sensor_monitor.config.enabled and detector.gust.output.accounts_for_gusts
+    gust_can_hide_vane_error = (
+        fdi.sensor_monitor.config.enabled and statistical_detector.gust.output.accounts_for_gusts
+    )
     isolation.update_likelihood_exclusion(
         fie,
-        detector.test_config,
-        detector.block,
+        statistical_detector.test_config,
+        statistical_detector.block,
         fdi.isolation,
         fdi.layout.loss_estimator,
         config.abrupt,
@@ -190,13 +192,18 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
 @kernel
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    detector, position_estimator = fdi.statistical, fdi.layout.position_estimator[fie.surface]
-    views, effect_column = (
-        detector.views[: detector.n_views],
+    statistical_detector, position_estimator = fdi.statistical, fdi.layout.position_estimator[fie.surface]
+    parity_views, surface_effectiveness_column = (
+        statistical_detector.views[: statistical_detector.n_views],
         fdi.isolation.estimator[position_estimator].frame_mean_effect.regressor,
     )
     return parity.views_exclude_surface(
-        views, detector.test_config, detector.forces, detector.gust, fie.surface, effect_column
+        parity_views,
+        statistical_detector.test_config,
+        statistical_detector.forces,
+        statistical_detector.gust,
+        fie.surface,
+        surface_effectiveness_column,
     )
 
 
@@ -263,24 +270,28 @@ def isolate_fault_type_by_either_detector(fdi, measured, t, isolation_started_ea
 @kernel
 def decide_fault_type(fdi, t, isolation_started_earlier):
     """Decide which fault of every type, alone or two at a time, is there."""
-    types, conclusion_record, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
-    estimators, bound = fdi.isolation.estimator, fdi.bound
+    types, conclusion_record, layout, filter_bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
+    estimators, bound_record = fdi.isolation.estimator, fdi.bound
     verdict.record_excluded_estimators(types.surface, layout, estimators)
     if types.pair.enabled:
-        pairs.observe_and_judge_frame_for_pairs(types, layout, estimators, bank, bound.frame_innovation_bound)
+        pairs.observe_and_judge_frame_for_pairs(
+            types, layout, estimators, filter_bank, bound_record.frame_innovation_bound
+        )
         conclusion.record_fault_type_finding(
             conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
         )
         return
     if isolation_started_earlier or fdi.isolation.config.uses_reach_test:
-        registry.observe_and_judge_frame(types, layout, estimators, bank.output.innovation, bound)
+        registry.observe_and_judge_frame(
+            types, layout, estimators, filter_bank.output.innovation, bound_record
+        )
     conclusion.record_fault_type_finding(
         conclusion_record, verdict.decide_surface_and_type(types, conclusion_record, layout, estimators, t)
     )
 
 
 @apart
-def begin_loss_isolation(fdi):
+def skip_begin_loss_isolation(fdi):
     """The estimators are all that a loss needs (IsolationVariant)."""
 
 
@@ -291,7 +302,7 @@ def begin_fault_type_isolation(fdi):
 
 
 @apart
-def record_no_commands_for_losses(fdi, prediction):
+def skip_record_commands_for_losses(fdi, prediction):
     """The estimators have observed all that a loss needs (IsolationVariant)."""
 
 
@@ -303,13 +314,13 @@ def record_surface_commands(fdi, prediction):
 
 ISOLATION_VARIANTS = {
     ("published", "worst-case"): IsolationVariant(
-        begin_loss_isolation, record_no_commands_for_losses, isolate_loss
+        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss
     ),
     ("published", "either"): IsolationVariant(
-        begin_loss_isolation, record_no_commands_for_losses, isolate_loss_by_either_detector
+        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_either_detector
     ),
     ("published", "statistical"): IsolationVariant(
-        begin_loss_isolation, record_no_commands_for_losses, isolate_loss_by_statistics
+        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_statistics
     ),
     ("all", "worst-case"): IsolationVariant(
         begin_fault_type_isolation, record_surface_commands, isolate_fault_type
@@ -336,30 +347,41 @@ def isolation_variant_index(config: FdiConfig) -> int:
 @apart
 def update_statistical_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    detector, y, uncertainty_bound = fdi.statistical, measured.y, fdi.statistical.noise.uncertainty_bound
-    tests, blocks, gust, force_record = detector.test_config, detector.block, detector.gust, detector.forces
-    parity_views, inertial_gust, mean = (
-        detector.views[: detector.n_views],
-        detector.inertial_gust,
+    statistical_detector, y, uncertainty_bound = (
+        fdi.statistical,
+        measured.y,
+        fdi.statistical.noise.uncertainty_bound,
+    )
+    test_config, blocks, gust, force_record = (
+        statistical_detector.test_config,
+        statistical_detector.block,
+        statistical_detector.gust,
+        statistical_detector.forces,
+    )
+    parity_views, inertial_gust, frame_means = (
+        statistical_detector.views[: statistical_detector.n_views],
+        statistical_detector.inertial_gust,
         prediction.frame_means,
     )
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
     gusts.fill_frame_mean_gust(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
         gusts.fill_frame_mean_gust(inertial_gust, prediction.frame_share_per_instant)
-    fill_surface_effects_with_previous_G(mean)
-    fill_block_signatures(blocks, mean.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0))
-    is_alarm_latched, loss_can_end = detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
+    fill_surface_effects_with_previous_G(frame_means)
+    fill_block_signatures(
+        blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
+    )
+    is_alarm_latched, loss_can_end = statistical_detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.update_blocks(
-        tests, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
+        test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
     )
     parity.update_view_directions_and_signatures(
-        parity_views, force_record, gust, fdi.bound, mean.previous_G, mean.Gu_with_previous_G
+        parity_views, force_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
     )
     parity.project_innovation(
         parity_views,
-        tests.has_regressors,
-        detector.noise,
+        test_config.has_regressors,
+        statistical_detector.noise,
         blocks,
         force_record,
         gust,
@@ -367,10 +389,12 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         innovation,
         y[AIRSPEED],
     )
-    parity.update_view_tests(parity_views, tests, detector.tone_config, y, dt, k, is_alarm_latched)
+    parity.update_view_tests(
+        parity_views, test_config, statistical_detector.tone_config, y, dt, k, is_alarm_latched
+    )
     is_error_mapped = fdi.bound.model_error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
-        detector.alarm, tests, blocks, parity_views, force_record, gust, t, is_error_mapped
+        statistical_detector.alarm, test_config, blocks, parity_views, force_record, gust, t, is_error_mapped
     )
     form_innovation_after_known_faults(prediction, measured.x, dt)
     statistical.filter_innovation_after_known_faults(
@@ -381,21 +405,50 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
 @apart
 def prepare_statistical_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
-    detector, dt = fdi.statistical, fdi.config.dt
-    tests, noise, gust = detector.test_config, detector.noise, detector.gust
-    update_gusts_and_forces(gust, detector.inertial_gust, detector.forces, prediction, measured, k, dt)
+    statistical_detector, dt = fdi.statistical, fdi.config.dt
+    test_config, noise_record, gust = (
+        statistical_detector.test_config,
+        statistical_detector.noise,
+        statistical_detector.gust,
+    )
+    update_gusts_and_forces(
+        gust, statistical_detector.inertial_gust, statistical_detector.forces, prediction, measured, k, dt
+    )
     statistical.prepare_tests(
-        tests, noise, detector.block, gust, fdi.bound, prediction.design, measured, prediction.u, dt
+        test_config,
+        noise_record,
+        statistical_detector.block,
+        gust,
+        fdi.bound,
+        prediction.design,
+        measured,
+        prediction.u,
+        dt,
     )
 
 
 @apart
 def add_instant_to_statistical_tests(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
-    detector, dt = fdi.statistical, prediction.frame_share_per_instant * fdi.config.dt
-    tests, noise, gust = detector.test_config, detector.noise, detector.gust
+    statistical_detector, instant_duration_s = (
+        fdi.statistical,
+        prediction.frame_share_per_instant * fdi.config.dt,
+    )
+    test_config, noise_record, gust = (
+        statistical_detector.test_config,
+        statistical_detector.noise,
+        statistical_detector.gust,
+    )
     statistical.add_instant_to_tests(
-        tests, noise, detector.block, gust, fdi.bound, prediction.design, measured, prediction.u, dt
+        test_config,
+        noise_record,
+        statistical_detector.block,
+        gust,
+        fdi.bound,
+        prediction.design,
+        measured,
+        prediction.u,
+        instant_duration_s,
     )
 
 
@@ -442,9 +495,9 @@ def begin_scheme(fdi, prediction, measured):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
-    conclusion_record, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
+    conclusion_record, bound_record, dt = fdi.verdict, fdi.bound, fdi.config.dt
     filters.update_bank(
-        fdi.bank, bound, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+        fdi.bank, bound_record, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
     )
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
@@ -453,7 +506,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     network_leaks = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
     filters.advance_fdae(
         fdi.fdae,
-        bound,
+        bound_record,
         prediction.x_before,
         prediction.acceleration_with_known_faults,
         conclusion_record.detected,
@@ -469,9 +522,9 @@ def update_verdict(fdi, prediction, measured, t):
         return
     was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
-    axis = detect_alarm_axis_or_engine_failure(fdi, measured.y, t)
-    if axis >= 0:
-        conclusion.latch_alarm(conclusion_record, axis, t)
+    alarm_axis = detect_alarm_axis_or_engine_failure(fdi, measured.y, t)
+    if alarm_axis >= 0:
+        conclusion.latch_alarm(conclusion_record, alarm_axis, t)
     if conclusion_record.detected:
         isolate_fault(fdi, measured, t, was_detected_before)
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])

@@ -33,8 +33,8 @@ from beaver_ftc.scenario.schema import Scenario
 # Centres of the network's basis functions on each axis of the aircraft: alpha (pitch) or beta, rad; the rate
 # of the axis, rad/s; the deflection of the surface that leads it, as a share of its travel.
 ALPHA_CENTRES_RAD, BETA_CENTRES_RAD = np.linspace(-0.1, 0.5, 9), np.linspace(-0.4, 0.4, 9)
-RATE_CENTRES, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
-N_CENTRES_PER_INPUT = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES), len(TRAVEL_SHARE_CENTRES))
+RATE_CENTRES_RAD_S, TRAVEL_SHARE_CENTRES = np.linspace(-0.3, 0.3, 3), np.linspace(0.0, 1.0, 3)
+N_CENTRES_PER_INPUT = (len(ALPHA_CENTRES_RAD), len(RATE_CENTRES_RAD_S), len(TRAVEL_SHARE_CENTRES))
 N_NETWORK_NODES = N_CENTRES_PER_INPUT[0] * N_CENTRES_PER_INPUT[1] * N_CENTRES_PER_INPUT[2]
 
 # first_centre, centre_spacing: of the centres, by axis and input. weight_limit: of a weight, projection P;
@@ -57,9 +57,13 @@ def configure_state_network(network: np.void, gain: float, weight_limit: float, 
     """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
     network["config"]["gain"], network["config"]["weight_limit"] = gain, weight_limit
     for i in range(3):
-        deflection_centres = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
+        deflection_centres_rad = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
         for input_index, centres in enumerate(
-            (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES, deflection_centres)
+            (
+                ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD,
+                RATE_CENTRES_RAD_S,
+                deflection_centres_rad,
+            )
         ):
             (
                 network["config"]["first_centre"][i, input_index],
@@ -73,30 +77,30 @@ def configure_state_network(network: np.void, gain: float, weight_limit: float, 
 def configure_published(fdi: np.void, scenario: Scenario, travel: np.ndarray) -> None:
     """Turn the stages of a diagnosis, filled in already, into the published scheme; travel (2, n)
     rad: the stops."""
-    config, dt, isolation = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
-    options, published = settings(DETECTORS, config.scheme, config.options), fdi["published"]
-    published["config"]["uses_dead_zone"] = options["dead_zone"]
+    config, dt, isolation_record = scenario.fdi, 1.0 / scenario.rate_hz, fdi["isolation"]
+    options, published_record = settings(DETECTORS, config.scheme, config.options), fdi["published"]
+    published_record["config"]["uses_dead_zone"] = options["dead_zone"]
     weight_limit = options["network_limit_rad_s2"] if options["projection"] else np.inf
     configure_state_network(
-        published["network"], options["network_gain"], weight_limit, travel[:, fdi["layout"]["main"]]
+        published_record["network"], options["network_gain"], weight_limit, travel[:, fdi["layout"]["main"]]
     )
     fdi["fdae"]["config"]["decay_factor"] = fdi["bank"]["config"]["decay_factor"][0] = euler_decay(
         config.detection_pole_per_s, dt
     )
-    isolation["config"]["filter_decay"] = euler_decay(config.isolation_pole_per_s, dt)
-    isolation["config"]["adapts_by_gradient"], isolation["config"]["gradient_gain"] = (
+    isolation_record["config"]["filter_decay"] = euler_decay(config.isolation_pole_per_s, dt)
+    isolation_record["config"]["adapts_by_gradient"], isolation_record["config"]["gradient_gain"] = (
         1,
         options["adaptation_gain"],
     )
-    isolation["estimator"]["theta"] = options["initial_theta"]
-    isolation["config"]["projection_disabled"] = not options["projection"]
+    isolation_record["estimator"]["theta"] = options["initial_theta"]
+    isolation_record["config"]["projection_disabled"] = not options["projection"]
     if not options["adaptive_threshold"]:
-        published["config"]["constant_threshold"], isolation["config"]["threshold_kind"] = (
+        published_record["config"]["constant_threshold"], isolation_record["config"]["threshold_kind"] = (
             options["constant_threshold_rad_s"],
             CONSTANT_THRESHOLD,
         )
     if options["leave_out"]:
-        isolation["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
+        isolation_record["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
 
 
 def euler_decay(pole_per_s: float, dt_s: float) -> float:
@@ -105,19 +109,21 @@ def euler_decay(pole_per_s: float, dt_s: float) -> float:
 
 
 @kernel
-def fill_input_basis(network, i, input_index, n_centres, value):
-    """Fill input_basis[input_index] with the Gaussians of that input of axis i at `value`; their squares add
-    up to 1."""
-    centre_position = min(
+def fill_input_basis(network, i, input_index, n_centres, input_value):
+    """Fill input_basis[input_index] with the Gaussians of that input of axis i at input_value; their squares
+    add up to 1."""
+    position_in_centre_spacings = min(
         max(
-            (value - network.config.first_centre[i, input_index])
+            (input_value - network.config.first_centre[i, input_index])
             / network.config.centre_spacing[i, input_index],
             0.0,
         ),
         n_centres - 1.0,
     )
     norm = np.sqrt(
-        fill_gaussians_and_sum_squares(centre_position, n_centres, 0, network.memory.input_basis[input_index])
+        fill_gaussians_and_sum_squares(
+            position_in_centre_spacings, n_centres, 0, network.memory.input_basis[input_index]
+        )
     )
     for k in range(n_centres):
         network.memory.input_basis[input_index, k] /= norm
@@ -133,18 +139,18 @@ def evaluate_state_network(network, main_surfaces, x, y, u):
         fill_input_basis(network, i, 0, N_CENTRES_PER_INPUT[0], y[ALPHA] if i == PITCH else y[BETA])
         fill_input_basis(network, i, 1, N_CENTRES_PER_INPUT[1], x[i])
         fill_input_basis(network, i, 2, N_CENTRES_PER_INPUT[2], u[main_surfaces[i]])
-        node, weighted_sum = 0, 0.0
-        for a in range(N_CENTRES_PER_INPUT[0]):
-            for b in range(N_CENTRES_PER_INPUT[1]):
-                for c in range(N_CENTRES_PER_INPUT[2]):
+        node_index, weighted_sum = 0, 0.0
+        for angle_centre in range(N_CENTRES_PER_INPUT[0]):
+            for rate_centre in range(N_CENTRES_PER_INPUT[1]):
+                for deflection_centre in range(N_CENTRES_PER_INPUT[2]):
                     basis_value = (
-                        network.memory.input_basis[0, a]
-                        * network.memory.input_basis[1, b]
-                        * network.memory.input_basis[2, c]
+                        network.memory.input_basis[0, angle_centre]
+                        * network.memory.input_basis[1, rate_centre]
+                        * network.memory.input_basis[2, deflection_centre]
                     )
-                    network.memory.basis[i, node] = basis_value
-                    weighted_sum += network.memory.weights[i, node] * basis_value
-                    node += 1
+                    network.memory.basis[i, node_index] = basis_value
+                    weighted_sum += network.memory.weights[i, node_index] * basis_value
+                    node_index += 1
         network.output[i] = weighted_sum
 
 
@@ -153,18 +159,18 @@ def train_state_network(network, training_signal, dt):
     """th' = P{Gamma Z^T training_signal}, by a step of dt s; training_signal (3,), Z: the basis as it was
     evaluated."""
     for i in range(3):
-        for j in range(N_NETWORK_NODES):
-            weight = (
-                network.memory.weights[i, j]
-                + dt * network.config.gain * network.memory.basis[i, j] * training_signal[i]
+        for node_index in range(N_NETWORK_NODES):
+            unlimited_weight = (
+                network.memory.weights[i, node_index]
+                + dt * network.config.gain * network.memory.basis[i, node_index] * training_signal[i]
             )
-            network.memory.weights[i, j] = min(
-                max(weight, -network.config.weight_limit), network.config.weight_limit
+            network.memory.weights[i, node_index] = min(
+                max(unlimited_weight, -network.config.weight_limit), network.config.weight_limit
             )
 
 
 @kernel
-def train_fdae_network(published, fdae, detected, dt):
+def train_fdae_network(published, fdae, is_detected, dt):
     """The FDAE's network learns from the residual the frame began with, once a fault is detected.
 
     Without the dead zone it learns from the first frame on, with any residual.
@@ -172,7 +178,7 @@ def train_fdae_network(published, fdae, detected, dt):
     is_outside_threshold = False
     for i in range(3):
         is_outside_threshold = is_outside_threshold or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
-    if not published.config.uses_dead_zone or (detected and is_outside_threshold):
+    if not published.config.uses_dead_zone or (is_detected and is_outside_threshold):
         train_state_network(published.network, fdae.output.residual, dt)
 
 
@@ -195,14 +201,14 @@ def fdae_alarm_axis(fdae):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
-    published, bound, dt = fdi.published, fdi.bound, fdi.config.dt
+    published, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     filters.update_bank(
-        fdi.bank, bound, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+        fdi.bank, bound_record, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
     )
     adaptive_estimators.update_isolation_estimators(fdi, prediction)
     train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
-        fdi.fdae, bound, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
+        fdi.fdae, bound_record, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
     )
     if published.config.constant_threshold > 0.0:
         set_all_constant_thresholds(fdi, published.config.constant_threshold)
@@ -223,10 +229,10 @@ def update_verdict(fdi, prediction, measured, t):
         return
     was_detected_before, conclusion_record = fdi.verdict.detected, fdi.verdict
     filters.form_fdae_residual(fdi.fdae, measured.x)
-    axis = fdae_alarm_axis(fdi.fdae)
+    alarm_axis = fdae_alarm_axis(fdi.fdae)
     update_fdae_network_output(fdi.published, fdi.fdae, fdi.layout.main, measured.x, measured.y, prediction.u)
-    if axis >= 0:
-        conclusion.latch_alarm(conclusion_record, axis, t)
+    if alarm_axis >= 0:
+        conclusion.latch_alarm(conclusion_record, alarm_axis, t)
     if conclusion_record.detected:
         adaptive_estimators.isolate_fault(fdi, measured, t, was_detected_before)
 

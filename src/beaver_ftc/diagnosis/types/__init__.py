@@ -224,7 +224,7 @@ def feasible_set(fdi: np.void, s: int, type_index: int) -> tuple[float, float]:
     )
 
 
-def parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
+def midpoint_parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
     """The middle of the feasible set of a type's parameter on surface s."""
     low, high = feasible_set(fdi, s, type_index)
     return 0.5 * (low + high)
@@ -331,25 +331,25 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
     of the same frame or block, dtype FAULT_EFFECT_RECORD.
     """
-    observation, commands = surface.last_observation, surface.commands
-    observation.healthy_position = (
+    last_observation, commands = surface.last_observation, surface.commands
+    last_observation.healthy_position = (
         -hypothesis_effect.acceleration_at_zero_theta[axis] / hypothesis_effect.regressor[axis]
     )
-    observation.weighted_mean_error_per_position_range = (
+    last_observation.weighted_mean_error_per_position_range = (
         0.25
         * (commands.max_acceleration_per_rad - commands.min_acceleration_per_rad)
         / abs(hypothesis_effect.regressor[axis])
     )
-    observation.position_low, observation.position_high = fie.theta_min, fie.theta_max
+    last_observation.position_low, last_observation.position_high = fie.theta_min, fie.theta_max
     for i in range(3):
         if config.frames_per_block > 1 and i != axis and hypothesis_effect.regressor[i] != 0.0:
             continue  # over a block the axes weigh what varies differently
-        low, high = isolation.consistent_theta_interval_on_axis(
+        axis_position_low, axis_position_high = isolation.consistent_theta_interval_on_axis(
             innovation, innovation_bound, fie, hypothesis_effect, i
         )
-        observation.position_low, observation.position_high = (
-            max(observation.position_low, low),
-            min(observation.position_high, high),
+        last_observation.position_low, last_observation.position_high = (
+            max(last_observation.position_low, axis_position_low),
+            min(last_observation.position_high, axis_position_high),
         )
     mark_stops_that_can_hide_deflection(
         surface,
@@ -360,37 +360,44 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
 
 
 @kernel
-def mark_stops_that_can_hide_deflection(surface, interval_width):
-    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than `interval_width`
-    (rad), that of the interval which holds the true deflection."""
+def mark_stops_that_can_hide_deflection(surface, position_interval_width):
+    """Which stops can cut a deflection off unseen: those nearer to a healthy surface than
+    `position_interval_width` (rad), that of the interval which holds the true deflection."""
     surface.last_observation.stop_can_hide_deflection[0] = (
-        surface.commands.min_healthy_position[0] - surface.actuator.travel_low < interval_width
+        surface.commands.min_healthy_position[0] - surface.actuator.travel_low < position_interval_width
     )
     surface.last_observation.stop_can_hide_deflection[1] = (
-        surface.actuator.travel_high - surface.commands.max_healthy_position[0] < interval_width
+        surface.actuator.travel_high - surface.commands.max_healthy_position[0] < position_interval_width
     )
 
 
 @kernel
-def set_observed_deflection_error(surface, error, tolerance):
-    """A surface was off its command by error +- tolerance (rad). False: nowhere within its reach."""
-    observation, actuator = surface.last_observation, surface.actuator
-    observation.position_low = max(actuator.reachable_low, observation.healthy_position + error - tolerance)
-    observation.position_high = min(actuator.reachable_high, observation.healthy_position + error + tolerance)
-    observation.is_anomalous = abs(error) > tolerance
-    mark_stops_that_can_hide_deflection(surface, 2.0 * tolerance)
-    return observation.position_low <= observation.position_high
+def set_observed_deflection_error(surface, deflection_error, deflection_error_tolerance):
+    """A surface was off its command by deflection_error +- deflection_error_tolerance (rad). False:
+    nowhere within its reach."""
+    last_observation, actuator = surface.last_observation, surface.actuator
+    last_observation.position_low = max(
+        actuator.reachable_low,
+        last_observation.healthy_position + deflection_error - deflection_error_tolerance,
+    )
+    last_observation.position_high = min(
+        actuator.reachable_high,
+        last_observation.healthy_position + deflection_error + deflection_error_tolerance,
+    )
+    last_observation.is_anomalous = abs(deflection_error) > deflection_error_tolerance
+    mark_stops_that_can_hide_deflection(surface, 2.0 * deflection_error_tolerance)
+    return last_observation.position_low <= last_observation.position_high
 
 
 @kernel
-def set_position_of_known_fault(surface, low, high):
-    """Set the interval (low, high) rad in which a surface with a known fault was; the frame is no longer
-    anomalous for it."""
+def set_position_of_known_fault(surface, position_low, position_high):
+    """Set the interval (position_low, position_high) rad in which a surface with a known fault was;
+    the frame is no longer anomalous for it."""
     (
         surface.last_observation.position_low,
         surface.last_observation.position_high,
         surface.last_observation.is_anomalous,
-    ) = low, high, 0
+    ) = position_low, position_high, 0
 
 
 @kernel

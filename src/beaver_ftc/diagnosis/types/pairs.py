@@ -46,12 +46,15 @@ from beaver_ftc.diagnosis.types.verdict import (
 
 
 @kernel
-def record_group_alarms(pair, bank):
+def record_group_alarms(pair, filter_bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
-    for i in range(3):
-        group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
-        for filter_index in range(bank.config.n_filters):
-            if abs(bank.output.residual[filter_index, i]) > bank.output.threshold[filter_index, i]:
+    for axis in range(3):
+        group = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
+        for filter_index in range(filter_bank.config.n_filters):
+            if (
+                abs(filter_bank.output.residual[filter_index, axis])
+                > filter_bank.output.threshold[filter_index, axis]
+            ):
                 pair.group_has_alarm[group] = 1
 
 
@@ -59,34 +62,51 @@ def record_group_alarms(pair, bank):
 def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovation_bound):
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
     innovation (3,), |eta| <= innovation_bound (3,) rad/s2."""
-    aileron, rudder = layout.main[ROLL], layout.main[YAW]
+    aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
     aileron_effect, rudder_effect = (
-        estimators[layout.position_estimator[aileron]].frame_mean_effect,
-        estimators[layout.position_estimator[rudder]].frame_mean_effect,
+        estimators[layout.position_estimator[aileron_index]].frame_mean_effect,
+        estimators[layout.position_estimator[rudder_index]].frame_mean_effect,
     )
-    aileron_roll, aileron_yaw, rudder_roll, rudder_yaw = (
+    aileron_roll_per_rad, aileron_yaw_per_rad, rudder_roll_per_rad, rudder_yaw_per_rad = (
         aileron_effect.regressor[ROLL],
         aileron_effect.regressor[YAW],
         rudder_effect.regressor[ROLL],
         rudder_effect.regressor[YAW],
     )
     roll_innovation, yaw_innovation = innovation[ROLL], innovation[YAW]
-    roll_tolerance = (
+    roll_innovation_tolerance = (
         innovation_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
     )
-    yaw_tolerance = innovation_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
-    determinant = aileron_roll * rudder_yaw - aileron_yaw * rudder_roll
+    yaw_innovation_tolerance = (
+        innovation_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
+    )
+    determinant = aileron_roll_per_rad * rudder_yaw_per_rad - aileron_yaw_per_rad * rudder_roll_per_rad
     abs_determinant = abs(determinant)
-    error, tolerance = (
-        (roll_innovation * rudder_yaw - yaw_innovation * rudder_roll) / determinant,
-        (roll_tolerance * abs(rudder_yaw) + yaw_tolerance * abs(rudder_roll)) / abs_determinant,
+    deflection_error, deflection_error_tolerance = (
+        (roll_innovation * rudder_yaw_per_rad - yaw_innovation * rudder_roll_per_rad) / determinant,
+        (
+            roll_innovation_tolerance * abs(rudder_yaw_per_rad)
+            + yaw_innovation_tolerance * abs(rudder_roll_per_rad)
+        )
+        / abs_determinant,
     )
-    aileron_fits = set_observed_deflection_error(types.surface[aileron], error, tolerance)
-    error, tolerance = (
-        (yaw_innovation * aileron_roll - roll_innovation * aileron_yaw) / determinant,
-        (yaw_tolerance * abs(aileron_roll) + roll_tolerance * abs(aileron_yaw)) / abs_determinant,
+    aileron_is_within_reach = set_observed_deflection_error(
+        types.surface[aileron_index], deflection_error, deflection_error_tolerance
     )
-    if not (set_observed_deflection_error(types.surface[rudder], error, tolerance) and aileron_fits):
+    deflection_error, deflection_error_tolerance = (
+        (yaw_innovation * aileron_roll_per_rad - roll_innovation * aileron_yaw_per_rad) / determinant,
+        (
+            yaw_innovation_tolerance * abs(aileron_roll_per_rad)
+            + roll_innovation_tolerance * abs(aileron_yaw_per_rad)
+        )
+        / abs_determinant,
+    )
+    if not (
+        set_observed_deflection_error(
+            types.surface[rudder_index], deflection_error, deflection_error_tolerance
+        )
+        and aileron_is_within_reach
+    ):
         types.pair.lateral_fault_outside_class = 1
 
 
@@ -97,18 +117,24 @@ def possible_deflection_range_of_constant_types(config, surface, k):
     min_deflection, max_deflection = np.inf, -np.inf
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
-            lower_end, upper_end = possible_deflection_range(config, surface, type_index, k)
-            min_deflection, max_deflection = min(min_deflection, lower_end), max(max_deflection, upper_end)
-    lower_end, upper_end = surface.actuator.reachable_low, surface.actuator.reachable_high
-    return min(max(min_deflection, lower_end), upper_end), min(max(max_deflection, lower_end), upper_end)
+            type_min, type_max = possible_deflection_range(config, surface, type_index, k)
+            min_deflection, max_deflection = min(min_deflection, type_min), max(max_deflection, type_max)
+    reachable_low, reachable_high = surface.actuator.reachable_low, surface.actuator.reachable_high
+    return (
+        min(max(min_deflection, reachable_low), reachable_high),
+        min(max(max_deflection, reachable_low), reachable_high),
+    )
 
 
 @kernel
 def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bound):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
-    first = types.pair.first_pitch_fault_surface
-    if first != NO_SURFACE and not types.surface[first].status.may_be_sole_fault:
+    first_fault_surface_index = types.pair.first_pitch_fault_surface
+    if (
+        first_fault_surface_index != NO_SURFACE
+        and not types.surface[first_fault_surface_index].status.may_be_sole_fault
+    ):
         locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound)
         return
     for s, surface in enumerate(types.surface):
@@ -119,35 +145,39 @@ def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bou
 @kernel
 def locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound):
     """Find the position of the second surface, given the sets of the first."""
-    first = types.pair.first_pitch_fault_surface
-    second = layout.partner[first]
-    first_effect = estimators[layout.position_estimator[first]].frame_mean_effect
-    second_effect = estimators[layout.position_estimator[second]].frame_mean_effect
-    surface = types.surface[first]
-    min_deflection, max_deflection = possible_deflection_range_of_constant_types(
-        types.config, surface, types.frame_index
+    first_index = types.pair.first_pitch_fault_surface
+    second_index = layout.partner[first_index]
+    first_effect = estimators[layout.position_estimator[first_index]].frame_mean_effect
+    second_effect = estimators[layout.position_estimator[second_index]].frame_mean_effect
+    first_surface = types.surface[first_index]
+    min_first_deflection, max_first_deflection = possible_deflection_range_of_constant_types(
+        types.config, first_surface, types.frame_index
     )
-    set_position_of_known_fault(surface, min_deflection, max_deflection)
+    set_position_of_known_fault(first_surface, min_first_deflection, max_first_deflection)
     second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
-    first_acceleration = first_regressor * observed_deflection_error(surface)
-    tolerance = abs(first_regressor) * 0.5 * (max_deflection - min_deflection)
-    tolerance += innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
+    first_fault_acceleration = first_regressor * observed_deflection_error(first_surface)
+    acceleration_tolerance = abs(first_regressor) * 0.5 * (max_first_deflection - min_first_deflection)
+    acceleration_tolerance += (
+        innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
+    )
     if not set_observed_deflection_error(
-        types.surface[second],
-        (innovation[PITCH] - first_acceleration) / second_regressor,
-        tolerance / abs(second_regressor),
+        types.surface[second_index],
+        (innovation[PITCH] - first_fault_acceleration) / second_regressor,
+        acceleration_tolerance / abs(second_regressor),
     ):
-        types.surface[second].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
+        types.surface[second_index].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
-def observe_and_judge_frame_for_pairs(types, layout, estimators, bank, innovation_bound):
+def observe_and_judge_frame_for_pairs(types, layout, estimators, filter_bank, innovation_bound):
     """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
     it."""
-    record_group_alarms(types.pair, bank)
-    registry.infer_surface_positions(types, layout, estimators, bank.output.innovation, innovation_bound)
-    locate_roll_and_yaw_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
-    observe_pitch_surfaces(types, layout, estimators, bank.output.innovation, innovation_bound)
+    record_group_alarms(types.pair, filter_bank)
+    registry.infer_surface_positions(
+        types, layout, estimators, filter_bank.output.innovation, innovation_bound
+    )
+    locate_roll_and_yaw_surfaces(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
+    observe_pitch_surfaces(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
     registry.judge_previous_frame(types)
 
 
@@ -169,31 +199,36 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     the class."""
     config, pair = types.config, types.pair
     roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_can_be_at_fault, yaw_can_be_at_fault = can_be_at_fault(roll_surface), can_be_at_fault(yaw_surface)
-    both_at_fault = not roll_can_be_at_fault and not yaw_can_be_at_fault
+    roll_alone_can_be_at_fault, yaw_alone_can_be_at_fault = (
+        can_be_at_fault(roll_surface),
+        can_be_at_fault(yaw_surface),
+    )
+    both_must_be_at_fault = not roll_alone_can_be_at_fault and not yaw_alone_can_be_at_fault
     class_is_refuted = (
         pair.lateral_fault_outside_class == 1
         or not verdict.any_type_remains(roll_surface)
         or not verdict.any_type_remains(yaw_surface)
     )
-    outside_class = both_at_fault and class_is_refuted
-    undecided = both_at_fault and not (
+    fault_is_outside_class = both_must_be_at_fault and class_is_refuted
+    types_are_undecided = both_must_be_at_fault and not (
         verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
     )
-    is_certain = pair.group_has_alarm[LATERAL_GROUP] == 1 and not (outside_class or undecided)
+    can_isolate = pair.group_has_alarm[LATERAL_GROUP] == 1 and not (
+        fault_is_outside_class or types_are_undecided
+    )
     set_isolation_status(
         roll_surface,
-        is_certain and not yaw_can_be_at_fault,
+        can_isolate and not yaw_alone_can_be_at_fault,
         verdict.fault_type_on_surface(config, roll_surface),
         t,
     )
     set_isolation_status(
         yaw_surface,
-        is_certain and not roll_can_be_at_fault,
+        can_isolate and not roll_alone_can_be_at_fault,
         verdict.fault_type_on_surface(config, yaw_surface),
         t,
     )
-    return outside_class
+    return fault_is_outside_class
 
 
 @kernel
@@ -227,13 +262,13 @@ def store_first_pitch_fault_sets(types, s):
 @kernel
 def begin_second_pitch_fault(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
-    first, second = (
+    first_surface, second_surface = (
         types.surface[types.pair.first_pitch_fault_surface],
         types.surface[layout.partner[types.pair.first_pitch_fault_surface]],
     )
-    restore_first_pitch_fault_sets(first)
-    registry.restart_fault_types_of_surface(second)
-    for surface in (first, second):
+    restore_first_pitch_fault_sets(first_surface)
+    registry.restart_fault_types_of_surface(second_surface)
+    for surface in (first_surface, second_surface):
         surface.status.may_be_sole_fault, surface.status.can_be_at_fault_basis = 0, verdict.DEDUCED_FAULTY
         mark_observations_not_anomalous(surface)
 
@@ -244,9 +279,11 @@ def alternative_types_would_have_shown(config, surface):
     may_be_growing_bias = verdict.can_be_another_type(
         surface, verdict.sole_remaining_constant_type(surface), False
     )
-    undecided = may_be_growing_bias or verdict.remaining_type_can_hide_at_rest(config, surface)
-    has_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
-    return has_half_cycle and verdict.types_would_have_shown(config, surface) and not undecided
+    type_is_undecided = may_be_growing_bias or verdict.remaining_type_can_hide_at_rest(config, surface)
+    anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
+    return (
+        anomaly_spans_half_cycle and verdict.types_would_have_shown(config, surface) and not type_is_undecided
+    )
 
 
 @kernel
@@ -257,12 +294,12 @@ def detect_second_pitch_fault(types, layout):
         or layout.partner[types.pair.first_pitch_fault_surface] < 0
     ):
         return False
-    surface = types.surface[types.pair.first_pitch_fault_surface]
-    if surface.status.may_be_sole_fault and not (
-        can_be_at_fault(surface) and any_constant_type_remains(surface)
+    first_surface = types.surface[types.pair.first_pitch_fault_surface]
+    if first_surface.status.may_be_sole_fault and not (
+        can_be_at_fault(first_surface) and any_constant_type_remains(first_surface)
     ):
         begin_second_pitch_fault(types, layout)
-    return not surface.status.may_be_sole_fault
+    return not first_surface.status.may_be_sole_fault
 
 
 @kernel
@@ -283,26 +320,28 @@ def pitch_fault_type(config, surface):
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
     if detect_second_pitch_fault(types, layout):
-        first, second_index = (
+        first_surface, second_index = (
             types.surface[types.pair.first_pitch_fault_surface],
             layout.partner[types.pair.first_pitch_fault_surface],
         )
-        second = types.surface[second_index]
-        set_isolation_status(first, 1, first.status.fault_type, t)
-        shows_fault = (
-            second.evidence.n_anomalous_frames > 0
-            and can_be_at_fault(second)
-            and verdict.any_type_explains_flight(second)
+        second_surface = types.surface[second_index]
+        set_isolation_status(first_surface, 1, first_surface.status.fault_type, t)
+        second_shows_fault = (
+            second_surface.evidence.n_anomalous_frames > 0
+            and can_be_at_fault(second_surface)
+            and verdict.any_type_explains_flight(second_surface)
         )
-        set_isolation_status(second, shows_fault, verdict.fault_type_on_surface(types.config, second), t)
+        set_isolation_status(
+            second_surface, second_shows_fault, verdict.fault_type_on_surface(types.config, second_surface), t
+        )
         return
-    second_index = find_sole_pitch_surface_at_fault(types, layout)
+    sole_surface_index = find_sole_pitch_surface_at_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
         if layout.group[surface_index] == PITCH_GROUP:
             set_isolation_status(
                 surface,
-                surface_index == second_index,
-                pitch_fault_type(types.config, surface) if surface_index == second_index else -1,
+                surface_index == sole_surface_index,
+                pitch_fault_type(types.config, surface) if surface_index == sole_surface_index else -1,
                 t,
             )
 
@@ -310,7 +349,11 @@ def decide_pitch_isolation(types, layout, t):
 @kernel
 def find_sole_pitch_surface_at_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
-    s = verdict.surface_at_fault(types, layout) if types.pair.group_has_alarm[PITCH_GROUP] else NO_SURFACE
+    s = (
+        verdict.find_surface_at_fault(types, layout)
+        if types.pair.group_has_alarm[PITCH_GROUP]
+        else NO_SURFACE
+    )
     if s < 0 or not any_constant_type_remains(types.surface[s]):
         return NO_SURFACE
     if alternative_types_would_have_shown(types.config, types.surface[s]):
@@ -321,20 +364,29 @@ def find_sole_pitch_surface_at_fault(types, layout):
 @kernel
 def decide_pair_isolation(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
-    `conclusion.record_fault_type_finding`: `isolated` is the one named first, the law acts on all.
-    conclusion: that of the frame before."""
+    `conclusion.record_fault_type_finding`: its isolated estimator is of the one named first, the law acts on
+    all. conclusion: that of the frame before."""
     lateral_fault_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
     decide_pitch_isolation(types, layout, t)
-    first_isolated = NO_SURFACE
+    first_isolated_surface = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        status, first_status = surface.status, types.surface[max(first_isolated, 0)].status
-        if status.is_isolated and (first_isolated < 0 or status.isolated_at_s < first_status.isolated_at_s):
-            first_isolated = s
-    isolated, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
-        types, conclusion, layout, first_isolated, lateral_fault_outside_class, t
+        status, first_status = surface.status, types.surface[max(first_isolated_surface, 0)].status
+        if status.is_isolated and (
+            first_isolated_surface < 0 or status.isolated_at_s < first_status.isolated_at_s
+        ):
+            first_isolated_surface = s
+    isolated_estimator, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
+        types, conclusion, layout, first_isolated_surface, lateral_fault_outside_class, t
     )
     accommodated_surface, accommodation_mode = choose_pair_accommodation(types, layout)
-    return isolated, isolated_at_s, fault_type, type_decided_at_s, accommodated_surface, accommodation_mode
+    return (
+        isolated_estimator,
+        isolated_at_s,
+        fault_type,
+        type_decided_at_s,
+        accommodated_surface,
+        accommodation_mode,
+    )
 
 
 @kernel
@@ -343,11 +395,11 @@ def first_fault_finding(types, conclusion, layout, s, lateral_fault_outside_clas
     instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
     if s >= 0:
         status = types.surface[s].status
-        isolated = verdict.estimator_of_fault(layout, s, status.fault_type)
-        return isolated, status.isolated_at_s, status.fault_type, status.type_decided_at_s
-    isolated = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
-    isolated_at_s = t if isolated != conclusion.isolated_estimator else conclusion.isolated_at_s
-    return isolated, isolated_at_s, -1, conclusion.type_decided_at_s
+        isolated_estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
+        return isolated_estimator, status.isolated_at_s, status.fault_type, status.type_decided_at_s
+    isolated_estimator = state.UNANTICIPATED if lateral_fault_outside_class else state.NOT_ISOLATED
+    isolated_at_s = t if isolated_estimator != conclusion.isolated_estimator else conclusion.isolated_at_s
+    return isolated_estimator, isolated_at_s, -1, conclusion.type_decided_at_s
 
 
 @kernel
@@ -382,9 +434,9 @@ def choose_pair_accommodation(types, layout):
     for s, surface in enumerate(types.surface):
         verdict.set_accommodation_mode(surface, -1)
         if should_be_accommodated(types, layout, s):
-            is_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
-            mode = verdict.choose_accommodation_mode(surface) if is_at_fault else SUBTRACT_OFFSET
-            if verdict.update_fault_presence(types.config, surface, mode, is_at_fault):
+            may_be_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
+            mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
+            if verdict.update_fault_presence(types.config, surface, mode, may_be_at_fault):
                 verdict.set_accommodation_mode(surface, mode)
                 is_replaced_elevator = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
                 if accommodated_surface == NO_SURFACE or is_replaced_elevator:

@@ -62,8 +62,10 @@ DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S = (
 
 def _load_ordered_types() -> tuple[FaultType, ...]:
     """Those of a constant parameter first, then by rank: a type's number is its place."""
-    module_names = sorted(f"{table.__name__}.{info.name}" for info in pkgutil.iter_modules(table.__path__))
-    rows = [row for name in module_names for row in import_module(name).TYPES]
+    module_names = sorted(
+        f"{table.__name__}.{module_info.name}" for module_info in pkgutil.iter_modules(table.__path__)
+    )
+    rows = [row for module_name in module_names for row in import_module(module_name).TYPES]
     return tuple(sorted(rows, key=lambda row: (not row.has_constant_parameter, row.sort_rank, row.name)))
 
 
@@ -77,15 +79,15 @@ FIRST_TYPE_WITH_SAME_NAME = tuple(
 )  # the first type of the same name
 
 
-def _column_of_types(name: str) -> np.ndarray:
+def _column_of_types(column_name: str) -> np.ndarray:
     """A column of whole numbers or flags of the table, by type."""
-    return np.array([int(getattr(row, name)) for row in TYPES])
+    return np.array([int(getattr(row, column_name)) for row in TYPES])
 
 
-def _kernels_by_type(name: str) -> dict[int, Kernel]:
+def _kernels_by_type(part_name: str) -> dict[int, Kernel]:
     """This part of each type that has it."""
-    parts = {type_index: getattr(row, name) for type_index, row in enumerate(TYPES)}
-    return {type_index: part for type_index, part in parts.items() if part is not None}
+    part_by_type = {type_index: getattr(row, part_name) for type_index, row in enumerate(TYPES)}
+    return {type_index: part for type_index, part in part_by_type.items() if part is not None}
 
 
 def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
@@ -138,8 +140,8 @@ def _compile_kernel(name: str, arguments: str, body_lines: list[str], namespace:
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
     """
-    source = "\n    ".join([f"def {name}({arguments}):", *body_lines])
-    exec(compile(source, __file__, "exec"), namespace)
+    source_code = "\n    ".join([f"def {name}({arguments}):", *body_lines])
+    exec(compile(source_code, __file__, "exec"), namespace)
     return kernel(namespace[name])
 
 
@@ -151,11 +153,11 @@ def _call_expression(type_index: int, arguments: str) -> str:
     return f"part_{type_index}({', '.join(call_arguments)})"
 
 
-def _kernel_namespace(parts: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
+def _kernel_namespace(part_kernels: dict[int, Kernel], **other_names: Any) -> dict[str, Any]:
     """The names that a kernel which calls these parts needs."""
     return {
         "__name__": __name__,
-        **{f"part_{type_index}": part for type_index, part in parts.items()},
+        **{f"part_{type_index}": part for type_index, part in part_kernels.items()},
         **other_names,
     }
 
@@ -307,25 +309,26 @@ FRAME_BLOCK_RECORD = record(
 def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
     what is concluded. refuted: its estimator is excluded (verdict.py)."""
-    own = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
+    memory_dtypes = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
-        evidence=ANOMALY_COUNTS_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD, **own,
+        evidence=ANOMALY_COUNTS_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD,
+        **memory_dtypes,
         estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
         first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
     )  # fmt: skip
 
 
 @sized
-def fault_types_dtype(n: int) -> np.dtype:
+def fault_types_dtype(n_surfaces: int) -> np.dtype:
     """Faults of every type on n surfaces: types/."""
     return record(
         config=TYPES_CONFIG_RECORD,
         frame_index=int,
         pair=FAULT_PAIR_RECORD,
         block=FRAME_BLOCK_RECORD,
-        surface=(surface_types_dtype(), n),
+        surface=(surface_types_dtype(), n_surfaces),
     )
 
 
@@ -352,17 +355,20 @@ def configure_fault_types(
     types_config["abrupt"] = config.fault_profile == "abrupt"
     types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
     surfaces, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
-    for s, (surface_name, surface, low, high) in enumerate(
+    for s, (surface_name, surface, travel_low, travel_high) in enumerate(
         zip(surfaces, types["surface"], *travel, strict=True)
     ):
-        rate_deg_s, actuator = getattr(scenario.actuators, surface_name).rate_limit_deg_s, surface["actuator"]
-        actuator["travel_low"], actuator["travel_high"] = low, high
-        actuator["reachable_low"], actuator["reachable_high"] = min(low, 0.0), max(high, 0.0)
+        rate_limit_deg_s, actuator = (
+            getattr(scenario.actuators, surface_name).rate_limit_deg_s,
+            surface["actuator"],
+        )
+        actuator["travel_low"], actuator["travel_high"] = travel_low, travel_high
+        actuator["reachable_low"], actuator["reachable_high"] = min(travel_low, 0.0), max(travel_high, 0.0)
         actuator["approach_share_per_substep"], actuator["max_motion_per_substep"] = (
             prediction_actuators["approach"][s],
             prediction_actuators["step"][s],
         )
-        actuator["min_runaway_rate"] = 0.5 * (radians(rate_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S)
+        actuator["min_runaway_rate"] = 0.5 * (radians(rate_limit_deg_s) or DEFAULT_ACTUATOR_RATE_LIMIT_RAD_S)
         actuator["min_rate_limited_motion_per_substep"] = min(
             radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
         )
@@ -399,13 +405,13 @@ def record_commands(types, commanded_rad, frame_means):
     for s, surface in enumerate(types.surface):
         commands = surface.commands
         if types.block.n_frames_so_far == 0:
-            for age in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
-                commands.command_history[age, :frames_per_block] = commands.command_history[
-                    age - 1, :frames_per_block
+            for blocks_ago in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
+                commands.command_history[blocks_ago, :frames_per_block] = commands.command_history[
+                    blocks_ago - 1, :frames_per_block
                 ]
-                commands.min_command[age], commands.max_command[age] = (
-                    commands.min_command[age - 1],
-                    commands.max_command[age - 1],
+                commands.min_command[blocks_ago], commands.max_command[blocks_ago] = (
+                    commands.min_command[blocks_ago - 1],
+                    commands.max_command[blocks_ago - 1],
                 )
             commands.min_command[0], commands.max_command[0] = np.inf, -np.inf
             commands.min_healthy_position[1], commands.max_healthy_position[1] = (
@@ -439,8 +445,8 @@ def infer_surface_positions(types, layout, estimators, innovation, innovation_bo
         shift_observations(surface)
         set_is_anomalous(surface, is_anomalous)
         fie, axis = estimators[layout.position_estimator[s]], layout.dominant_axis[s]
-        effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
-        infer_position(types.config, surface, fie, axis, innovation, innovation_bound, effect)
+        mean_effect = fie.block_mean_effect if types.config.frames_per_block > 1 else fie.frame_mean_effect
+        infer_position(types.config, surface, fie, axis, innovation, innovation_bound, mean_effect)
 
 
 @kernel
@@ -454,8 +460,8 @@ def count_anomalous_frame(surface):
 @kernel
 def narrow_feasible_sets(config, surface, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    evidence, observation = surface.evidence, surface.judged_observation
-    if observation.position_low > observation.position_high:
+    evidence, judged_observation = surface.evidence, surface.judged_observation
+    if judged_observation.position_low > judged_observation.position_high:
         return
     if evidence.first_anomalous_frame < 0:
         (
@@ -464,8 +470,8 @@ def narrow_feasible_sets(config, surface, k):
             evidence.first_anomalous_position_high,
         ) = (
             k,
-            observation.position_low,
-            observation.position_high,
+            judged_observation.position_low,
+            judged_observation.position_high,
         )
     intersect_consistent_interval_each(config, surface, k)
 
@@ -504,12 +510,12 @@ def judge_previous_frame(types):
 
 
 @kernel
-def observe_and_judge_frame(types, layout, estimators, innovation, bound):
+def observe_and_judge_frame(types, layout, estimators, innovation, bound_record):
     """Observe the elapsed frame, or the block that it completes, and judge the one before."""
     if types.config.frames_per_block > 1:
-        observe_and_judge_block(types, layout, estimators, innovation, bound)
+        observe_and_judge_block(types, layout, estimators, innovation, bound_record)
         return
-    infer_surface_positions(types, layout, estimators, innovation, bound.frame_innovation_bound)
+    infer_surface_positions(types, layout, estimators, innovation, bound_record.frame_innovation_bound)
     judge_previous_frame(types)
 
 
@@ -526,32 +532,32 @@ def begin_frame_block(types, layout, estimators, gyro_error_change_bound_before)
 @kernel
 def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
     """Add the elapsed frame to the means over the block."""
-    block, frame_share = types.block, 1.0 / types.config.frames_per_block
+    block, block_share_of_frame = types.block, 1.0 / types.config.frames_per_block
     for i in range(3):
-        block.mean_innovation[i] += frame_share * innovation[i]
-        block.mean_innovation_bound[i] += frame_share * eta_bar[i]
+        block.mean_innovation[i] += block_share_of_frame * innovation[i]
+        block.mean_innovation_bound[i] += block_share_of_frame * eta_bar[i]
     for estimator_index in layout.position_estimator:
         isolation.add_to_mean_effect(
             estimators[estimator_index].block_mean_effect,
             estimators[estimator_index].frame_mean_effect,
-            frame_share,
+            block_share_of_frame,
         )
 
 
 @kernel
-def observe_and_judge_block(types, layout, estimators, innovation, bound):
+def observe_and_judge_block(types, layout, estimators, innovation, bound_record):
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.n_frames_so_far == 0:
-        begin_frame_block(types, layout, estimators, bound.gyro_error_change_bound_before)
-    add_frame_to_block(types, layout, estimators, innovation, bound.eta_bar)
+        begin_frame_block(types, layout, estimators, bound_record.gyro_error_change_bound_before)
+    add_frame_to_block(types, layout, estimators, innovation, bound_record.eta_bar)
     block.n_frames_so_far += 1
     if block.n_frames_so_far < config.frames_per_block:
         return
     block.n_frames_so_far = 0
     for i in range(3):
         block.mean_innovation_bound[i] += (
-            block.gyro_error_change_bound_at_start[i] + bound.gyro_error_change_bound[i]
+            block.gyro_error_change_bound_at_start[i] + bound_record.gyro_error_change_bound[i]
         ) / config.block_duration_s
     infer_surface_positions(types, layout, estimators, block.mean_innovation, block.mean_innovation_bound)
     judge_previous_frame(types)
@@ -586,10 +592,11 @@ def count_rest_as_evidence(types, surface_index):
 def agrees_with_rest_position(surface):
     """Whether the judged frame agrees with where the surface is known to stand."""
     for type_index in range(N_TYPES):
-        low, high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
-        is_disjoint = (
-            surface.judged_observation.position_low > high or surface.judged_observation.position_high < low
+        set_low, set_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
+        position_is_outside_set = (
+            surface.judged_observation.position_low > set_high
+            or surface.judged_observation.position_high < set_low
         )
-        if EVIDENCE_AT_REST[type_index] == REST_POSITION_IS_PARAMETER and is_disjoint:
+        if EVIDENCE_AT_REST[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
             return False
     return True

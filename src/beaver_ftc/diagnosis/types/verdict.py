@@ -185,19 +185,19 @@ def can_be_another_type(surface, apparent_type, includes_command_dependent_types
 def sole_possible_surface(surfaces, needs_constant_type):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or
     SEVERAL_SURFACES."""
-    sole_index = NO_SURFACE
+    sole_surface_index = NO_SURFACE
     for s, surface in enumerate(surfaces):
         if (
             surface.status.may_be_sole_fault
             and can_be_at_fault(surface)
             and (any_constant_type_remains(surface) or not needs_constant_type)
         ):
-            sole_index = s if sole_index == NO_SURFACE else SEVERAL_SURFACES
-    return sole_index
+            sole_surface_index = s if sole_surface_index == NO_SURFACE else SEVERAL_SURFACES
+    return sole_surface_index
 
 
 @kernel
-def surface_at_fault(types, layout):
+def find_surface_at_fault(types, layout):
     """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
 
     What acts on pitch alone shows no direction, so a surface left over there must also have a type that
@@ -221,7 +221,7 @@ def surface_at_fault(types, layout):
 
 
 @kernel
-def other_surfaces_refuted(types, chosen_surface):
+def other_surfaces_refuted(types, candidate_surface):
     """Whether every other surface can only have a fault that depends on the command of the chosen one.
 
     A type that must show itself is given the time to. Where errors are declared that a course can hide in,
@@ -229,7 +229,7 @@ def other_surfaces_refuted(types, chosen_surface):
     """
     config, required_half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != chosen_surface and surface.status.may_be_sole_fault and can_be_at_fault(surface):
+        if s != candidate_surface and surface.status.may_be_sole_fault and can_be_at_fault(surface):
             if config.has_declared_surface_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
@@ -242,7 +242,7 @@ def other_surfaces_refuted(types, chosen_surface):
                         required_half_cycles, HALF_CYCLES_BEFORE_ISOLATING_OTHERS[type_index]
                     )
     return (
-        types.surface[chosen_surface].evidence.n_anomalous_frames
+        types.surface[candidate_surface].evidence.n_anomalous_frames
         >= required_half_cycles * config.slowest_half_cycle_frames
     )
 
@@ -307,13 +307,14 @@ def decide_surface_and_type(types, conclusion, layout, estimators, t):
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
-    surface_index, previous_surface = surface_at_fault(types, layout), conclusion.isolated_estimator
-    if previous_surface >= 0:
-        previous_surface = estimators[previous_surface].surface
+    surface_index, previous_estimator = find_surface_at_fault(types, layout), conclusion.isolated_estimator
+    previous_surface_index = (
+        estimators[previous_estimator].surface if previous_estimator >= 0 else previous_estimator
+    )
     fault_type = (
         fault_type_on_surface(types.config, types.surface[surface_index]) if surface_index >= 0 else -1
     )
-    isolated_at_s = t if surface_index != previous_surface else conclusion.isolated_at_s
+    isolated_at_s = t if surface_index != previous_surface_index else conclusion.isolated_at_s
     type_decided_at_s = t if fault_type != conclusion.fault_type else conclusion.type_decided_at_s
     isolated_estimator = (
         estimator_of_fault(layout, surface_index, fault_type) if surface_index >= 0 else surface_index
@@ -348,44 +349,46 @@ def choose_accommodation_mode(surface):
     SUBTRACT_OFFSET subtracts what the last frame shows to be off. It serves a type of another mode meanwhile,
     and moves the command, so that a surface that does not follow shows in the next frame.
     """
-    has_constant_type = any_constant_type_remains(surface)
+    constant_type_remains = any_constant_type_remains(surface)
     for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-        if has_constant_type and serves_all_constant_types(surface, mode):
+        if constant_type_remains and serves_all_constant_types(surface, mode):
             return mode
     for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-        if not has_constant_type and serves_any_varying_type(surface, mode):
+        if not constant_type_remains and serves_any_varying_type(surface, mode):
             return mode
     return SUBTRACT_OFFSET
 
 
 @kernel
-def serves_all_constant_types(surface, mode):
+def serves_all_constant_types(surface, accommodation_mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
-    is_own_mode = False
+    is_mode_of_some_type = False
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
-            is_own_mode = is_own_mode or ACCOMMODATION_MODES[type_index] == mode
-            serves_limit_type = (
+            is_mode_of_some_type = (
+                is_mode_of_some_type or ACCOMMODATION_MODES[type_index] == accommodation_mode
+            )
+            serves_type_at_end_of_range = (
                 TYPE_INDEX_AT_END_OF_RANGE[type_index] >= 0
                 and type_remains(surface, TYPE_INDEX_AT_END_OF_RANGE[type_index])
-                and MODE_SERVES_TYPE[mode, TYPE_INDEX_AT_END_OF_RANGE[type_index]]
+                and MODE_SERVES_TYPE[accommodation_mode, TYPE_INDEX_AT_END_OF_RANGE[type_index]]
             )
-            if not (MODE_SERVES_TYPE[mode, type_index] or serves_limit_type):
+            if not (MODE_SERVES_TYPE[accommodation_mode, type_index] or serves_type_at_end_of_range):
                 return False
-    return is_own_mode
+    return is_mode_of_some_type
 
 
 @kernel
-def serves_any_varying_type(surface, mode):
+def serves_any_varying_type(surface, accommodation_mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_remains(surface, type_index) and ACCOMMODATION_MODES[type_index] == mode:
+        if type_remains(surface, type_index) and ACCOMMODATION_MODES[type_index] == accommodation_mode:
             return True
     return False
 
 
 @kernel
-def presumed_surface(types, isolated_estimator, layout, estimators):
+def find_presumed_faulty_surface(types, isolated_estimator, layout, estimators):
     """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
@@ -403,9 +406,9 @@ def presumed_surface(types, isolated_estimator, layout, estimators):
 
 
 @kernel
-def set_accommodation_mode(surface, mode):
+def set_accommodation_mode(surface, accommodation_mode):
     """Replace the mode of accommodation of a surface, -1 for none."""
-    surface.accommodation.mode = mode
+    surface.accommodation.mode = accommodation_mode
 
 
 @kernel
@@ -418,31 +421,32 @@ def clear_all_accommodation_modes(surfaces):
 @kernel
 def choose_accommodated_surface(types, isolated_estimator, layout, estimators):
     """The surface on which the law acts, or NO_SURFACE, and how; isolated_estimator: if any."""
-    surface_index = presumed_surface(types, isolated_estimator, layout, estimators)
+    surface_index = find_presumed_faulty_surface(types, isolated_estimator, layout, estimators)
     clear_all_accommodation_modes(types.surface)
     if surface_index < 0:
         return NO_SURFACE, -1
     surface = types.surface[surface_index]
-    mode = choose_accommodation_mode(surface)
-    if update_fault_presence(types.config, surface, mode, True):
-        set_accommodation_mode(surface, mode)
-        return surface_index, mode
-    return NO_SURFACE, mode
+    accommodation_mode = choose_accommodation_mode(surface)
+    if update_fault_presence(types.config, surface, accommodation_mode, True):
+        set_accommodation_mode(surface, accommodation_mode)
+        return surface_index, accommodation_mode
+    return NO_SURFACE, accommodation_mode
 
 
 @kernel
-def update_fault_presence(config, surface, mode, is_at_fault):
+def update_fault_presence(config, surface, accommodation_mode, is_at_fault):
     """Whether the fault of a surface shows, or did a moment ago."""
-    observation, accommodation = surface.last_observation, surface.accommodation
-    deflection = deflection_error(surface, is_at_fault) + observation.healthy_position
-    explains_frame = (
-        observation.position_low <= deflection <= observation.position_high or mode == SCALE_COMMAND
+    last_observation, accommodation = surface.last_observation, surface.accommodation
+    expected_deflection_rad = deflection_error(surface, is_at_fault) + last_observation.healthy_position
+    fault_shows_in_frame = (
+        last_observation.position_low <= expected_deflection_rad <= last_observation.position_high
+        or accommodation_mode == SCALE_COMMAND
     )
     accommodation.n_frames_without_sign_of_fault = (
-        0 if explains_frame else accommodation.n_frames_without_sign_of_fault + 1
+        0 if fault_shows_in_frame else accommodation.n_frames_without_sign_of_fault + 1
     )
-    absence_s = accommodation.n_frames_without_sign_of_fault * config.dt
-    return absence_s < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
+    fault_absence_s = accommodation.n_frames_without_sign_of_fault * config.dt
+    return fault_absence_s < FAULT_ABSENCE_LIMIT_S - _TIME_TOLERANCE_S
 
 
 @kernel
@@ -494,34 +498,37 @@ def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> Findings:
 
 def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findings:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    status = fdi["types"]["surface"]["status"]
+    surface_status = fdi["types"]["surface"]["status"]
     isolated_surfaces = sorted(
-        np.flatnonzero(status["is_isolated"]).tolist(), key=lambda s: status["isolated_at_s"][s]
+        np.flatnonzero(surface_status["is_isolated"]).tolist(),
+        key=lambda s: surface_status["isolated_at_s"][s],
     )
     faults = [
-        _finding_on_surface(fdi, s, int(status["fault_type"][s]), surface_names) for s in isolated_surfaces
+        _finding_on_surface(fdi, s, int(surface_status["fault_type"][s]), surface_names)
+        for s in isolated_surfaces
     ]
     group_has_alarm = fdi["types"]["pair"]["group_has_alarm"]
     surfaces_by_group = [
-        np.flatnonzero(fdi["layout"]["group"] == group).tolist() for group in range(len(group_has_alarm))
+        np.flatnonzero(fdi["layout"]["group"] == group_index).tolist()
+        for group_index in range(len(group_has_alarm))
     ]
     if not group_has_alarm.any() and not faults and int(fdi["verdict"]["isolated_estimator"]) == NOT_ISOLATED:
         group_has_alarm = np.ones_like(
             group_has_alarm
         )  # a statistical alarm by itself says of no plane that it is there
-    undecided_groups = [
+    undecided_group_findings = [
         {**_NO_FINDINGS, "candidates": tuple(_remaining_candidates(fdi, group_surfaces, surface_names))}
-        for has_alarm, group_surfaces in zip(group_has_alarm, surfaces_by_group, strict=True)
-        if has_alarm and not set(group_surfaces) & set(isolated_surfaces)
+        for group_alarm, group_surfaces in zip(group_has_alarm, surfaces_by_group, strict=True)
+        if group_alarm and not set(group_surfaces) & set(isolated_surfaces)
     ]
     if faults:
-        return {**faults[0], "faults": (*faults, *undecided_groups)}
+        return {**faults[0], "faults": (*faults, *undecided_group_findings)}
     if int(fdi["verdict"]["isolated_estimator"]) == UNANTICIPATED:
-        return {**_findings_assuming_one_fault(fdi, surface_names), "faults": tuple(undecided_groups)}
+        return {**_findings_assuming_one_fault(fdi, surface_names), "faults": tuple(undecided_group_findings)}
     candidates = tuple(
-        candidate for group_surfaces in undecided_groups for candidate in group_surfaces["candidates"]
+        candidate for group_finding in undecided_group_findings for candidate in group_finding["candidates"]
     )
-    return {**_NO_FINDINGS, "candidates": candidates, "faults": tuple(undecided_groups)}
+    return {**_NO_FINDINGS, "candidates": candidates, "faults": tuple(undecided_group_findings)}
 
 
 def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> Findings:
@@ -554,7 +561,7 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
 
 
 def _finding_on_surface(fdi: np.void, s: int, fault_type: int, surface_names: Sequence[str]) -> Findings:
-    """Return the finding on surface s, which is at fault; type_index: of which type, -1 if open."""
+    """Return the finding on surface s, which is at fault; fault_type: of which type, -1 if open."""
     surface = fdi["types"]["surface"][s]
     return {
         "isolated": surface_names[s],
@@ -578,9 +585,9 @@ def estimate_fault_size(fdi: np.void, s: int, type_index: int) -> float | None:
     return estimate
 
 
-def _call_type_attribute(type_index: int, attribute: str, *arguments: Any) -> Any:
+def _call_type_attribute(type_index: int, attribute_name: str, *arguments: Any) -> Any:
     """Return an attribute of a type's row; None while the type is open."""
-    return getattr(registry.TYPES[type_index], attribute)(*arguments) if type_index >= 0 else None
+    return getattr(registry.TYPES[type_index], attribute_name)(*arguments) if type_index >= 0 else None
 
 
 def _can_be_at_fault(fdi: np.void, s: int) -> bool:
@@ -604,27 +611,27 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         for type_index, is_excluded in enumerate(surface["feasible_sets"]["excluded"])
         if _can_be_at_fault(fdi, s) and not is_excluded
     ]
-    constant_types = [
+    constant_type_indices = [
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
-    if constant_types and not fdi["types"]["config"]["has_declared_surface_errors"]:
+    if constant_type_indices and not fdi["types"]["config"]["has_declared_surface_errors"]:
         evidence, slowest_half_cycle_frames = (
             surface["evidence"],
             fdi["types"]["config"]["slowest_half_cycle_frames"],
         )
-        has_little_evidence = (
+        anomaly_is_shorter_than_half_cycle = (
             evidence["n_anomalous_frames"] - evidence["n_rest_frames"] < slowest_half_cycle_frames
         )
         type_indices = [
             type_index
             for type_index in type_indices
-            if type_index in constant_types
-            or has_little_evidence
-            or _can_count_with_constant_types(type_index, constant_types)
+            if type_index in constant_type_indices
+            or anomaly_is_shorter_than_half_cycle
+            or _can_count_with_constant_types(type_index, constant_type_indices)
         ]
     second_fault_is_possible = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
     if second_fault_is_possible and any(
-        registry.ACCOMMODATION_MODES[type_index] == GIVE_UP for type_index in constant_types
+        registry.ACCOMMODATION_MODES[type_index] == GIVE_UP for type_index in constant_type_indices
     ):
         # if the other surface is off as well, each constant may be one of another type
         type_indices += sorted(
@@ -634,11 +641,12 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
     return list(dict.fromkeys(registry.TYPE_NAMES[type_index] for type_index in type_indices))
 
 
-def _can_count_with_constant_types(type_index: int, constant_types: list[int]) -> bool:
+def _can_count_with_constant_types(type_index: int, constant_type_indices: list[int]) -> bool:
     """Whether a varying type counts together with these constant ones: it may yet show itself, or looks like
     one of them."""
     return bool(
-        registry.MUST_SHOW_ITSELF[type_index] or registry.CAN_LOOK_LIKE[type_index, constant_types].any()
+        registry.MUST_SHOW_ITSELF[type_index]
+        or registry.CAN_LOOK_LIKE[type_index, constant_type_indices].any()
     )
 
 
@@ -649,8 +657,8 @@ def _remaining_candidates(
 
     Of one plane also both its surfaces, as `elevator+flap`.
     """
-    possible_surfaces = [s for s in surface_indices if _can_be_at_fault(fdi, s)]
-    for s in possible_surfaces:
+    possible_surface_indices = [s for s in surface_indices if _can_be_at_fault(fdi, s)]
+    for s in possible_surface_indices:
         type_names = _remaining_type_names(fdi, s)
         yield from (
             (f"{surface_names[s]}:{type_name}" for type_name in type_names)
@@ -659,5 +667,5 @@ def _remaining_candidates(
         )
     if fdi["types"]["pair"]["enabled"]:
         yield "+".join(surface_names[s] for s in surface_indices)
-    if not any(_remaining_type_names(fdi, s) for s in possible_surfaces):
+    if not any(_remaining_type_names(fdi, s) for s in possible_surface_indices):
         yield "unanticipated"

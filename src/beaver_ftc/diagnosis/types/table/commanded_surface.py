@@ -33,7 +33,7 @@ from beaver_ftc.diagnosis.types import (
     feasible_set,
     feasible_set_midpoint,
     limit_to_travel,
-    parameter_estimate,
+    midpoint_parameter_estimate,
     read_observed_deflection_error,
 )
 
@@ -41,9 +41,16 @@ from beaver_ftc.diagnosis.types import (
 @kernel
 def consistent_effectiveness_interval(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
-    low, high = surface.judged_observation.position_low, surface.judged_observation.position_high
+    position_low, position_high = (
+        surface.judged_observation.position_low,
+        surface.judged_observation.position_high,
+    )
     return isolation.consistent_theta_interval(
-        0.5 * (low + high), 0.5 * (high - low), surface.judged_observation.healthy_position, 0.0, 1.0
+        0.5 * (position_low + position_high),
+        0.5 * (position_high - position_low),
+        surface.judged_observation.healthy_position,
+        0.0,
+        1.0,
     )
 
 
@@ -62,31 +69,31 @@ def consistent_loss_interval(config, surface, type_index, k):
 @kernel
 def loss_deflection_range(config, surface, type_index, k):
     """The command times what can be left."""
-    low, high, healthy_position = (
+    effectiveness_low, effectiveness_high, healthy_position = (
         surface.feasible_sets.low[type_index],
         surface.feasible_sets.high[type_index],
         surface.last_observation.healthy_position,
     )
-    return min(low * healthy_position, high * healthy_position), max(
-        low * healthy_position, high * healthy_position
+    return min(effectiveness_low * healthy_position, effectiveness_high * healthy_position), max(
+        effectiveness_low * healthy_position, effectiveness_high * healthy_position
     )
 
 
 @kernel
 def consistent_varying_loss_interval(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
-    low, high = consistent_effectiveness_interval(surface)
+    effectiveness_low, effectiveness_high = consistent_effectiveness_interval(surface)
     command_changed_sign = (
         config.frames_per_block > 1
         and surface.commands.min_healthy_position[1] < 0.0 < surface.commands.max_healthy_position[1]
     )
-    return EMPTY_SET if low > high and not command_changed_sign else UNLIMITED_SET
+    return EMPTY_SET if effectiveness_low > effectiveness_high and not command_changed_sign else UNLIMITED_SET
 
 
 def loss_theta_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
     """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
     return (
-        parameter_estimate(fdi, s, type_index) - 1.0
+        midpoint_parameter_estimate(fdi, s, type_index) - 1.0
         if fdi["types"]["pair"]["enabled"]
         else loss_theta_from_isolation_estimator(fdi, s, type_index)
     )
@@ -135,20 +142,25 @@ def consistent_offset_interval(surface):
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    low, high, healthy_position, commands = (
+    position_low, position_high, healthy_position, commands = (
         surface.judged_observation.position_low,
         surface.judged_observation.position_high,
         surface.judged_observation.healthy_position,
         surface.commands,
     )
-    if high < surface.actuator.travel_low or low > surface.actuator.travel_high:
+    if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
         return isolation.EMPTY_SET
-    lowest_position, highest_position = (
-        low - max(healthy_position - commands.min_healthy_position[1], 0.0),
-        high + max(commands.max_healthy_position[1] - healthy_position, 0.0),
+    min_instant_position, max_instant_position = (
+        position_low - max(healthy_position - commands.min_healthy_position[1], 0.0),
+        position_high + max(commands.max_healthy_position[1] - healthy_position, 0.0),
     )
-    offset_low = low - healthy_position if lowest_position > surface.actuator.travel_low else -np.inf
-    return offset_low, high - healthy_position if highest_position < surface.actuator.travel_high else np.inf
+    offset_low = (
+        position_low - healthy_position if min_instant_position > surface.actuator.travel_low else -np.inf
+    )
+    return (
+        offset_low,
+        position_high - healthy_position if max_instant_position < surface.actuator.travel_high else np.inf,
+    )
 
 
 @kernel
@@ -160,17 +172,17 @@ def consistent_bias_interval(config, surface, type_index, k):
 @kernel
 def bias_deflection_error(surface, type_index):
     """Off its command, rad, by the middle of its set; unlimited while an end of that is open."""
-    low, high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
-    return feasible_set_midpoint(surface, type_index) if high - low < np.inf else np.inf
+    offset_low, offset_high = surface.feasible_sets.low[type_index], surface.feasible_sets.high[type_index]
+    return feasible_set_midpoint(surface, type_index) if offset_high - offset_low < np.inf else np.inf
 
 
 @kernel
 def bias_deflection_range(config, surface, type_index, k):
     """The command and the offset, cut off by the stops."""
-    low = mean_deflection_with_offset(
+    deflection_low = mean_deflection_with_offset(
         surface, surface.feasible_sets.low[type_index], surface.commands.min_healthy_position[0]
     )
-    return low, mean_deflection_with_offset(
+    return deflection_low, mean_deflection_with_offset(
         surface, surface.feasible_sets.high[type_index], surface.commands.max_healthy_position[0]
     )
 
@@ -193,8 +205,8 @@ def mean_deflection_with_offset(surface, offset_rad, extreme_healthy_position):
 
 def bias_interval(fdi: np.void, s: int, type_index: int) -> tuple[float, float] | None:
     """Return the interval of the offset, rad; None while one end is open."""
-    low, high = feasible_set(fdi, s, type_index)
-    return (low, high) if np.isfinite(low) and np.isfinite(high) else None
+    offset_low, offset_high = feasible_set(fdi, s, type_index)
+    return (offset_low, offset_high) if np.isfinite(offset_low) and np.isfinite(offset_high) else None
 
 
 @kernel
@@ -221,9 +233,9 @@ def max_bias_growth_per_frame(config, surface):
 @kernel
 def widen_offset_interval(config, surface, type_index):
     """Widen the interval of the offset by what one that is slower than a runaway moves in a frame."""
-    max_growth = max_bias_growth_per_frame(config, surface)
-    surface.growing_bias.offset_low -= max_growth
-    surface.growing_bias.offset_high += max_growth
+    max_growth_per_frame = max_bias_growth_per_frame(config, surface)
+    surface.growing_bias.offset_low -= max_growth_per_frame
+    surface.growing_bias.offset_high += max_growth_per_frame
 
 
 @kernel
@@ -233,7 +245,7 @@ def forget_bias_offset_interval(config, surface, type_index, k):
 
 
 @kernel
-def detect_run_to_stop(config, surface, min_offset, max_offset):
+def detect_run_to_stop_and_narrow_offset(config, surface, min_offset, max_offset):
     """Hold an offset between min_offset and max_offset (rad) against what a slower one can be. A mean over
     several instants may be that of the last of them."""
     memory = surface.growing_bias
@@ -241,10 +253,12 @@ def detect_run_to_stop(config, surface, min_offset, max_offset):
         memory.has_run_towards_stop[0] = 1
     if min_offset > memory.offset_high:
         memory.has_run_towards_stop[1] = 1
-    max_growth = 0.0 if config.frame_shows_single_instant else max_bias_growth_per_frame(config, surface)
+    max_growth_per_frame = (
+        0.0 if config.frame_shows_single_instant else max_bias_growth_per_frame(config, surface)
+    )
     memory.offset_low, memory.offset_high = (
-        max(memory.offset_low, min_offset - max_growth),
-        min(memory.offset_high, max_offset + max_growth),
+        max(memory.offset_low, min_offset - max_growth_per_frame),
+        min(memory.offset_high, max_offset + max_growth_per_frame),
     )
 
 
@@ -253,7 +267,7 @@ def consistent_growing_bias_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     min_offset, max_offset = consistent_offset_interval(surface)
     if min_offset <= max_offset:
-        detect_run_to_stop(config, surface, min_offset, max_offset)
+        detect_run_to_stop_and_narrow_offset(config, surface, min_offset, max_offset)
     if np.isinf(min_offset) or np.isinf(max_offset):
         return UNLIMITED_SET
     memory = surface.growing_bias
@@ -262,12 +276,12 @@ def consistent_growing_bias_interval(config, surface, type_index, k):
         min(memory.min_growth_down, max_offset),
     )
     has_grown_up, has_grown_down = memory.min_growth_up > 0.0, memory.min_growth_down < 0.0
-    shrinks = (has_grown_up and max_offset < memory.min_growth_up) or (
+    offset_shrinks = (has_grown_up and max_offset < memory.min_growth_up) or (
         has_grown_down and min_offset > memory.min_growth_down
     )
     return (
         EMPTY_SET
-        if min_offset > max_offset or (has_grown_up and has_grown_down) or shrinks
+        if min_offset > max_offset or (has_grown_up and has_grown_down) or offset_shrinks
         else UNLIMITED_SET
     )
 
@@ -292,7 +306,7 @@ BIAS = FaultType(
     deflection_relation=DeflectionRelation(
         1.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low - high, high - low)
     ),
-    excluding_frame_comparison="offset", estimate_parameter=parameter_estimate,
+    excluding_frame_comparison="offset", estimate_parameter=midpoint_parameter_estimate,
     estimate_parameter_interval=bias_interval,
 )  # fmt: skip
 GROWING_BIAS = FaultType(
@@ -328,11 +342,11 @@ def reset_oscillation_memory(surface, type_index):
 @kernel
 def add_squared_deflection_error(config, surface, type_index):
     """Sum the squares of the deflection error."""
-    error = (
+    deflection_error = (
         0.5 * (surface.judged_observation.position_low + surface.judged_observation.position_high)
         - surface.judged_observation.healthy_position
     )
-    surface.oscillatory.half_cycle_error_square_sum += error**2
+    surface.oscillatory.half_cycle_error_square_sum += deflection_error**2
 
 
 @kernel
@@ -400,11 +414,15 @@ def oscillation_amplitude_rad(fdi: np.void, s: int, type_index: int) -> float | 
 def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float | None:
     """From the half-cycles counted."""
     memory = fdi["types"]["surface"][s]["oscillatory"]
-    n_half_cycles, n_frames = (
+    n_counted_half_cycles, n_frames_in_half_cycles = (
         int(memory["n_half_cycles"]) - 1,
         int(memory["last_half_cycle_end_frame"] - memory["first_half_cycle_end_frame"]),
     )
-    return n_half_cycles * pi / (float(fdi["types"]["config"]["block_duration_s"]) * n_frames)
+    return (
+        n_counted_half_cycles
+        * pi
+        / (float(fdi["types"]["config"]["block_duration_s"]) * n_frames_in_half_cycles)
+    )
 
 
 OSCILLATORY = FaultType(
@@ -439,40 +457,45 @@ def consistent_rate_limit_interval(config, surface, type_index, k):
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    low, high, memory = (
+    position_low, position_high, memory = (
         surface.judged_observation.position_low,
         surface.judged_observation.position_high,
         surface.rate_limit,
     )
-    side, moves_away = surface_side_of_commands(config, surface), False
-    if side == 0 or side != memory.side_of_command or k != memory.last_known_frame + 1:
-        memory.position_low, memory.position_high = low, high
+    side_of_command, moves_away_from_command = surface_side_of_commands(config, surface), False
+    if side_of_command == 0 or side_of_command != memory.side_of_command or k != memory.last_known_frame + 1:
+        memory.position_low, memory.position_high = position_low, position_high
     else:
-        moves_away = (side > 0 and low > memory.position_high) or (side < 0 and high < memory.position_low)
-        narrow_position_by_min_rate(config, surface, memory, side)
-    memory.position_low, memory.position_high = max(memory.position_low, low), min(memory.position_high, high)
-    memory.side_of_command, memory.last_known_frame = side, k
-    return EMPTY_SET if moves_away else UNLIMITED_SET
+        moves_away_from_command = (side_of_command > 0 and position_low > memory.position_high) or (
+            side_of_command < 0 and position_high < memory.position_low
+        )
+        narrow_position_by_min_rate(config, surface, memory, side_of_command)
+    memory.position_low, memory.position_high = (
+        max(memory.position_low, position_low),
+        min(memory.position_high, position_high),
+    )
+    memory.side_of_command, memory.last_known_frame = side_of_command, k
+    return EMPTY_SET if moves_away_from_command else UNLIMITED_SET
 
 
 @kernel
-def narrow_position_by_min_rate(config, surface, memory, side):
+def narrow_position_by_min_rate(config, surface, memory, side_of_command):
     """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
     its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later."""
-    min_motion = (
+    min_motion_in_frame = (
         config.n_substeps * config.frames_per_block * surface.actuator.min_rate_limited_motion_per_substep
     )
     lag_distance = (
         surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.approach_share_per_substep
     )
     min_command, max_command = command_range(config, surface)
-    if side > 0:
+    if side_of_command > 0:
         memory.position_high = min(
-            memory.position_high, max(memory.position_high - min_motion, max_command + lag_distance)
+            memory.position_high, max(memory.position_high - min_motion_in_frame, max_command + lag_distance)
         )
-    elif side < 0:
+    elif side_of_command < 0:
         memory.position_low = max(
-            memory.position_low, min(memory.position_low + min_motion, min_command - lag_distance)
+            memory.position_low, min(memory.position_low + min_motion_in_frame, min_command - lag_distance)
         )
 
 
@@ -480,9 +503,9 @@ def narrow_position_by_min_rate(config, surface, memory, side):
 def command_range(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     commands = surface.commands
-    newest_age = 2 if config.frame_shows_single_instant else 1
-    return min(commands.min_command[2], commands.min_command[newest_age]), max(
-        commands.max_command[2], commands.max_command[newest_age]
+    newest_blocks_ago = 2 if config.frame_shows_single_instant else 1
+    return min(commands.min_command[2], commands.min_command[newest_blocks_ago]), max(
+        commands.max_command[2], commands.max_command[newest_blocks_ago]
     )
 
 

@@ -39,7 +39,7 @@ from beaver_ftc.diagnosis.types import (
     feasible_set,
     feasible_set_midpoint,
     limit_to_travel,
-    parameter_estimate,
+    midpoint_parameter_estimate,
 )
 
 EARLIER_RELEASE, LATER_RELEASE = 0, 1
@@ -85,7 +85,7 @@ def clear_held_interval(surface, type_index):
 
 
 @kernel
-def mean_return_position(config, surface, start_position, release_side=0):
+def simulate_return_in_frame(config, surface, start_position, release_side=0):
     """Mean position over the judged frame of a surface released at `start_position` (rad), its position at
     the end of the frame, and the possible error of the mean where the effectiveness changes meanwhile.
 
@@ -99,8 +99,8 @@ def mean_return_position(config, surface, start_position, release_side=0):
         start_position,
         start_position,
     )
-    for k in range(config.frames_per_block):
-        command = surface.commands.command_history[1, k]
+    for frame_in_block in range(config.frames_per_block):
+        command = surface.commands.command_history[1, frame_in_block]
         for _ in range(config.n_substeps):
             position_sum += position
             n_positions += 1
@@ -131,16 +131,16 @@ def release_within_block_explains_block(config, surface, type_index):
     )
     if config.frames_per_block == 1 or held_position_min > held_position_max:
         return False
-    low, _, low_tolerance = mean_return_position(config, surface, held_position_min, -1)
-    high, _, high_tolerance = mean_return_position(config, surface, held_position_max, 1)
+    lowest_mean, _, lowest_mean_tolerance = simulate_return_in_frame(config, surface, held_position_min, -1)
+    highest_mean, _, highest_mean_tolerance = simulate_return_in_frame(config, surface, held_position_max, 1)
     return (
-        low - low_tolerance <= surface.judged_observation.position_high
-        and high + high_tolerance >= surface.judged_observation.position_low
+        lowest_mean - lowest_mean_tolerance <= surface.judged_observation.position_high
+        and highest_mean + highest_mean_tolerance >= surface.judged_observation.position_low
     )
 
 
 @kernel
-def return_explains_frame(config, surface, type_index):
+def drop_refuted_releases_and_test_return(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
     is_explained = release_within_block_explains_block(config, surface, type_index)
     if not is_explained:
@@ -161,34 +161,34 @@ def narrow_return_interval(config, surface, release_slot, type_index):
     The mean over the frame rises with where the return began, and by no more than that.
     """
     release = surface.release
-    mean_from_low, _, low_tolerance = mean_return_position(
+    mean_from_low, _, low_tolerance = simulate_return_in_frame(
         config, surface, release.return_position_low[release_slot, type_index]
     )
-    mean_from_high, _, high_tolerance = mean_return_position(
+    mean_from_high, _, high_tolerance = simulate_return_in_frame(
         config, surface, release.return_position_high[release_slot, type_index]
     )
-    tolerance, healthy_position = (
+    mean_tolerance, healthy_position = (
         max(low_tolerance, high_tolerance),
         surface.judged_observation.healthy_position,
     )
     if (
         max(
-            abs(mean_from_low - tolerance - healthy_position),
-            abs(mean_from_high + tolerance - healthy_position),
+            abs(mean_from_low - mean_tolerance - healthy_position),
+            abs(mean_from_high + mean_tolerance - healthy_position),
         )
         <= RETURN_TOLERANCE_RAD
     ):
         return False
     if (
-        mean_from_low - tolerance > surface.judged_observation.position_high
-        or mean_from_high + tolerance < surface.judged_observation.position_low
+        mean_from_low - mean_tolerance > surface.judged_observation.position_high
+        or mean_from_high + mean_tolerance < surface.judged_observation.position_low
     ):
         return False
     narrowed_low = release.return_position_low[release_slot, type_index] + max(
-        surface.judged_observation.position_low - mean_from_low - tolerance, 0.0
+        surface.judged_observation.position_low - mean_from_low - mean_tolerance, 0.0
     )
     narrowed_high = release.return_position_high[release_slot, type_index] - max(
-        mean_from_high - tolerance - surface.judged_observation.position_high, 0.0
+        mean_from_high - mean_tolerance - surface.judged_observation.position_high, 0.0
     )
     set_return_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
     return True
@@ -209,14 +209,15 @@ def promote_later_releases(surface, type_index):
 
 
 @kernel
-def set_return_interval(release, release_slot, type_index, low, high):
-    """Replace the interval of a return by [low, high]; rounding may have swapped ends that meet."""
+def set_return_interval(release, release_slot, type_index, return_low, return_high):
+    """Replace the interval of a return by [return_low, return_high]; rounding may have swapped ends that
+    meet."""
     (
         release.return_position_low[release_slot, type_index],
         release.return_position_high[release_slot, type_index],
     ) = (
-        min(low, high),
-        max(low, high),
+        min(return_low, return_high),
+        max(return_low, return_high),
     )
 
 
@@ -225,8 +226,9 @@ def update_held_status(config, surface, type_index, held_position_min, held_posi
     """Whether a type holds the surface between these positions (rad) in the judged frame: STATUS_HELD; or has
     released it, and the actuator may be bringing it back: STATUS_RETURNING; or neither explains it:
     STATUS_REFUTED."""
-    is_return_possible = config.released_surface_returns_via_actuator and return_explains_frame(
-        config, surface, type_index
+    is_return_possible = (
+        config.released_surface_returns_via_actuator
+        and drop_refuted_releases_and_test_return(config, surface, type_index)
     )
     has_released = surface.release.has_released
     if (
@@ -266,17 +268,21 @@ def position_at_frame_start(config, surface, k):
 
 
 @kernel
-def add_release(surface, type_index, low, high):
-    """Add a release from between low and high (rad), where a type may hold the surface, if low <= high."""
+def add_release(surface, type_index, held_position_min, held_position_max):
+    """Add a release from between held_position_min and held_position_max (rad), where a type may hold the
+    surface, if the interval is not empty."""
     release = surface.release
     clear_held_interval(surface, type_index)
-    if low <= high and not release.has_released[type_index]:
-        release.held_position_min[type_index], release.held_position_max[type_index] = low, high
+    if held_position_min <= held_position_max and not release.has_released[type_index]:
+        release.held_position_min[type_index], release.held_position_max[type_index] = (
+            held_position_min,
+            held_position_max,
+        )
         release.return_position_low[LATER_RELEASE, type_index] = min(
-            release.return_position_low[LATER_RELEASE, type_index], low
+            release.return_position_low[LATER_RELEASE, type_index], held_position_min
         )
         release.return_position_high[LATER_RELEASE, type_index] = max(
-            release.return_position_high[LATER_RELEASE, type_index], high
+            release.return_position_high[LATER_RELEASE, type_index], held_position_max
         )
 
 
@@ -288,24 +294,28 @@ def propagate_returns(config, surface, type_index):
         release.has_released[type_index] = 0
     for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
         if is_release_possible(surface, release_slot, type_index):
-            _, low, _ = mean_return_position(
+            _, return_low, _ = simulate_return_in_frame(
                 config, surface, release.return_position_low[release_slot, type_index]
             )
-            _, high, _ = mean_return_position(
+            _, return_high, _ = simulate_return_in_frame(
                 config, surface, release.return_position_high[release_slot, type_index]
             )
-            set_return_interval(release, release_slot, type_index, low, high)
+            set_return_interval(release, release_slot, type_index, return_low, return_high)
     if (
         config.frames_per_block > 1
         and release.held_position_min[type_index] <= release.held_position_max[type_index]
     ):
-        _, low, _ = mean_return_position(config, surface, release.held_position_min[type_index], -1)
-        _, high, _ = mean_return_position(config, surface, release.held_position_max[type_index], 1)
+        _, return_low, _ = simulate_return_in_frame(
+            config, surface, release.held_position_min[type_index], -1
+        )
+        _, return_high, _ = simulate_return_in_frame(
+            config, surface, release.held_position_max[type_index], 1
+        )
         release.return_position_low[LATER_RELEASE, type_index] = min(
-            release.return_position_low[LATER_RELEASE, type_index], low
+            release.return_position_low[LATER_RELEASE, type_index], return_low
         )
         release.return_position_high[LATER_RELEASE, type_index] = max(
-            release.return_position_high[LATER_RELEASE, type_index], high
+            release.return_position_high[LATER_RELEASE, type_index], return_high
         )
 
 
@@ -343,12 +353,12 @@ def consistent_stuck_interval(config, surface, type_index, k):
 def add_stuck_release(config, surface, type_index, k):
     """Add a release from the interval of the jammed position."""
     promote_sets_before_release(surface, type_index)
-    low, high, _ = position_at_frame_start(config, surface, k)
+    start_position_low, start_position_high, _ = position_at_frame_start(config, surface, k)
     add_release(
         surface,
         type_index,
-        max(low, surface.feasible_sets.low[type_index]),
-        min(high, surface.feasible_sets.high[type_index]),
+        max(start_position_low, surface.feasible_sets.low[type_index]),
+        min(start_position_high, surface.feasible_sets.high[type_index]),
     )
 
 
@@ -396,23 +406,28 @@ def stuck_deflection_range(config, surface, type_index, k):
 @kernel
 def consistent_float_interval(config, surface, type_index, k):
     """It is at neutral, or at the stop that is nearest to it."""
-    neutral = limit_to_travel(surface, 0.0)
-    return held_or_returning_set(config, surface, type_index, neutral, neutral)
+    neutral_position = limit_to_travel(surface, 0.0)
+    return held_or_returning_set(config, surface, type_index, neutral_position, neutral_position)
 
 
 @kernel
 def add_float_release(config, surface, type_index, k):
     """Add a release from the neutral position."""
-    low, high, _ = position_at_frame_start(config, surface, k)
-    neutral = limit_to_travel(surface, 0.0)
-    add_release(surface, type_index, max(low, neutral), min(high, neutral))
+    start_position_low, start_position_high, _ = position_at_frame_start(config, surface, k)
+    neutral_position = limit_to_travel(surface, 0.0)
+    add_release(
+        surface,
+        type_index,
+        max(start_position_low, neutral_position),
+        min(start_position_high, neutral_position),
+    )
 
 
 @kernel
 def float_deflection_range(config, surface, type_index, k):
     """At neutral."""
-    neutral = limit_to_travel(surface, 0.0)
-    return neutral, neutral
+    neutral_position = limit_to_travel(surface, 0.0)
+    return neutral_position, neutral_position
 
 
 def neutral_position_rad(travel_low: float, travel_high: float) -> float:
@@ -452,7 +467,7 @@ STUCK = FaultType(
     deflection_relation=DeflectionRelation(
         0.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low, high)
     ),
-    estimate_parameter=parameter_estimate, estimate_parameter_interval=feasible_set,
+    estimate_parameter=midpoint_parameter_estimate, estimate_parameter_interval=feasible_set,
 )  # fmt: skip
 FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
@@ -472,7 +487,7 @@ FLOAT = FaultType(
 
 
 @kernel
-def min_runaway_travel(config, surface, k):
+def min_runaway_distance(config, surface, k):
     """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
     elapsed_frames = k - surface.evidence.first_anomalous_frame
     if config.frames_per_block > 1:
@@ -487,7 +502,7 @@ def min_runaway_up_deflection(config, surface, k):
         return surface.actuator.travel_low
     return min(
         surface.actuator.travel_high,
-        surface.evidence.first_anomalous_position_low + min_runaway_travel(config, surface, k),
+        surface.evidence.first_anomalous_position_low + min_runaway_distance(config, surface, k),
     )
 
 
@@ -498,7 +513,7 @@ def max_runaway_down_deflection(config, surface, k):
         return surface.actuator.travel_high
     return max(
         surface.actuator.travel_low,
-        surface.evidence.first_anomalous_position_high - min_runaway_travel(config, surface, k),
+        surface.evidence.first_anomalous_position_high - min_runaway_distance(config, surface, k),
     )
 
 
@@ -529,21 +544,23 @@ def consistent_hardover_down_interval(config, surface, type_index, k):
 @kernel
 def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    low, high, shown_frame = position_at_frame_start(config, surface, k)
-    low = max(low, min_runaway_up_deflection(config, surface, shown_frame))
-    if not config.frame_shows_single_instant and low <= high:
-        high = surface.actuator.travel_high
-    add_release(surface, type_index, low, high)
+    start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
+    start_position_low = max(start_position_low, min_runaway_up_deflection(config, surface, observed_frame))
+    if not config.frame_shows_single_instant and start_position_low <= start_position_high:
+        start_position_high = surface.actuator.travel_high
+    add_release(surface, type_index, start_position_low, start_position_high)
 
 
 @kernel
 def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
-    low, high, shown_frame = position_at_frame_start(config, surface, k)
-    high = min(high, max_runaway_down_deflection(config, surface, shown_frame))
-    if not config.frame_shows_single_instant and low <= high:
-        low = surface.actuator.travel_low
-    add_release(surface, type_index, low, high)
+    start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
+    start_position_high = min(
+        start_position_high, max_runaway_down_deflection(config, surface, observed_frame)
+    )
+    if not config.frame_shows_single_instant and start_position_low <= start_position_high:
+        start_position_low = surface.actuator.travel_low
+    add_release(surface, type_index, start_position_low, start_position_high)
 
 
 @kernel

@@ -271,7 +271,7 @@ def _cell(key: str, value: Any) -> str:
 
 def as_text(document: Document) -> str:
     """For a terminal."""
-    blocks = [f"{document['flights']} hidden flights; walls: {', '.join(document['walls']) or 'none'}"]
+    blocks = [f"{document['flights']} hidden flights; protections: {', '.join(document['walls']) or 'none'}"]
     for name in ("detectors", "laws"):
         table = _table(document[name])
         blocks.append(f"{name}\n" + aligned([table.head, *table.rows]))

@@ -72,7 +72,7 @@ def submit(
     document = {"student": name, **tried(source, file.name), "submitted": None}
     if to is not None:
         document["submitted"] = str(folders.keep(source, name, to))
-    done = f"handed in as {document['submitted']}" if to else "not handed in, which --to DIR does"
+    done = f"handed in as {document['submitted']}" if to else "not handed in: for that, add --to DIR"
     points = f"{document['points']:g} points in one practice flight with a loss"
     says = f"{document['kind']} {document['class']}: {points} (a grade is the mean over all flights); {done}"
     answer(format, document, lambda: says)

@@ -41,7 +41,7 @@ def _of_faults(cell: Cell) -> Cell:
 
 def _alarms(row: Document) -> str:
     rate, upper = row["false_alarms_per_h"], row["false_alarms_per_h_upper"]
-    return "-" if rate is None else f"{rate:.3g} (<{upper:.2g})"
+    return "-" if rate is None else f"{rate:.3g} (<{float(f'{upper:.2g}'):g})"
 
 
 def _free(row: Document) -> str:

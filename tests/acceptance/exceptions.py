@@ -89,6 +89,12 @@ TABLE = (
         r"timeout --signal=INT 10 \1 | grep live:.http",
     ),
     Exempt(
+        r"(beaver-ftc sitl elevator-partial-loss --as ardupilot --no-report)",
+        "waits for the autopilot that the page shows: with it",
+        r"(\1 & python steady.py && wait)",
+    ),
+    Exempt(r"python steady\.py", "is an autopilot: runs with the simulator that waits for it"),
+    Exempt(
         r"(beaver-ftc sitl \S+ --as ardupilot)",
         "waits for an autopilot, which tests/products/links/sitl has: its address",
         r"timeout --signal=INT 10 \1 --port 0 --no-report 2>&1 | grep 127.0.0.1",

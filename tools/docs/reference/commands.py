@@ -183,16 +183,31 @@ def _in_html(text: str) -> str:
 
 
 _CAPTION = """*Table 1. Exit statuses. "exception": the exception that the same error raises in Python.*"""
-_NOTES = """Status 1 has three possible reasons:
+_NOTES = """## Status 1 of each command
 
-- An expectation of a scenario, of a sweep or of a plan is not met.
-- A check found a violation. `verify` checks guarantees, `check` a certificate, `matrix` names and false
-  alarms, `reproduce` statements of the paper, `mechanisms` false alarms, and `separate` whether the doublet
-  distinguished the candidates. `beaver-ftc COMMAND --help` states the condition of each command.
-- Ctrl-C interrupted a flight of `sitl`. The results are written, with the verdict INTERRUPTED. Other commands
-  that are interrupted end with status 130.
+*Table 2. Commands that can end with status 1, and the reason.*
+
+|command|status 1 means|
+|---|---|
+|`run`, `sitl`|a flight misses an expectation of its scenario|
+|`sweep`|the sweep misses one of its expectations|
+|`evidence`|a requirement is not met or not shown|
+|`verify`|a guarantee is violated|
+|`check`|a statement of the certificate does not hold|
+|`matrix`|a fault is named wrongly, or an alarm is false|
+|`matrix --pitch-lost`|an aircraft is lost with control by engine power, but not without it|
+|`reproduce`|a statement of the paper does not hold, and the reason is not known|
+|`mechanisms`|a false alarm of a worst-case detector has no reason|
+|`separate`|a doublet was flown, and both candidates remain|
 
 A command without expectations and without a check, such as `list`, ends with status 0 when it is done.
+
+## After Ctrl-C
+
+After Ctrl-C, a command ends with status 130. The one exception is `sitl`: it writes the results of the flight
+until then, with the verdict INTERRUPTED, and ends with status 1.
+
+## Use in a script
 
 *Example.* This script publishes the report only if the flight meets its expectations:
 
@@ -211,8 +226,9 @@ fi
 def statuses_page() -> str:
     """The exit statuses: what `beaver-ftc --help` says of each, and the errors that end with it."""
     says = (
-        "Which exit status does a command end with, and what does it mean? This page is for writers of "
-        "scripts and CI jobs, which read the exit status of `beaver-ftc`."
+        "With which exit status does a command end, and what does it mean? This page is for writers of "
+        "scripts and of CI jobs (continuous integration). A script reads this number to find out whether the "
+        "command was successful."
     )
     _, _, listed = PARSER.help.partition("Exit status: ")
     found = re.findall(r"(\d+) ([^,.]+)", " ".join(listed.split()))
@@ -225,7 +241,7 @@ def statuses_page() -> str:
     rows.append(
         (
             "`128 + N`",
-            "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2); each "
+            "signal N of the operating system ended the command, for example 130 for Ctrl-C (signal 2). Each "
             "result file is complete or absent",
             "",
         )

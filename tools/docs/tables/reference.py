@@ -40,7 +40,10 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
         f"{initial.altitude_m:g} m ({initial.altitude_m / 0.3048:.0f} ft) above sea level",
         "initial.altitude_m",
     )
-    power = f"{initial.engine_rpm:g} rpm, {initial.manifold_pressure_inhg:g} inHg, constant"
+    power = (
+        f"engine speed {initial.engine_rpm:g} rpm, manifold pressure {initial.manifold_pressure_inhg:g} inHg, "
+        "constant"
+    )
     yield "with which power?", power, "initial.engine_rpm`, `initial.manifold_pressure_inhg"
     yield "with how much flap?", f"{initial.flap_deg:g} deg", "initial.flap_deg"
     yield "which manoeuvre?", _none(scenario.reference.p, "none: all commanded body rates are 0"), "reference"
@@ -55,16 +58,19 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
     )
     yield "does the design model differ from the simulated aircraft?", "no", "uncertainty"
     yield "which law?", f"`{scenario.control.law}`", "control.law"
-    yield "which diagnosis?", f"`{fdi.scheme}`, looking for the fault class `{fdi.fault_class}`", "fdi.scheme"
+    yield "which diagnosis?", f"`{fdi.scheme}`", "fdi.scheme"
+    if fdi.fault_class != "published":
+        raise AssertionError(f"{fdi.fault_class}: the default is no longer loss of effectiveness")
+    yield "which faults does it test for?", "`published`: loss of effectiveness", "fdi.fault_class"
     constant, share = bounds.constant_rad_s2.q, bounds.inertia_coupling.q
     declared = (
-        f"a model error of {constant:g} rad/s² and {100 * share:.0f} % of the inertia coupling (angular "
-        "acceleration from products of two rates) on each axis"
+        f"on each axis, a model error of {constant:g} rad/s², and an error of {100 * share:.0f} % in the "
+        "inertia coupling, the angular acceleration from products of two rates"
     )
-    yield "which uncertainty is declared?", declared, "fdi.bounds"
+    yield "which errors are declared?", declared, "fdi.bounds"
     yield "is the statistical detector on?", "no" if fdi.statistical is None else "yes", "fdi.statistical"
     yield "which seed?", f"{scenario.seed}", "seed"
-    yield "what must come out?", "nothing: the verdict says *flown*, and the exit status is 0", "expect"
+    yield "which result is required?", "none: the verdict says *flown*, and the exit status is 0", "expect"
 
 
 def _none(value: Any, words: str) -> str:
@@ -111,7 +117,7 @@ def _surface(name: str) -> dict[str, str]:
         "lower stop, deg": f"{low:.1f}",
         "upper stop, deg": f"{high:.1f}",
         "a positive deflection": up if term.value > 0 else down,
-        "deciding term": f"`{term.name}`",
+        "main coefficient": f"`{term.name}`",
         "value, 1/rad": f"{term.value:g}",
     }
 
@@ -123,6 +129,7 @@ def beaver_trim() -> str:
 
 def _trim(altitude_m: float, airspeed_mps: float) -> dict[str, str]:
     trim = bf.trim("fault-free", airspeed_mps=airspeed_mps, altitude_m=altitude_m)
+    low, high = bf.aircraft("beaver").alpha_rad
     surfaces = {
         f"{name}, deg": f"{math.degrees(trim.surfaces_rad[name]):.1f}"
         for name in ("aileron", "elevator", "rudder")
@@ -131,6 +138,7 @@ def _trim(altitude_m: float, airspeed_mps: float) -> dict[str, str]:
         "altitude, m": f"{altitude_m:.0f}",
         "airspeed, m/s": f"{airspeed_mps:g}",
         "angle of attack, deg": f"{math.degrees(trim.alpha_rad):.1f}",
+        "validated": "yes" if low <= trim.alpha_rad <= high else "no",
         "flight path, deg": f"{math.degrees(trim.gamma_rad):.1f}",
         **surfaces,
     }

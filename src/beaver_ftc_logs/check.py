@@ -370,8 +370,8 @@ def vehicle_file_text(vehicle: Document) -> str:
     import yaml
 
     header = (
-        "# Proposed by `identify --check`. Check each line. Choose commands that come before\n"
-        "# any part that can fail. A surface may follow several commands: `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
+        "# Proposed by `identify --check`. Check each line. Choose commands that come before any part\n"
+        "# that can fail. A surface may follow several commands: `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
     )
     yaml_text = str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
     return header + yaml_text + unused_keys_as_comments(vehicle)

@@ -41,8 +41,8 @@ def _answers(scenario: Any) -> Iterator[tuple[str, str, str]]:
         "initial.altitude_m",
     )
     power = (
-        f"engine speed {initial.engine_rpm:g} rpm, manifold pressure {initial.manifold_pressure_inhg:g} inHg, "
-        "constant"
+        f"engine speed {initial.engine_rpm:g} rpm, manifold pressure "
+        f"{initial.manifold_pressure_inhg:g} inHg, constant"
     )
     yield "with which power?", power, "initial.engine_rpm`, `initial.manifold_pressure_inhg"
     yield "with how much flap?", f"{initial.flap_deg:g} deg", "initial.flap_deg"

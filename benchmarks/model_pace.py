@@ -49,7 +49,7 @@ def flown(scenario: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:
         status = fly_frame(frames, references, log)
-        bound.append(np.where(error_map["is_outside_all_boxes"][0], np.nan, error_map["error_now"][0]))
+        bound.append(np.where(error_map["is_outside_all_boxes"][0], np.nan, error_map["error_bound_now"][0]))
         return status
 
     loop.fly_frame = fly_and_note

@@ -217,9 +217,11 @@ def new_map(**fields):
     record["box_low"], record["box_high"] = -1e6, 1e6
     record["box_low"][0, 0], record["box_high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
     record["box_low"][1, 5], record["box_high"][1, 5] = 30.0, 60.0  # the outer one by airspeed
-    record["travel_share"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
+    record["travel_share_by_level"][:3], record["until_s"][:2] = (0.25, 0.5, 1.0), (10.0, 60.0)
     record["travel_low"], record["travel_high"] = (-0.4, -0.4, -0.2, -0.1), (0.2, 0.4, 0.4, 1.0)
-    record["error"] = np.arange(record["error"].size).reshape(record["error"].shape) / 1000.0
+    record["error_bound"] = (
+        np.arange(record["error_bound"].size).reshape(record["error_bound"].shape) / 1000.0
+    )
     return fill(record, **fields)
 
 
@@ -250,7 +252,7 @@ def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.error_map_time_row(new_map(time_s=time_s)) == age
+    assert bounds.error_map_time_row_index(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -269,9 +271,9 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     y[2] = airspeed
     bounds.add_map_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
-    expected = record["error"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
+    expected = record["error_bound"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert out == pytest.approx(0.5 + expected)
-    assert record["error_now"] == pytest.approx(np.full(3, expected))
+    assert record["error_bound_now"] == pytest.approx(np.full(3, expected))
     assert record["is_outside_all_boxes"] == (box is None)
     assert record["coordinates"][:7] == pytest.approx(
         [roll, 0, 0, 0.1, 0.03, airspeed, 2.0 * 1036.0 / airspeed**2]

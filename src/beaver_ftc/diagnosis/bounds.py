@@ -111,29 +111,30 @@ def declared_errors_dtype(n: int) -> np.dtype:
 
 
 @sized
-def error_map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
+def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
     one_surface_may_be_anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere:
     more than one may.
-    is_outside_all_boxes: whether the state is outside all boxes; box, time_row: where it is in the map.
-    surface_positions_before: deflections in the frame before, rad; error_now: error here, rad/s2.
+    is_outside_all_boxes: whether the state is outside all boxes; box_index, time_row_index: where it is
+    in the map.
+    surface_positions_before: deflections in the frame before, rad; error_bound_now: error here, rad/s2.
     engine_asymmetry_bound: bound on the yawing moment of healthy engines, by box."""
     return record(
         n_boxes=int, n_levels=int, n_time_rows=int, one_surface_may_be_anywhere=int,
         several_surfaces_may_be_anywhere=int,
-        is_outside_all_boxes=int, box=int, time_row=int,
-        time_s=float, until_s=MAX_AGES, box_low=(boxes, N_MAP_COORDINATES), box_high=(boxes,
+        is_outside_all_boxes=int, box_index=int, time_row_index=int,
+        time_s=float, until_s=MAX_AGES, box_low=(n_boxes, N_MAP_COORDINATES), box_high=(n_boxes,
         N_MAP_COORDINATES),
-        travel_share=MAX_LEVELS,
-        error=(MAX_AGES, boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n, surface_positions_before=n,
-        coordinates=N_MAP_COORDINATES, error_now=3,
-        engine_asymmetry_bound=boxes, engine_asymmetry_bound_now=float,
+        travel_share_by_level=MAX_LEVELS,
+        error_bound=(MAX_AGES, n_boxes, MAX_LEVELS, 3), travel_low=n, travel_high=n,
+        surface_positions_before=n, coordinates=N_MAP_COORDINATES, error_bound_now=3,
+        engine_asymmetry_bound=n_boxes, engine_asymmetry_bound_now=float,
     )  # fmt: skip
 
 
 @sized
-def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
+def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_innovation_bound: on the innovation
     of one frame, rad/s2. surface_error_per_rad, surface_error_at_command: error of each surface's own terms
@@ -144,7 +145,7 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     return record(
         inertia_coupling=3, constant_error_bound=3, earth_rate_rad_s=float,
         declared_errors=declared_errors_dtype(n),
-        model_error_map=error_map_dtype(n, boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
+        model_error_map=error_map_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
         gyro_error_change_bound_before=3,
         frame_innovation_bound=3,
         has_declared_surface_errors=int, surface_error_per_rad=(3, n), surface_error_at_command=(3, n),
@@ -169,7 +170,7 @@ def fill_error_map(
     error_map["n_boxes"] = len(declared_map.boxes)
     error_map["n_levels"], error_map["n_time_rows"] = n_levels, n_time_rows
     error_map["until_s"][:n_time_rows] = declared_map.until_s
-    error_map["travel_share"][:n_levels] = declared_map.travel_share
+    error_map["travel_share_by_level"][:n_levels] = declared_map.travel_share
     travel_share_of_surface = np.array(
         [declared_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
@@ -179,12 +180,13 @@ def fill_error_map(
     error_map["travel_high"] = travel_share_of_surface * [
         travel.max_rad for travel in aircraft.travel.values()
     ]
-    for k, box in enumerate(declared_map.boxes):
-        box_ends = np.array(box.ends(aircraft.signals))
-        error_map["box_low"][k, : len(box_ends)], error_map["box_high"][k, : len(box_ends)] = box_ends.T
-        errors = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        error_map["error"][:n_time_rows, k, :n_levels] = np.stack(errors, axis=-1)
-        error_map["engine_asymmetry_bound"][k] = box.engines_apart or 0.0
+    for box_index, box in enumerate(declared_map.boxes):
+        box_limits = np.array(box.ends(aircraft.signals))
+        error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
+        error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
+        errors_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
+        error_map["error_bound"][:n_time_rows, box_index, :n_levels] = np.stack(errors_by_axis, axis=-1)
+        error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
 
 
 @kernel
@@ -200,10 +202,10 @@ def reading_error_bound(declared_errors, signal_index, reading):
 def changing_gyro_error_bound(declared_errors, axis, reading):
     """Bound the changing error of the gyro of an axis, rad/s: noise, resolution, slope times the true
     rate."""
-    changing_offset = (
+    changing_error_offset = (
         declared_errors.signal_error_offset[axis] - declared_errors.constant_gyro_error_bound[axis]
     )
-    return changing_offset + declared_errors.signal_error_slope[axis] * (
+    return changing_error_offset + declared_errors.signal_error_slope[axis] * (
         abs(reading) + reading_error_bound(declared_errors, axis, reading)
     )
 
@@ -215,21 +217,25 @@ def slipstream_error_bound(declared_errors, y):
     dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_power_error_kw and by the
     density density_power_error_kw for all of it; and the share that dynamic pressure and airspeed are off.
     """
-    pressure_error_share = (
+    relative_pressure_error_bound = (
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + QDYN, y[QDYN]) / y[QDYN]
     )
-    airspeed_error_share = (
+    relative_airspeed_error_bound = (
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + AIRSPEED, y[AIRSPEED])
         / y[AIRSPEED]
     )
-    max_error_ratio = 1.0 / ((1.0 - min(pressure_error_share, 0.9)) * (1.0 - min(airspeed_error_share, 0.9)))
-    density_error_share = (1.0 + pressure_error_share) / (1.0 - min(airspeed_error_share, 0.9)) ** 2 - 1.0
-    power_error_kw = (
-        declared_errors.engine_power_error_kw
-        + declared_errors.density_power_error_kw * density_error_share * density_ratio(y)
+    max_reading_over_truth = 1.0 / (
+        (1.0 - min(relative_pressure_error_bound, 0.9)) * (1.0 - min(relative_airspeed_error_bound, 0.9))
     )
-    return max_error_ratio * KW_TO_DPT * power_error_kw / (y[QDYN] * y[AIRSPEED]) + (
-        max_error_ratio - 1.0
+    relative_density_error_bound = (1.0 + relative_pressure_error_bound) / (
+        1.0 - min(relative_airspeed_error_bound, 0.9)
+    ) ** 2 - 1.0
+    power_error_bound_kw = (
+        declared_errors.engine_power_error_kw
+        + declared_errors.density_power_error_kw * relative_density_error_bound * density_ratio(y)
+    )
+    return max_reading_over_truth * KW_TO_DPT * power_error_bound_kw / (y[QDYN] * y[AIRSPEED]) + (
+        max_reading_over_truth - 1.0
     ) * abs(y[DPT] - DPT_0)
 
 
@@ -269,24 +275,28 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
         declared_errors.magnitude_y[QDYN],
         declared_errors.magnitude_bound_y[QDYN],
     )
-    table = design.moments
+    moment_table = design.moments
     for i in range(3):
-        measured_coefficient, max_coefficient = 0.0, 0.0
-        for k in range(table.free_from[i], table.surface_to[i]):
-            coefficient, s = abs(table.value[k]), table.surface[k]
-            measured_coefficient += (
-                coefficient
-                * declared_errors.monomial_magnitude[table.monomial[k]]
+        coefficient_magnitude, max_coefficient_magnitude = 0.0, 0.0
+        for k in range(moment_table.free_from[i], moment_table.surface_to[i]):
+            term_value_magnitude, s = abs(moment_table.value[k]), moment_table.surface[k]
+            coefficient_magnitude += (
+                term_value_magnitude
+                * declared_errors.monomial_magnitude[moment_table.monomial[k]]
                 * (declared_errors.magnitude_u[s] if s >= 0 else 1.0)
             )
-            max_factor = declared_errors.max_monomial_magnitude[table.monomial[k]] * (
+            max_factor_magnitude = declared_errors.max_monomial_magnitude[moment_table.monomial[k]] * (
                 declared_errors.max_magnitude_u[s] if s >= 0 else 1.0
             )
-            max_coefficient += (coefficient + declared_errors.coefficient_tolerance[k]) * max_factor
-        area_times_length = design.S * (design.c if i == 1 else design.b)
-        declared_errors.moment_magnitude[i] = area_times_length * measured_pressure * measured_coefficient
-        declared_errors.moment_error_bound[i] = area_times_length * (
-            max_pressure * max_coefficient - measured_pressure * measured_coefficient
+            max_coefficient_magnitude += (
+                term_value_magnitude + declared_errors.coefficient_tolerance[k]
+            ) * max_factor_magnitude
+        wing_area_times_length = design.S * (design.c if i == 1 else design.b)
+        declared_errors.moment_magnitude[i] = (
+            wing_area_times_length * measured_pressure * coefficient_magnitude
+        )
+        declared_errors.moment_error_bound[i] = wing_area_times_length * (
+            max_pressure * max_coefficient_magnitude - measured_pressure * coefficient_magnitude
         )
 
 
@@ -308,9 +318,12 @@ def inertia_times_moment_error_bound(declared_errors, axis, coefficient, toleran
 @kernel
 def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, tolerance):
     """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
-    magnitude, max_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
+    rate_magnitude, max_rate_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
-        coefficient, tolerance, magnitude[i] * magnitude[j], max_magnitude[i] * max_magnitude[j]
+        coefficient,
+        tolerance,
+        rate_magnitude[i] * rate_magnitude[j],
+        max_rate_magnitude[i] * max_rate_magnitude[j],
     )
 
 
@@ -318,19 +331,24 @@ def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, toleranc
 def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
     """Return the part of surface s in the moment about an axis per rad: its magnitude, and with all errors; N
     m."""
-    measured_coefficient, max_coefficient = 0.0, 0.0
-    table = design.moments
-    for k in range(table.free_to[axis], table.surface_to[axis]):
-        if table.surface[k] == s:
-            coefficient = abs(table.value[k])
-            measured_coefficient += coefficient * declared_errors.monomial_magnitude[table.monomial[k]]
-            max_coefficient += (
-                coefficient + declared_errors.coefficient_tolerance[k]
-            ) * declared_errors.max_monomial_magnitude[table.monomial[k]]
-    area_times_length = design.S * (design.c if axis == 1 else design.b)
-    return area_times_length * declared_errors.magnitude_y[
-        QDYN
-    ] * measured_coefficient, area_times_length * declared_errors.magnitude_bound_y[QDYN] * max_coefficient
+    coefficient_magnitude_per_rad, max_coefficient_magnitude_per_rad = 0.0, 0.0
+    moment_table = design.moments
+    for k in range(moment_table.free_to[axis], moment_table.surface_to[axis]):
+        if moment_table.surface[k] == s:
+            term_value_magnitude = abs(moment_table.value[k])
+            coefficient_magnitude_per_rad += (
+                term_value_magnitude * declared_errors.monomial_magnitude[moment_table.monomial[k]]
+            )
+            max_coefficient_magnitude_per_rad += (
+                term_value_magnitude + declared_errors.coefficient_tolerance[k]
+            ) * declared_errors.max_monomial_magnitude[moment_table.monomial[k]]
+    wing_area_times_length = design.S * (design.c if axis == 1 else design.b)
+    force_times_length = wing_area_times_length * declared_errors.magnitude_y[QDYN]
+    max_force_times_length = wing_area_times_length * declared_errors.magnitude_bound_y[QDYN]
+    return (
+        force_times_length * coefficient_magnitude_per_rad,
+        max_force_times_length * max_coefficient_magnitude_per_rad,
+    )
 
 
 @kernel
@@ -340,15 +358,32 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
     The declared bound is affine in |u_s|; this is its slope. Call `add_declared_error_bound` first: it fills
     the scratch fields.
     """
-    inertia_tolerance, per_rad = declared_errors.inertia_tolerance, declared_errors.acceleration_error_per_rad
-    roll, max_roll = surface_moment_magnitudes_per_rad(declared_errors, design, 0, s)
-    pitch, max_pitch = surface_moment_magnitudes_per_rad(declared_errors, design, 1, s)
-    yaw, max_yaw = surface_moment_magnitudes_per_rad(declared_errors, design, 2, s)
-    per_rad[0, s] = product_error_bound(design.Pl, inertia_tolerance[2], roll, max_roll)
-    per_rad[0, s] += product_error_bound(design.Pn, inertia_tolerance[3], yaw, max_yaw)
-    per_rad[1, s] = product_error_bound(design.Qm, inertia_tolerance[7], pitch, max_pitch)
-    per_rad[2, s] = product_error_bound(design.Rl, inertia_tolerance[10], roll, max_roll)
-    per_rad[2, s] += product_error_bound(design.Rn, inertia_tolerance[11], yaw, max_yaw)
+    inertia_tolerance = declared_errors.inertia_tolerance
+    error_bound_per_rad = declared_errors.acceleration_error_per_rad
+    roll_moment_per_rad, max_roll_moment_per_rad = surface_moment_magnitudes_per_rad(
+        declared_errors, design, 0, s
+    )
+    pitch_moment_per_rad, max_pitch_moment_per_rad = surface_moment_magnitudes_per_rad(
+        declared_errors, design, 1, s
+    )
+    yaw_moment_per_rad, max_yaw_moment_per_rad = surface_moment_magnitudes_per_rad(
+        declared_errors, design, 2, s
+    )
+    error_bound_per_rad[0, s] = product_error_bound(
+        design.Pl, inertia_tolerance[2], roll_moment_per_rad, max_roll_moment_per_rad
+    )
+    error_bound_per_rad[0, s] += product_error_bound(
+        design.Pn, inertia_tolerance[3], yaw_moment_per_rad, max_yaw_moment_per_rad
+    )
+    error_bound_per_rad[1, s] = product_error_bound(
+        design.Qm, inertia_tolerance[7], pitch_moment_per_rad, max_pitch_moment_per_rad
+    )
+    error_bound_per_rad[2, s] = product_error_bound(
+        design.Rl, inertia_tolerance[10], roll_moment_per_rad, max_roll_moment_per_rad
+    )
+    error_bound_per_rad[2, s] += product_error_bound(
+        design.Rn, inertia_tolerance[11], yaw_moment_per_rad, max_yaw_moment_per_rad
+    )
 
 
 @kernel
@@ -409,14 +444,14 @@ def is_inside_box(error_map, box_index):
 @kernel
 def is_coordinate_outside_all_boxes(error_map, coordinate_index):
     """Whether this coordinate of the state is outside the range that the boxes span together."""
-    low, high = np.inf, -np.inf
-    for k in range(error_map.n_boxes):
-        low, high = (
-            min(low, error_map.box_low[k, coordinate_index]),
-            max(high, error_map.box_high[k, coordinate_index]),
-        )
+    map_low, map_high = np.inf, -np.inf
+    for box_index in range(error_map.n_boxes):
+        map_low = min(map_low, error_map.box_low[box_index, coordinate_index])
+        map_high = max(map_high, error_map.box_high[box_index, coordinate_index])
     rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[coordinate_index]))
-    return not low - rounding_margin <= error_map.coordinates[coordinate_index] <= high + rounding_margin
+    return (
+        not map_low - rounding_margin <= error_map.coordinates[coordinate_index] <= map_high + rounding_margin
+    )
 
 
 @kernel
@@ -436,11 +471,11 @@ def map_travel_level_index_for_positions(error_map, u):
 @kernel
 def map_travel_level_index_for_share(error_map, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
-    last_level = error_map.n_levels - 1
-    for j in range(last_level):
-        if travel_share <= error_map.travel_share[j]:
+    last_level_index = error_map.n_levels - 1
+    for j in range(last_level_index):
+        if travel_share <= error_map.travel_share_by_level[j]:
             return j
-    return last_level
+    return last_level_index
 
 
 @kernel
@@ -450,52 +485,60 @@ def max_travel_share_used(error_map, s, position_interval, share_before, n_insta
     position_interval: (low, high) rad, of the mean position over the instants; share_before: the share at the
     start of the frame, where the surface may still be at the first instant.
     """
-    used, (low, high) = 0.0, position_interval
-    if high > 0.0:
-        used = high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
-    if low < 0.0:
-        used = max(used, low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0)
+    max_share_used, (position_low, position_high) = 0.0, position_interval
+    if position_high > 0.0:
+        max_share_used = position_high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
+    if position_low < 0.0:
+        max_share_used = max(
+            max_share_used, position_low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0
+        )
     if n_instants > 1:
-        used = max(share_before, (n_instants * used + share_before) / (n_instants - 1))
-    return min(used, 1.0)
+        max_share_used = max(share_before, (n_instants * max_share_used + share_before) / (n_instants - 1))
+    return min(max_share_used, 1.0)
 
 
 @kernel
-def error_map_time_row(error_map):
+def error_map_time_row_index(error_map):
     """The row of the map for the present flight time, -1 if the map ends before."""
-    for a in range(error_map.n_time_rows):
-        if error_map.time_s <= error_map.until_s[a]:
-            return a
+    for time_row_index in range(error_map.n_time_rows):
+        if error_map.time_s <= error_map.until_s[time_row_index]:
+            return time_row_index
     return -1
 
 
 @kernel
 def look_up_map_error(error_map, x, y, u):
-    """Fill `coordinates` and `error_now`, the mapped error at this state; x (3,) rad/s, y (4 + declared,), u
-    (n,) rad."""
+    """Fill `coordinates` and `error_bound_now`, the mapped error at this state; x (3,) rad/s, y (4 +
+    declared,), u (n,) rad."""
     coordinates = error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    level, time_row = map_travel_level_index_for_positions(error_map, u), error_map_time_row(error_map)
-    for k in range(error_map.n_boxes if time_row >= 0 else 0):
-        if is_inside_box(error_map, k):
-            error_map.is_outside_all_boxes, error_map.error_now[:] = 0, error_map.error[time_row, k, level]
-            error_map.box, error_map.time_row = k, time_row
-            error_map.engine_asymmetry_bound_now = error_map.engine_asymmetry_bound[k]
+    travel_level_index = map_travel_level_index_for_positions(error_map, u)
+    time_row_index = error_map_time_row_index(error_map)
+    for box_index in range(error_map.n_boxes if time_row_index >= 0 else 0):
+        if is_inside_box(error_map, box_index):
+            error_map.is_outside_all_boxes = 0
+            error_map.error_bound_now[:] = error_map.error_bound[
+                time_row_index, box_index, travel_level_index
+            ]
+            error_map.box_index, error_map.time_row_index = box_index, time_row_index
+            error_map.engine_asymmetry_bound_now = error_map.engine_asymmetry_bound[box_index]
             return
     error_map.is_outside_all_boxes = 1
-    error_map.error_now[:] = UNMAPPED_ERROR_RAD_S2
+    error_map.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
     error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
 
 
 @kernel
-def additional_error_at_travel_level(error_map, level, axis):
+def additional_error_at_travel_level(error_map, travel_level_index, axis):
     """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
     travel, rad/s2."""
     if error_map.is_outside_all_boxes:
         return 0.0
     return max(
-        error_map.error[error_map.time_row, error_map.box, level, axis] - error_map.error_now[axis], 0.0
+        error_map.error_bound[error_map.time_row_index, error_map.box_index, travel_level_index, axis]
+        - error_map.error_bound_now[axis],
+        0.0,
     )
 
 
@@ -504,7 +547,7 @@ def add_map_error(error_map, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
     look_up_map_error(error_map, x, y, u)
     for i in range(3):
-        eta_bar[i] += error_map.error_now[i]
+        eta_bar[i] += error_map.error_bound_now[i]
 
 
 @kernel
@@ -516,22 +559,22 @@ def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth
     earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by `max_rate_coupling_by_axis`.
     """
     p, q, r = x[0], x[1], x[2]
-    rates = abs(p) + abs(q) + abs(r)
-    roll, pitch, yaw = max_rate_coupling_by_axis(design)
+    sum_of_rate_magnitudes = abs(p) + abs(q) + abs(r)
+    max_roll_coupling, max_pitch_coupling, max_yaw_coupling = max_rate_coupling_by_axis(design)
     eta_bar[0] += (
         inertia_coupling[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, roll)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_roll_coupling)
     )
     eta_bar[1] += (
         inertia_coupling[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, pitch)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_pitch_coupling)
     )
     eta_bar[2] += (
         inertia_coupling[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, rates, yaw)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_yaw_coupling)
     )
 
 
@@ -539,65 +582,71 @@ def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth
 def max_rate_coupling_by_axis(design):
     """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
     least 1."""
-    roll, yaw = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
-    pitch = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
-    return max(roll, 1.0), max(pitch, 1.0), max(yaw, 1.0)
+    roll_coupling, yaw_coupling = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
+    pitch_coupling = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
+    return max(roll_coupling, 1.0), max(pitch_coupling, 1.0), max(yaw_coupling, 1.0)
 
 
 @kernel
-def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rates, rate_coupling):
+def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_rate_coupling):
     """Bound the angular acceleration on an axis by the Earth's rotation and by rounding, rad/s2;
-    sum_of_rates: |p| + |q| + |r|, rad/s."""
+    sum_of_rate_magnitudes: |p| + |q| + |r|, rad/s."""
     return (
-        earth_rate_rad_s * ((1.0 + rate_coupling) * sum_of_rates + rate_coupling * earth_rate_rad_s)
+        earth_rate_rad_s
+        * ((1.0 + max_rate_coupling) * sum_of_rate_magnitudes + max_rate_coupling * earth_rate_rad_s)
         + ROUNDING_RAD_S2
     )
 
 
 @kernel
-def min_true_height_m(altitude, error_offset_m, error_slope):
-    """The least true height, m. The error of `altitude`, as measured, is up to error_offset_m +
+def min_true_height_m(measured_altitude_m, error_offset_m, error_slope):
+    """The least true height, m. The error of `measured_altitude_m` is up to error_offset_m +
     error_slope |truth|. The ground is at sea level; the model of turbulence has no height below
     LEAST_HEIGHT_M."""
     return max(
-        altitude - (error_offset_m + error_slope * abs(altitude)) / (1.0 - error_slope), LEAST_HEIGHT_M
+        measured_altitude_m - (error_offset_m + error_slope * abs(measured_altitude_m)) / (1.0 - error_slope),
+        LEAST_HEIGHT_M,
     )
 
 
 @kernel
-def set_air_rotation_bound(declared_errors, altitude):
-    """Set the bound on the air's rotation, rad/s, for this altitude, m as measured."""
+def set_air_rotation_bound(declared_errors, measured_altitude_m):
+    """Set the bound on the air's rotation, rad/s, for this altitude."""
     if declared_errors.air_rotation_bound_at_1_m > 0.0:
-        height = min_true_height_m(
-            altitude, declared_errors.altitude_error_bound_m, declared_errors.altitude_error_share
+        min_height_m = min_true_height_m(
+            measured_altitude_m, declared_errors.altitude_error_bound_m, declared_errors.altitude_error_share
         )
         declared_errors.air_rotation_bound[:] = max(
             declared_errors.air_rotation_bound_aloft,
-            declared_errors.air_rotation_bound_at_1_m / np.sqrt(height),
+            declared_errors.air_rotation_bound_at_1_m / np.sqrt(min_height_m),
         )
 
 
 @kernel
-def fill_uncertainty_bound_now(bound, design, measured, u):
+def fill_uncertainty_bound_now(bound_record, design, measured, u):
     """Fill eta_bar_now (3,) rad/s2, the bound on the uncertainty at this instant; u (n,) rad."""
     x, y = measured.x, measured.y
-    bound.eta_bar_now[:] = 0.0
-    if bound.declared_errors.has_declared_errors:
-        set_air_rotation_bound(bound.declared_errors, measured.altitude)
-        add_declared_error_bound(bound.declared_errors, design, x, y, u, bound.eta_bar_now)
-        if bound.has_declared_surface_errors:
+    bound_record.eta_bar_now[:] = 0.0
+    if bound_record.declared_errors.has_declared_errors:
+        set_air_rotation_bound(bound_record.declared_errors, measured.altitude)
+        add_declared_error_bound(bound_record.declared_errors, design, x, y, u, bound_record.eta_bar_now)
+        if bound_record.has_declared_surface_errors:
             for s in range(u.size):
-                fill_acceleration_error_per_rad(bound.declared_errors, design, s)
-    if bound.model_error_map.n_boxes > 0:
-        add_map_error(bound.model_error_map, x, y, u, bound.eta_bar_now)
-    max_rates = bound.declared_errors.max_magnitude_x if bound.declared_errors.has_declared_errors else x
+                fill_acceleration_error_per_rad(bound_record.declared_errors, design, s)
+    if bound_record.model_error_map.n_boxes > 0:
+        add_map_error(bound_record.model_error_map, x, y, u, bound_record.eta_bar_now)
+    max_rate_magnitudes = (
+        bound_record.declared_errors.max_magnitude_x
+        if bound_record.declared_errors.has_declared_errors
+        else x
+    )
     add_published_bound(
-        max_rates,
+        max_rate_magnitudes,
         design,
-        bound.inertia_coupling,
-        bound.constant_error_bound,
-        bound.earth_rate_rad_s,
-        bound.eta_bar_now,
+        bound_record.inertia_coupling,
+        bound_record.constant_error_bound,
+        bound_record.earth_rate_rad_s,
+        bound_record.eta_bar_now,
     )
 
 
@@ -607,69 +656,77 @@ POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds 
 
 
 @lru_cache(maxsize=64)
-def max_inertia_coefficient_errors(tolerance: float, mass: MassProperties) -> np.ndarray:
+def max_inertia_coefficient_errors(inertia_tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
     Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
     corner.
     """
-    nominal = np.array(inertia_coefficients(mass))
-    max_change = np.zeros(12)
+    nominal_coefficients = np.array(inertia_coefficients(mass))
+    max_coefficient_change = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
         changed_inertias = {
-            name: getattr(mass, name) * (1 + tolerance * s)
-            for name, s in zip(_INERTIA_NAMES, signs, strict=True)
+            inertia_name: getattr(mass, inertia_name) * (1 + inertia_tolerance * sign)
+            for inertia_name, sign in zip(_INERTIA_NAMES, signs, strict=True)
         }
         changed_coefficients = np.array(inertia_coefficients(replace(mass, **changed_inertias)))
-        max_change = np.maximum(max_change, np.abs(changed_coefficients - nominal))
-    max_change.flags.writeable = False  # kept: the same for every flight of a design
-    return max_change
+        max_coefficient_change = np.maximum(
+            max_coefficient_change, np.abs(changed_coefficients - nominal_coefficients)
+        )
+    max_coefficient_change.flags.writeable = False  # kept: the same for every flight of a design
+    return max_coefficient_change
 
 
 def configure_uncertainty_bound(
-    bound: np.void, scenario: "Scenario", declared: Declared, design: np.void
+    bound_record: np.void, scenario: "Scenario", declared: Declared, design: np.void
 ) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. design: record of the design model."""
     config, aircraft = scenario.fdi, declared.aircraft
-    bound["inertia_coupling"], bound["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
-    bound["constant_error_bound"] = declared.constant_rad_s2
+    bound_record["inertia_coupling"], bound_record["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
+    bound_record["constant_error_bound"] = declared.constant_rad_s2
     diagnoses_all_types = config.fault_class == "all"
     fill_error_map(
-        bound["model_error_map"], aircraft, diagnoses_all_types, diagnoses_all_types and config.pairs
+        bound_record["model_error_map"], aircraft, diagnoses_all_types, diagnoses_all_types and config.pairs
     )
     if aircraft.file.model_error_map is None:
-        bound["constant_error_bound"] += aircraft.model_error_rad_s2
-    declared_errors = bound["declared_errors"]
+        bound_record["constant_error_bound"] += aircraft.model_error_rad_s2
+    declared_errors = bound_record["declared_errors"]
     fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
     fill_declared_engine_errors(declared_errors, scenario, declared)
-    bound["has_declared_surface_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
+    bound_record["has_declared_surface_errors"] = (
+        declared_errors["has_declared_errors"] and diagnoses_all_types
+    )
 
 
 def fill_declared_errors(
     declared_errors: np.void, declared: Declared, design: np.void, mass: MassProperties
 ) -> None:
     """Fill the declared errors; design, mass: record and mass properties of the design model."""
-    tolerance = declared.coefficients.absolute(declared.aircraft.moments, design["moments"]["value"])
-    declared_errors["coefficient_tolerance"][: tolerance.size] = tolerance
+    coefficient_tolerance = declared.coefficients.absolute(
+        declared.aircraft.moments, design["moments"]["value"]
+    )
+    declared_errors["coefficient_tolerance"][: coefficient_tolerance.size] = coefficient_tolerance
     declared_errors["inertia_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
     declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
-    errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
+    sensor_errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
-    declared_errors["altitude_error_bound_m"] = errors["altitude"].worst
-    declared_errors["altitude_error_share"] = errors["altitude"].slope
-    declared_errors["signal_error_offset"] = errors.each("worst")
-    declared_errors["signal_error_slope"] = errors.each("slope")
-    declared_errors["constant_gyro_error_bound"] = errors.each("steady", AXES)
+    declared_errors["altitude_error_bound_m"] = sensor_errors["altitude"].worst
+    declared_errors["altitude_error_share"] = sensor_errors["altitude"].slope
+    declared_errors["signal_error_offset"] = sensor_errors.each("worst")
+    declared_errors["signal_error_slope"] = sensor_errors.each("slope")
+    declared_errors["constant_gyro_error_bound"] = sensor_errors.each("steady", AXES)
     error_bounds = (
         declared_errors["coefficient_tolerance"],
         declared_errors["inertia_tolerance"],
         declared_errors["deflection_error_bound"],
         declared_errors["air_rotation_bound"],
     )
-    declared_errors["has_declared_errors"] = any(np.any(part) for part in error_bounds) or not errors.is_ideal
+    declared_errors["has_declared_errors"] = (
+        any(np.any(error_bound) for error_bound in error_bounds) or not sensor_errors.is_ideal
+    )
 
 
 def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", declared: Declared) -> None:
@@ -677,17 +734,21 @@ def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", 
 
     The engine may have any setting between the initial one and its highest manifold pressure.
     """
-    sensors = declared.sensors
-    has_instrument_errors = any(not getattr(sensors.declared, name).is_ideal for name in OF_THE_SLIPSTREAM)
+    sensor_errors = declared.sensors
+    has_instrument_errors = any(
+        not getattr(sensor_errors.declared, instrument).is_ideal for instrument in OF_THE_SLIPSTREAM
+    )
     if not (has_instrument_errors and declared.aircraft.has_engine_instruments):
         return
-    initial: Any = scenario.initial
+    initial_condition: Any = scenario.initial
     max_manifold_pressure = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
-    max_readings = dict(zip(ENGINE, (initial.engine_rpm, max_manifold_pressure), strict=True))
-    errors = [sensors[name].of_reading(most) for name, most in max_readings.items()]
+    max_readings = dict(zip(ENGINE, (initial_condition.engine_rpm, max_manifold_pressure), strict=True))
+    reading_error_bounds = [
+        sensor_errors[instrument].of_reading(max_reading) for instrument, max_reading in max_readings.items()
+    ]
     declared_errors["has_engine_errors"] = 1
     declared_errors["engine_power_error_kw"], declared_errors["density_power_error_kw"] = power_error_kw(
-        initial.engine_rpm, max_manifold_pressure, *errors
+        initial_condition.engine_rpm, max_manifold_pressure, *reading_error_bounds
     )
 
 
@@ -710,11 +771,15 @@ def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> 
 
 
 def _detection_pole_per_s(delay_s: float, gyro_error_change_bound: float, eta_bar: float) -> float:
-    phi = eta_bar + 8.0 * gyro_error_change_bound / delay_s
+    smallest_fault_rad_s2 = eta_bar + 8.0 * gyro_error_change_bound / delay_s
     for _ in range(50):
-        pole = max(log(phi * delay_s / gyro_error_change_bound) / delay_s, 0.1 / delay_s)
-        phi = (gyro_error_change_bound * pole + eta_bar) / (1.0 - exp(-pole * delay_s))
-    return pole
+        pole_per_s = max(
+            log(smallest_fault_rad_s2 * delay_s / gyro_error_change_bound) / delay_s, 0.1 / delay_s
+        )
+        smallest_fault_rad_s2 = (gyro_error_change_bound * pole_per_s + eta_bar) / (
+            1.0 - exp(-pole_per_s * delay_s)
+        )
+    return pole_per_s
 
 
 _AXIS_OF_RATE_SIGNAL = dict(zip(RATE_SIGNALS, AXES, strict=True))
@@ -727,24 +792,28 @@ def declared_errors_for_plugin(
     (1,)."""
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
-    aircraft, errors = declared.aircraft, declared.sensors
-    noise, bias, resolution = (errors.each(of_it) for of_it in ("noise", "steady", "resolution"))
-    coefficients = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
+    aircraft, sensor_errors = declared.aircraft, declared.sensors
+    reading_noise_std, reading_bias, reading_resolution = (
+        sensor_errors.each(quantity) for quantity in ("noise", "steady", "resolution")
+    )
+    coefficient_errors = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
     gust_rad_s, gust_time_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
-    air_data_std = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_FIRST_AIR_DATA_SIGNAL_INDEX:]
+    air_data_std = np.sqrt(reading_noise_std**2 + reading_bias**2 + reading_resolution**2 / 12.0)[
+        _FIRST_AIR_DATA_SIGNAL_INDEX:
+    ]
     deflection_rad = declared.actuators.deflection_rad
     return DeclaredErrors(
-        noise=noise,
-        bias=bias,
-        resolution=resolution,
-        slope=errors.each("slope"),
+        noise=reading_noise_std,
+        bias=reading_bias,
+        resolution=reading_resolution,
+        slope=sensor_errors.each("slope"),
         gust_rad_s=gust_rad_s,
         gust_time_s=gust_time_s,
         gust_effect=acceleration_per_air_rotation(DesignFunctions(design.copy()), y),
-        coefficients=coefficients,
+        coefficients=coefficient_errors,
         inertia=declared.inertia,
         deflection_rad=deflection_rad,
-        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficients, deflection_rad),
+        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficient_errors, deflection_rad),
         bandwidth_rad_s=np.array([getattr(actuators, s).bandwidth_rad_s for s in aircraft.surfaces]),
         rate_limit_rad_s=np.radians([getattr(actuators, s).rate_limit_deg_s for s in aircraft.surfaces]),
     )
@@ -752,9 +821,12 @@ def declared_errors_for_plugin(
 
 def acceleration_per_air_rotation(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
-    step = 1e-4
-    columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
-    return -np.column_stack(columns)
+    rate_step_rad_s = 1e-4
+    derivative_columns = [
+        (model.f(rate_step_rad_s * e, y) - model.f(-rate_step_rad_s * e, y)) / (2.0 * rate_step_rad_s)
+        for e in np.eye(3)
+    ]
+    return -np.column_stack(derivative_columns)
 
 
 def model_error_std(
@@ -762,28 +834,30 @@ def model_error_std(
     y: np.ndarray,
     u: np.ndarray,
     air_data_std: np.ndarray,
-    coefficients: np.ndarray,
+    coefficient_errors: np.ndarray,
     deflection_rad: float,
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
-    air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficients: absolute errors.
+    air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficient_errors: absolute.
     """
     nominal_acceleration = _design_acceleration_at_zero_rates(design, y, u)
-    air_data_errors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
-    deviations = [
+    air_data_error_vectors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
+    acceleration_deviations = [
         _design_acceleration_at_zero_rates(design, y + error, u) - nominal_acceleration
-        for error in air_data_errors
+        for error in air_data_error_vectors
     ]
-    deviations += [
+    acceleration_deviations += [
         _design_acceleration_at_zero_rates(design, y, u + deflection_rad * e) - nominal_acceleration
         for e in np.eye(u.size)
     ]
-    for term_index in np.flatnonzero(coefficients):
+    for term_index in np.flatnonzero(coefficient_errors):
         changed_design = design.copy()
-        changed_design["moments"]["value"][0][term_index] += coefficients[term_index]
-        deviations.append(_design_acceleration_at_zero_rates(changed_design, y, u) - nominal_acceleration)
-    return np.sqrt(np.square(deviations).sum(axis=0))
+        changed_design["moments"]["value"][0][term_index] += coefficient_errors[term_index]
+        acceleration_deviations.append(
+            _design_acceleration_at_zero_rates(changed_design, y, u) - nominal_acceleration
+        )
+    return np.sqrt(np.square(acceleration_deviations).sum(axis=0))
 
 
 def _design_acceleration_at_zero_rates(design: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -791,15 +865,18 @@ def _design_acceleration_at_zero_rates(design: np.ndarray, y: np.ndarray, u: np.
     return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
-def flow_angle_in_level_axes_noise_std(errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
+def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps: float) -> np.ndarray:
     """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
     airspeed and attitude. An error of pitch attitude or heading turns the flow as much as an error of a
     vane."""
     cross_axis_share = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
-    vane_noise_std = [hypot(errors[vane].random, errors[angle].random) for vane, angle in vane_attitude_pairs]
+    vane_noise_std = [
+        hypot(sensor_errors[vane].random, sensor_errors[attitude_angle].random)
+        for vane, attitude_angle in vane_attitude_pairs
+    ]
     return np.array(vane_noise_std) + cross_axis_share * (
-        errors["V"].random / airspeed_mps + errors["phi"].random
+        sensor_errors["V"].random / airspeed_mps + sensor_errors["phi"].random
     )
 
 
@@ -808,10 +885,15 @@ def gust_acceleration_noise_std(
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise (2,) rad of the flow's
     angles."""
-    V, span = y[AIRSPEED], span_m
-    pitch_gust_noise, yaw_gust_noise = flow_angle_noise_std * pi * V / (np.array([4.0, 3.0]) * span)
-    damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
-    return np.sqrt((damping[:, 1] * pitch_gust_noise) ** 2 + (damping[:, 2] * yaw_gust_noise) ** 2)
+    V = y[AIRSPEED]
+    pitching_gust_noise_std, yawing_gust_noise_std = (
+        flow_angle_noise_std * pi * V / (np.array([4.0, 3.0]) * span_m)
+    )
+    rate_damping = jacobian(design, np.zeros(3), y, u)[2]  # without rates all of it is aerodynamic
+    return np.sqrt(
+        (rate_damping[:, 1] * pitching_gust_noise_std) ** 2
+        + (rate_damping[:, 2] * yawing_gust_noise_std) ** 2
+    )
 
 
 def moment_axis_of_term(term: Term) -> int:
@@ -824,39 +906,51 @@ def moment_term_tolerances(
 ) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
     (statistical.py); y, u in trim."""
-    aircraft, errors = declared.aircraft, declared.sensors
-    coefficient = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    inertia_error = max_inertia_coefficient_errors(declared.inertia, mass)
-    nominal_inertia = np.abs(inertia_coefficients(mass))
-    own_axis_coefficients = (2, 7, 11)  # what multiplies a moment there
-    relative_tolerance = np.full(
-        coefficient.shape, max(inertia_error[i] / nominal_inertia[i] for i in own_axis_coefficients)
+    aircraft, sensor_errors = declared.aircraft, declared.sensors
+    coefficient_magnitudes = np.abs(design["moments"]["value"][: len(aircraft.moments)])
+    inertia_coefficient_errors = max_inertia_coefficient_errors(declared.inertia, mass)
+    nominal_inertia_coefficients = np.abs(inertia_coefficients(mass))
+    own_axis_coefficient_indices = (2, 7, 11)  # what multiplies a moment there
+    relative_term_tolerances = np.full(
+        coefficient_magnitudes.shape,
+        max(
+            inertia_coefficient_errors[i] / nominal_inertia_coefficients[i]
+            for i in own_axis_coefficient_indices
+        ),
     )
-    relative_tolerance += [_relative_signal_error_of_term(errors, term) for term in aircraft.moments]
-    tolerance = (
-        declared.coefficients.absolute(aircraft.moments, coefficient) + relative_tolerance * coefficient
+    relative_term_tolerances += [
+        _relative_signal_error_of_term(sensor_errors, term) for term in aircraft.moments
+    ]
+    term_tolerances = (
+        declared.coefficients.absolute(aircraft.moments, coefficient_magnitudes)
+        + relative_term_tolerances * coefficient_magnitudes
     )
-    slopes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
+    coefficient_slope_magnitudes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
     span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for name, signal_index, length in zip(AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True):
-        normalised_rate_error = errors[name].steady * length / y[AIRSPEED]
+    for gyro, signal_index, rate_normalisation_length_m in zip(
+        AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True
+    ):
+        normalised_rate_error = sensor_errors[gyro].steady * rate_normalisation_length_m / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                tolerance[k] += normalised_rate_error * slopes[moment_axis_of_term(term), signal_index]
-    return tolerance
+                term_tolerances[k] += (
+                    normalised_rate_error
+                    * coefficient_slope_magnitudes[moment_axis_of_term(term), signal_index]
+                )
+    return term_tolerances
 
 
-def _relative_signal_error_of_term(errors: SensorErrors, term: Term) -> float:
+def _relative_signal_error_of_term(sensor_errors: SensorErrors, term: Term) -> float:
     """Relative error of the signals that a term multiplies, by the slopes of gyros, vanes, airspeed and
     pressure."""
     own_gyro = AXES[
         moment_axis_of_term(term)
     ]  # a gyro's slope is counted once for all terms of its own_gyro axis
-    relative_error = errors[own_gyro].slope + errors["qdyn"].slope
-    for signal, power in term.of:
+    relative_error = sensor_errors[own_gyro].slope + sensor_errors["qdyn"].slope
+    for signal, exponent in term.of:
         if signal in _AXIS_OF_RATE_SIGNAL:
-            relative_error += power * errors["V"].slope
-        sensor_error = errors.get(_AXIS_OF_RATE_SIGNAL.get(signal, signal))
-        if sensor_error is not None and _AXIS_OF_RATE_SIGNAL.get(signal) != own_gyro:
-            relative_error += power * sensor_error.slope
+            relative_error += exponent * sensor_errors["V"].slope
+        signal_errors = sensor_errors.get(_AXIS_OF_RATE_SIGNAL.get(signal, signal))
+        if signal_errors is not None and _AXIS_OF_RATE_SIGNAL.get(signal) != own_gyro:
+            relative_error += exponent * signal_errors.slope
     return relative_error

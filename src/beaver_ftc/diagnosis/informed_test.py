@@ -48,17 +48,19 @@ class WhiteningFilter:
 
     def __init__(self, context: Context) -> None:
         declared, dt = context.declared, context.dt_s
-        time_s = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_ACCELERATION_MEMORY_S)))
-        process_std = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
-        decay_factor = np.exp(-dt / time_s)
+        time_constants_s = np.concatenate(
+            (declared.gust_time_s, np.full(3, UNEXPLAINED_ACCELERATION_MEMORY_S))
+        )
+        stationary_std = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
+        decay_factors = np.exp(-dt / time_constants_s)
         self.F = np.eye(9)
         self.F[:3, 3:6], self.F[:3, 6:] = dt * declared.gust_effect, dt * np.eye(3)
-        self.F[range(3, 9), range(3, 9)] = decay_factor
+        self.F[range(3, 9), range(3, 9)] = decay_factors
         self.dt = dt
         self.R = np.diag(declared.rate_variance(MIN_GYRO_NOISE_STD_RAD_S))
         model_error_variance = (dt * declared.model_rad_s2) ** 2
-        Q = np.diag(np.concatenate((model_error_variance, (1.0 - decay_factor**2) * process_std**2)))
-        P = np.diag(np.concatenate((np.diagonal(self.R), process_std**2)))
+        Q = np.diag(np.concatenate((model_error_variance, (1.0 - decay_factors**2) * stationary_std**2)))
+        P = np.diag(np.concatenate((np.diagonal(self.R), stationary_std**2)))
         for _ in range(_KALMAN_SETTLING_FRAMES):
             P = self._updated_covariance(P)
             P = self.F @ P @ self.F.T + Q
@@ -74,42 +76,47 @@ class WhiteningFilter:
         one."""
         state_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
-        state_response, response = np.zeros((9, *phi.shape[2:])), np.empty_like(phi)
+        state_response, whitened = np.zeros((9, *phi.shape[2:])), np.empty_like(phi)
         for k, acceleration in enumerate(phi):
             state_response = state_transition @ state_response
             state_response[:3] += self.dt * acceleration
-            response[k] = whitener @ state_response[:3]
-        return response
+            whitened[k] = whitener @ state_response[:3]
+        return whitened
 
     def deflection_coefficient(self, phi: np.ndarray) -> np.ndarray:
         """d after each frame, (n,), of a fault phi (n, 3) rad/s2 that begins with the first of them."""
         return np.sqrt(np.cumsum(np.square(self.whitened_response(phi)).sum(axis=1)))
 
     def deflection_coefficient_with_unknowns(
-        self, phi: np.ndarray, regressors: np.ndarray, sigma: np.ndarray
+        self, phi: np.ndarray, regressors: np.ndarray, constant_std: np.ndarray
     ) -> float:
         """d of a fault phi (n, 3) rad/s2 with unknown constants in all frames.
 
-        The constants, of standard deviation sigma (m,) > 0, multiply regressors (n, 3, m).
+        The constants, of standard deviation constant_std (m,) > 0, multiply regressors (n, 3, m).
         """
-        s = self.whitened_response(phi).ravel()
-        R = self.whitened_response(regressors).reshape(s.size, sigma.size) * sigma
-        correlation = R.T @ s
-        squared_deflection = s @ s - correlation @ np.linalg.solve(R.T @ R + np.eye(sigma.size), correlation)
+        whitened_fault = self.whitened_response(phi).ravel()
+        whitened_regressors = (
+            self.whitened_response(regressors).reshape(whitened_fault.size, constant_std.size) * constant_std
+        )
+        regressor_fault_correlation = whitened_regressors.T @ whitened_fault
+        squared_deflection = whitened_fault @ whitened_fault - regressor_fault_correlation @ np.linalg.solve(
+            whitened_regressors.T @ whitened_regressors + np.eye(constant_std.size),
+            regressor_fault_correlation,
+        )
         return float(np.sqrt(max(squared_deflection, 0.0)))
 
 
-def context_with_measured_gust(context: Context, noise_rad_s2: np.ndarray) -> Context:
+def context_with_measured_gust(context: Context, gust_estimate_noise_rad_s2: np.ndarray) -> Context:
     """Return the context of a test that knows the gusts the vanes measure, with noise (3,) rad/s2."""
     declared = context.declared
     if not declared.air:
         return context
-    measured_errors = replace(
+    errors_with_measured_gust = replace(
         declared,
         gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_INTENSITY_SHARES),
-        model_rad_s2=np.hypot(declared.model_rad_s2, noise_rad_s2),
+        model_rad_s2=np.hypot(declared.model_rad_s2, gust_estimate_noise_rad_s2),
     )
-    return replace(context, declared=measured_errors)
+    return replace(context, declared=errors_with_measured_gust)
 
 
 def detection_probability(
@@ -117,26 +124,30 @@ def detection_probability(
 ) -> float:
     """Probability of detection by that test, made once every test_interval_s, at so many false alarms per
     hour."""
-    normal = NormalDist()
+    standard_normal = NormalDist()
     if false_alarms_per_h <= 0.0:
         return 0.0  # noise that has no bound leaves nothing certain
-    return normal.cdf(
-        deflection_coefficient - normal.inv_cdf(1.0 - min(false_alarms_per_h * test_interval_s / 3600.0, 0.5))
+    return standard_normal.cdf(
+        deflection_coefficient
+        - standard_normal.inv_cdf(1.0 - min(false_alarms_per_h * test_interval_s / 3600.0, 0.5))
     )
 
 
 def healthy_surface_positions(context: Context, log_columns: FlightColumns, surface: str) -> np.ndarray:
     """Return the positions of a healthy surface under the commands of a flight, (frames,) rad."""
-    s, command = context.surfaces.index(surface), log_columns[f"{surface}_cmd_rad"]
-    bandwidth, rate = context.declared.bandwidth_rad_s[s], context.declared.rate_limit_rad_s[s]
-    approach_share = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
-    max_step = rate * context.dt_s if rate else np.inf
-    low, high = context.travel_rad[:, s]
-    position, positions = log_columns[f"{surface}_effective_rad"][0], np.empty_like(command)
-    for k, commanded in enumerate(np.clip(command, low, high)):
-        position += min(max((commanded - position) * approach_share, -max_step), max_step)
-        positions[k] = position
-    return positions
+    s, command_rad = context.surfaces.index(surface), log_columns[f"{surface}_cmd_rad"]
+    bandwidth_rad_s = context.declared.bandwidth_rad_s[s]
+    rate_limit_rad_s = context.declared.rate_limit_rad_s[s]
+    step_share_of_difference = 1.0 - np.exp(-bandwidth_rad_s * context.dt_s) if bandwidth_rad_s else 1.0
+    max_step_rad = rate_limit_rad_s * context.dt_s if rate_limit_rad_s else np.inf
+    travel_min_rad, travel_max_rad = context.travel_rad[:, s]
+    position_rad, positions_rad = log_columns[f"{surface}_effective_rad"][0], np.empty_like(command_rad)
+    for k, limited_command_rad in enumerate(np.clip(command_rad, travel_min_rad, travel_max_rad)):
+        position_rad += min(
+            max((limited_command_rad - position_rad) * step_share_of_difference, -max_step_rad), max_step_rad
+        )
+        positions_rad[k] = position_rad
+    return positions_rad
 
 
 def unit_term_acceleration(
@@ -145,21 +156,21 @@ def unit_term_acceleration(
     """Compute the acceleration by a coefficient of one, (frames, 3) rad/s2; deflection_rad: of its
     surface."""
     V, geometry, inertia = log_columns["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
-    factor_values: dict[str | None, Any] = {
+    value_by_factor: dict[str | None, Any] = {
         **{name: log_columns[name] for name in aircraft.signals},
         "alpha": log_columns["alpha_rad"], "beta": log_columns["beta_rad"],
         "ph": log_columns["p_rad_s"] * geometry.span_m / (2.0 * V),
         "qh": log_columns["q_rad_s"] * geometry.chord_m / V,
         "rh": log_columns["r_rad_s"] * geometry.span_m / (2.0 * V), term.surface: deflection_rad,
     }  # fmt: skip
-    unit_force = (
+    force_per_coefficient = (
         log_columns["qdyn_pa"]
         * geometry.wing_area_m2
-        * prod(factor_values[factor] for factor in term.factors)
+        * prod(value_by_factor[factor] for factor in term.factors)
     )
     acceleration_per_force = {
         "Cl": (inertia.Pl * geometry.span_m, 0.0, inertia.Rl * geometry.span_m),
         "Cm": (0.0, inertia.Qm * geometry.chord_m, 0.0),
         "Cn": (inertia.Pn * geometry.span_m, 0.0, inertia.Rn * geometry.span_m),
     }[term.coefficient]
-    return np.multiply.outer(unit_force, acceleration_per_force)
+    return np.multiply.outer(force_per_coefficient, acceleration_per_force)

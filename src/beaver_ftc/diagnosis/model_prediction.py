@@ -71,14 +71,16 @@ def configure_prediction(prediction: np.void, scenario: Scenario, travel: np.nda
     """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
     prediction["frame_share_per_instant"] = 1.0 / scenario.substeps
     prediction["design"] = design_of(scenario.design_model, scenario.airframe)[0]
-    actuators, instant_s = prediction["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
+    actuators, instant_interval_s = prediction["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
     actuators["real"] = not scenario.actuators.is_ideal
     actuators["low"], actuators["high"] = travel
     for s, surface in enumerate(scenario.airframe.surfaces):
         actuator = getattr(scenario.actuators, surface)
-        bandwidth, rate_limit = actuator.bandwidth_rad_s, radians(actuator.rate_limit_deg_s)
-        actuators["approach"][s] = 1.0 - exp(-bandwidth * instant_s) if bandwidth else 1.0
-        actuators["step"][s] = rate_limit * instant_s if rate_limit else np.inf
+        bandwidth_rad_s, rate_limit_rad_s = actuator.bandwidth_rad_s, radians(actuator.rate_limit_deg_s)
+        actuators["approach"][s] = (
+            1.0 - exp(-bandwidth_rad_s * instant_interval_s) if bandwidth_rad_s else 1.0
+        )
+        actuators["step"][s] = rate_limit_rad_s * instant_interval_s if rate_limit_rad_s else np.inf
 
 
 @kernel
@@ -88,65 +90,71 @@ def evaluate_design_model(prediction, measured):
 
 
 @kernel
-def add_instant_to_sums(prediction, bound, layout, diagnoses_all_types):
+def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
     """Add this instant to the sums over the frame and, for faults of `diagnoses_all_types`, to the
     extremes."""
     sums, G, u = prediction.sums, prediction.G, prediction.u
     for i in range(3):
         sums.f[i] += prediction.f[i]
-        sums.eta_bar[i] += bound.eta_bar_now[i]
+        sums.eta_bar[i] += bound_record.eta_bar_now[i]
         for s in range(u.size):
             sums.G[i, s] += G[i, s]
             sums.Gu[i, s] += G[i, s] * u[s]
-            if bound.has_declared_surface_errors:
-                sums.surface_error_per_rad[i, s] += bound.declared_errors.acceleration_error_per_rad[i, s]
-                sums.surface_error_at_command[i, s] += bound.declared_errors.acceleration_error_per_rad[
+            if bound_record.has_declared_surface_errors:
+                sums.surface_error_per_rad[i, s] += bound_record.declared_errors.acceleration_error_per_rad[
                     i, s
-                ] * abs(u[s])
-    if bound.model_error_map.one_surface_may_be_anywhere:
-        for j in range(bound.model_error_map.n_levels):
+                ]
+                sums.surface_error_at_command[i, s] += (
+                    bound_record.declared_errors.acceleration_error_per_rad[i, s] * abs(u[s])
+                )
+    if bound_record.model_error_map.one_surface_may_be_anywhere:
+        for j in range(bound_record.model_error_map.n_levels):
             for i in range(3):
-                bound.additional_error_by_travel_level[j, i] += (
+                bound_record.additional_error_by_travel_level[j, i] += (
                     prediction.frame_share_per_instant
-                    * additional_error_at_travel_level(bound.model_error_map, j, i)
+                    * additional_error_at_travel_level(bound_record.model_error_map, j, i)
                 )
     if diagnoses_all_types:
         for s, axis in enumerate(layout.dominant_axis):
-            effectiveness = G[axis, s]
-            sums.G_min[s] = min(sums.G_min[s], effectiveness)
-            sums.G_max[s] = max(sums.G_max[s], effectiveness)
+            dominant_axis_effectiveness = G[axis, s]
+            sums.G_min[s] = min(sums.G_min[s], dominant_axis_effectiveness)
+            sums.G_max[s] = max(sums.G_max[s], dominant_axis_effectiveness)
             sums.u_min[s], sums.u_max[s] = min(sums.u_min[s], u[s]), max(sums.u_max[s], u[s])
 
 
 @kernel
-def fill_frame_means(prediction, bound):
+def fill_frame_means(prediction, bound_record):
     """Fill the means over the elapsed frame: G, the effect G u of each surface, f + G u, and the bound."""
-    frame_share, sums, means = prediction.frame_share_per_instant, prediction.sums, prediction.frame_means
+    frame_share_per_instant = prediction.frame_share_per_instant
+    sums = prediction.sums
+    frame_means = prediction.frame_means
     for i in range(3):
-        acceleration = frame_share * sums.f[i]
+        acceleration = frame_share_per_instant * sums.f[i]
         for s in range(prediction.u.size):
-            means.previous_G[i, s] = means.G[i, s]
-            means.G[i, s] = frame_share * sums.G[i, s]
-            means.Gu[i, s] = frame_share * sums.Gu[i, s]
-            acceleration += means.Gu[i, s]
-        means.acceleration[i] = acceleration
-        bound.eta_bar[i] = frame_share * sums.eta_bar[i]
-    means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
-    means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
-    if bound.has_declared_surface_errors:
-        bound.surface_error_per_rad[:] = frame_share * sums.surface_error_per_rad
-        bound.surface_error_at_command[:] = frame_share * sums.surface_error_at_command
-    if frame_share < 1.0:
+            frame_means.previous_G[i, s] = frame_means.G[i, s]
+            frame_means.G[i, s] = frame_share_per_instant * sums.G[i, s]
+            frame_means.Gu[i, s] = frame_share_per_instant * sums.Gu[i, s]
+            acceleration += frame_means.Gu[i, s]
+        frame_means.acceleration[i] = acceleration
+        bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
+    frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
+    frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max
+    if bound_record.has_declared_surface_errors:
+        bound_record.surface_error_per_rad[:] = frame_share_per_instant * sums.surface_error_per_rad
+        bound_record.surface_error_at_command[:] = frame_share_per_instant * sums.surface_error_at_command
+    if frame_share_per_instant < 1.0:
         fill_effect_tolerance_for_fault_change(prediction)
 
 
 @kernel
-def fill_surface_effects_with_previous_G(means):
+def fill_surface_effects_with_previous_G(frame_means):
     """Fill `Gu_with_previous_G` (3, n) rad/s2: the effect of each surface with G of the frame before."""
     for i in range(3):
-        for s in range(means.G_min.size):
-            effectiveness_ratio = means.previous_G[i, s] / means.G[i, s] if means.G[i, s] != 0.0 else 0.0
-            means.Gu_with_previous_G[i, s] = effectiveness_ratio * means.Gu[i, s]
+        for s in range(frame_means.G_min.size):
+            previous_over_present_G = (
+                frame_means.previous_G[i, s] / frame_means.G[i, s] if frame_means.G[i, s] != 0.0 else 0.0
+            )
+            frame_means.Gu_with_previous_G[i, s] = previous_over_present_G * frame_means.Gu[i, s]
 
 
 @kernel
@@ -158,60 +166,64 @@ def fill_effect_tolerance_for_fault_change(prediction):
     are the effects of a healthy surface in the first and in the other n - 1 steps. The mean effect of the
     fault then exceeds the extremes for the mean of z0 and z by at most |z0 - z| / n.
     """
-    frame_share, sums = prediction.frame_share_per_instant, prediction.sums
+    frame_share_per_instant, sums = prediction.frame_share_per_instant, prediction.sums
     for i in range(3):
         for s in range(prediction.u.size):
-            first_effect = sums.first_instant_Gu[i, s]
-            mean_effect_of_others = (sums.Gu[i, s] - first_effect) * frame_share / (1.0 - frame_share)
-            prediction.frame_means.Gu_tolerance_for_fault_change[i, s] = frame_share * abs(
-                first_effect - mean_effect_of_others
+            first_instant_effect = sums.first_instant_Gu[i, s]
+            mean_effect_of_other_instants = (
+                (sums.Gu[i, s] - first_instant_effect)
+                * frame_share_per_instant
+                / (1.0 - frame_share_per_instant)
+            )
+            prediction.frame_means.Gu_tolerance_for_fault_change[i, s] = frame_share_per_instant * abs(
+                first_instant_effect - mean_effect_of_other_instants
             )
 
 
 @kernel
-def evaluate_bound_and_frame_means(prediction, bound, measured, k, dt):
+def evaluate_bound_and_frame_means(prediction, bound_record, measured, k, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
-    bound.model_error_map.time_s = k * dt
-    fill_uncertainty_bound_now(bound, prediction.design, measured, prediction.u)
-    bound.eta_bar[:] = bound.eta_bar_now
-    if bound.declared_errors.has_declared_errors:
+    bound_record.model_error_map.time_s = k * dt
+    fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
+    bound_record.eta_bar[:] = bound_record.eta_bar_now
+    if bound_record.declared_errors.has_declared_errors:
         for i in range(3):
-            bound.gyro_error_change_bound[i] = changing_gyro_error_bound(
-                bound.declared_errors, i, measured.x[i]
+            bound_record.gyro_error_change_bound[i] = changing_gyro_error_bound(
+                bound_record.declared_errors, i, measured.x[i]
             )
     if k > 0:
-        fill_frame_means(prediction, bound)
+        fill_frame_means(prediction, bound_record)
 
 
 @kernel
-def begin_frame_sums(prediction, bound, layout, diagnoses_all_types, measured):
+def begin_frame_sums(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
     prediction.x_before[:] = measured.x
-    bound.gyro_error_change_bound_before[:] = bound.gyro_error_change_bound
+    bound_record.gyro_error_change_bound_before[:] = bound_record.gyro_error_change_bound
     sums = prediction.sums
     sums.f[:], sums.eta_bar[:] = 0.0, 0.0
     sums.G[:], sums.Gu[:] = 0.0, 0.0
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
-    if bound.has_declared_surface_errors:
+    if bound_record.has_declared_surface_errors:
         sums.surface_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
-    bound.additional_error_by_travel_level[:] = 0.0
-    add_instant_to_sums(prediction, bound, layout, diagnoses_all_types)
+    bound_record.additional_error_by_travel_level[:] = 0.0
+    add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu
 
 
 @kernel
-def move_healthy_surfaces_otherwise(prediction, command):
+def repeat_move_of_healthy_surfaces(prediction, command):
     """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
     prediction.u[:] = prediction.u_before
     move_healthy_surfaces(prediction, command)
 
 
 @kernel
-def add_instant_to_frame(prediction, bound, layout, diagnoses_all_types, measured):
+def add_instant_to_frame(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
-    fill_uncertainty_bound_now(bound, prediction.design, measured, prediction.u)
-    add_instant_to_sums(prediction, bound, layout, diagnoses_all_types)
+    fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
+    add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
     move(prediction.actuators, prediction.commanded, prediction.u)
 
 
@@ -223,27 +235,27 @@ def predict_acceleration(prediction, include_known_faults, effectiveness, deflec
     effectiveness (n,): estimate for each surface; deflection_bias (n,) rad: its bias, used if
     `include_biases`.
     """
-    acceleration, means = prediction.acceleration_with_known_faults, prediction.frame_means
-    acceleration[:] = means.acceleration
+    acceleration, frame_means = prediction.acceleration_with_known_faults, prediction.frame_means
+    acceleration[:] = frame_means.acceleration
     if not include_known_faults:
         return
     for s in range(effectiveness.size):
-        lost_effectiveness = 1.0 - effectiveness[s]
+        lost_effectiveness_share = 1.0 - effectiveness[s]
         for i in range(3):
-            acceleration[i] -= lost_effectiveness * means.Gu[i, s]
+            acceleration[i] -= lost_effectiveness_share * frame_means.Gu[i, s]
     if include_biases:
         for s in range(deflection_bias.size):
             for i in range(3):
-                acceleration[i] += means.G[i, s] * deflection_bias[s]
+                acceleration[i] += frame_means.G[i, s] * deflection_bias[s]
 
 
 @kernel
-def form_innovation_after_known_faults(prediction, rates, dt):
-    """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; rates (3,) rad/s:
-    now."""
+def form_innovation_after_known_faults(prediction, measured_rates, dt):
+    """Fill `innovation_after_known_faults` (3,) rad/s2 of the elapsed frame, of dt s; measured_rates
+    (3,) rad/s: now."""
     for i in range(3):
         prediction.innovation_after_known_faults[i] = (
-            rates[i] - prediction.x_before[i]
+            measured_rates[i] - prediction.x_before[i]
         ) / dt - prediction.acceleration_with_known_faults[i]
 
 

@@ -300,7 +300,7 @@ class DiagnosisReadout:
         """The design model's error here, where the aircraft maps it."""
         model_error_map = self._fdi["bound"]["model_error_map"]
         return MappedModelError(
-            not model_error_map["is_outside_all_boxes"], model_error_map["error_now"].copy()
+            not model_error_map["is_outside_all_boxes"], model_error_map["error_bound_now"].copy()
         )
 
     @cached_property

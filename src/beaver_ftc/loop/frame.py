@@ -28,7 +28,11 @@ from beaver_ftc.control.autopilot import SPEED, record_deviations, steer
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
-from beaver_ftc.diagnosis.bounds import N_MAP_COORDINATES, error_map_time_row, is_coordinate_outside_all_boxes
+from beaver_ftc.diagnosis.bounds import (
+    N_MAP_COORDINATES,
+    error_map_time_row_index,
+    is_coordinate_outside_all_boxes,
+)
 from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
@@ -215,7 +219,7 @@ def note_inconclusive(inconclusive, fdi, t):
     inconclusive.frames += 1
     if not enabled:
         inconclusive.undiagnosed += 1
-    elif error_map_time_row(error_map) < 0:
+    elif error_map_time_row_index(error_map) < 0:
         inconclusive.late += 1
     else:
         note_place(inconclusive, error_map)

@@ -53,7 +53,7 @@ class Mapped(DesignPlant):
         at = self.u.copy()
         at[self.surface] = self.position(self.k, self.u[self.surface])
         used = np.max(at / np.where(at > 0, TRAVEL_RAD[1], TRAVEL_RAD[0]))
-        more = np.maximum(ERROR[np.searchsorted(SHARE[:2], used)] - self.map["error_now"], 0.0)
+        more = np.maximum(ERROR[np.searchsorted(SHARE[:2], used)] - self.map["error_bound_now"], 0.0)
         signs = np.sign(np.random.default_rng((self.k // 9, 7)).uniform(-1, 1, 3))
         return G @ (at - self.u) + signs * more
 
@@ -116,7 +116,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     (
         bound["model_error_map"]["one_surface_may_be_anywhere"],
         bound["model_error_map"]["n_levels"],
-        bound["model_error_map"]["travel_share"][:3],
+        bound["model_error_map"]["travel_share_by_level"][:3],
     ) = (
         1,
         3,

@@ -128,23 +128,25 @@ def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ..
     return (config.detection_pole_per_s, *added_poles_per_s)[:MAX_POLES]
 
 
-def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
+def configure_bank(filter_bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
     """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
     poles_per_s = filter_poles_per_s(config, declared)
-    bank["config"]["n_filters"] = len(poles_per_s)
-    bank["config"]["decay_factor"][: len(poles_per_s)] = [exp(-pole_per_s * dt) for pole_per_s in poles_per_s]
+    filter_bank["config"]["n_filters"] = len(poles_per_s)
+    filter_bank["config"]["decay_factor"][: len(poles_per_s)] = [
+        exp(-pole_per_s * dt) for pole_per_s in poles_per_s
+    ]
 
 
 @kernel
-def start_bank(bank, gyro_error_change_bound):
+def start_bank(filter_bank, gyro_error_change_bound):
     """Start with the full bound on the change of the gyros' errors, gyro_error_change_bound (3,) rad/s."""
-    bank.memory.threshold_gyro_error_part[: bank.config.n_filters] = gyro_error_change_bound
+    filter_bank.memory.threshold_gyro_error_part[: filter_bank.config.n_filters] = gyro_error_change_bound
 
 
 @kernel
-def set_constant_published_filter_threshold(bank, threshold):
+def set_constant_published_filter_threshold(filter_bank, threshold):
     """Replace the threshold of the published filter by a constant, rad/s."""
-    bank.output.threshold[0] = threshold
+    filter_bank.output.threshold[0] = threshold
 
 
 @kernel
@@ -164,82 +166,83 @@ def set_parity_directions(isolation, G):
 
 
 @kernel
-def update_bank(bank, bound, x, x_before, predicted_acceleration, dt):
+def update_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
     x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the
-    healthy aircraft, mean over the frame. bound: of `bound_dtype`; dt s.
+    healthy aircraft, mean over the frame. bound_record: of `bound_dtype`; dt s.
     """
     for i in range(3):
-        bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
-        bound.frame_innovation_bound[i] = (
-            bound.eta_bar[i]
-            + (bound.gyro_error_change_bound[i] + bound.gyro_error_change_bound_before[i]) / dt
+        filter_bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
+        bound_record.frame_innovation_bound[i] = (
+            bound_record.eta_bar[i]
+            + (bound_record.gyro_error_change_bound[i] + bound_record.gyro_error_change_bound_before[i]) / dt
         )
-        for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
-            bank.output.residual[m, i] = (
-                decay_factor * bank.output.residual[m, i] + dt * bank.output.innovation[i]
+        for m, decay_factor in enumerate(filter_bank.config.decay_factor[: filter_bank.config.n_filters]):
+            filter_bank.output.residual[m, i] = (
+                decay_factor * filter_bank.output.residual[m, i] + dt * filter_bank.output.innovation[i]
             )
-            bank.memory.threshold_uncertainty_part[m, i] = advance_residual_bound(
-                bank.memory.threshold_uncertainty_part[m, i], bound.eta_bar[i], decay_factor, dt
+            filter_bank.memory.threshold_uncertainty_part[m, i] = advance_residual_bound(
+                filter_bank.memory.threshold_uncertainty_part[m, i], bound_record.eta_bar[i], decay_factor, dt
             )
-            bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
-                bank.memory.threshold_gyro_error_part[m, i],
-                bound.gyro_error_change_bound_before[i],
+            filter_bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
+                filter_bank.memory.threshold_gyro_error_part[m, i],
+                bound_record.gyro_error_change_bound_before[i],
                 decay_factor,
             )
-            bank.output.threshold[m, i] = (
-                bank.memory.threshold_uncertainty_part[m, i]
-                + bank.memory.threshold_gyro_error_part[m, i]
-                + bound.gyro_error_change_bound[i]
+            filter_bank.output.threshold[m, i] = (
+                filter_bank.memory.threshold_uncertainty_part[m, i]
+                + filter_bank.memory.threshold_gyro_error_part[m, i]
+                + bound_record.gyro_error_change_bound[i]
             )
 
 
 @kernel
-def bank_alarm_axis(bank):
+def bank_alarm_axis(filter_bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(bank.config.n_filters):
-            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
+        for m in range(filter_bank.config.n_filters):
+            if abs(filter_bank.output.residual[m, i]) > filter_bank.output.threshold[m, i]:
                 return i
     return -1
 
 
 @kernel
-def residual_threshold_ratio(bank, m, i):
+def residual_threshold_ratio(filter_bank, m, i):
     """The share of its bound that filter m reaches on axis i."""
-    threshold = bank.output.threshold[m, i]
-    return abs(bank.output.residual[m, i]) / threshold if threshold > 0.0 else 0.0
+    threshold = filter_bank.output.threshold[m, i]
+    return abs(filter_bank.output.residual[m, i]) / threshold if threshold > 0.0 else 0.0
 
 
 @kernel
-def filter_nearest_to_alarm(bank, i):
+def filter_nearest_to_alarm(filter_bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
     m_nearest, max_ratio = 0, 0.0
-    for m in range(bank.config.n_filters):
-        ratio = residual_threshold_ratio(bank, m, i)
+    for m in range(filter_bank.config.n_filters):
+        ratio = residual_threshold_ratio(filter_bank, m, i)
         if ratio > max_ratio:
             m_nearest, max_ratio = m, ratio
     return m_nearest
 
 
 @kernel
-def max_residual_threshold_ratio(bank):
+def max_residual_threshold_ratio(filter_bank):
     """The largest share of its bound that a filter of the bank reaches."""
     max_ratio = 0.0
-    for m in range(bank.config.n_filters):
+    for m in range(filter_bank.config.n_filters):
         for i in range(3):
-            max_ratio = max(max_ratio, residual_threshold_ratio(bank, m, i))
+            max_ratio = max(max_ratio, residual_threshold_ratio(filter_bank, m, i))
     return max_ratio
 
 
 @kernel
-def update_max_residual_over_threshold(bank):
+def update_max_residual_over_threshold(filter_bank):
     """Keep the largest share of its bound that each filter has reached."""
-    for m in range(bank.config.n_filters):
+    for m in range(filter_bank.config.n_filters):
         for i in range(3):
-            bank.output.max_residual_over_threshold_so_far[m] = max(
-                bank.output.max_residual_over_threshold_so_far[m], residual_threshold_ratio(bank, m, i)
+            filter_bank.output.max_residual_over_threshold_so_far[m] = max(
+                filter_bank.output.max_residual_over_threshold_so_far[m],
+                residual_threshold_ratio(filter_bank, m, i),
             )
 
 
@@ -278,7 +281,7 @@ def fault_acceleration_range_along_parity(fie):
 
 
 @kernel
-def advance_reachable_residuals(bank, fie, dt):
+def advance_reachable_residuals(filter_bank, fie, dt):
     """Advance the reach of the fault in each filter since the flight began; index 3: `parity_direction`."""
     for axis_or_parity in range(4):
         acceleration_low, acceleration_high = (
@@ -286,7 +289,7 @@ def advance_reachable_residuals(bank, fie, dt):
             if axis_or_parity < 3
             else fault_acceleration_range_along_parity(fie)
         )
-        for m, decay_factor in enumerate(bank.config.decay_factor[: bank.config.n_filters]):
+        for m, decay_factor in enumerate(filter_bank.config.decay_factor[: filter_bank.config.n_filters]):
             fie.reachable_bank_residual_low[m, axis_or_parity] = (
                 decay_factor * fie.reachable_bank_residual_low[m, axis_or_parity] + dt * acceleration_low
             )
@@ -296,16 +299,16 @@ def advance_reachable_residuals(bank, fie, dt):
 
 
 @kernel
-def are_residuals_reachable(bank, fie, axes_share_theta):
+def are_residuals_reachable(filter_bank, fie, axes_share_theta):
     """True if the residuals are within the reach of the fault, for any course of it since the flight began.
 
     axes_share_theta: the axes share one parameter; the residual along `parity_direction` is then tested as
     well.
     """
-    for m in range(bank.config.n_filters):
+    for m in range(filter_bank.config.n_filters):
         parity_residual, parity_threshold = 0.0, 0.0
         for i in range(3):
-            residual, threshold = bank.output.residual[m, i], bank.output.threshold[m, i]
+            residual, threshold = filter_bank.output.residual[m, i], filter_bank.output.threshold[m, i]
             if (
                 not fie.reachable_bank_residual_low[m, i] - threshold
                 <= residual
@@ -477,19 +480,19 @@ def form_fdae_residual(fdae, x):
 
 
 @kernel
-def alarm_axis(bank, authority, statistical_alarm):
+def alarm_axis(filter_bank, authority, statistical_alarm):
     """The axis on which a detector in authority raises the alarm, or -1.
 
     statistical_alarm: `ALARM` of the statistical detector.
     """
-    axis = bank_alarm_axis(bank) if authority != STATISTICAL_DETECTOR else -1
+    axis = bank_alarm_axis(filter_bank) if authority != STATISTICAL_DETECTOR else -1
     if axis < 0 and authority != WORST_CASE_DETECTOR and statistical_alarm.score_over_alarm_level > 1.0:
         axis = statistical_alarm.axis
     return axis
 
 
 @kernel
-def advance_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
+def advance_fdae(fdae, bound_record, x, predicted_acceleration, is_fault_detected, do_weights_leak, dt):
     """Advance the FDAE and its threshold by one frame; once `is_fault_detected`, the network learns what
     exceeds the threshold.
 
@@ -502,15 +505,17 @@ def advance_fdae(fdae, bound, x, predicted_acceleration, is_fault_detected, do_w
         decay_factor = fdae.config.decay_factor[i]
         fdae.memory.xhat[i] = x[i] + dt * estimated_acceleration + decay_factor * (fdae.memory.xhat[i] - x[i])
         fdae.memory.threshold_uncertainty_part[i] = advance_residual_bound(
-            fdae.memory.threshold_uncertainty_part[i], bound.eta_bar[i], decay_factor, dt
+            fdae.memory.threshold_uncertainty_part[i], bound_record.eta_bar[i], decay_factor, dt
         )
         fdae.memory.threshold_gyro_error_part[i] = advance_gyro_error_bound(
-            fdae.memory.threshold_gyro_error_part[i], bound.gyro_error_change_bound_before[i], decay_factor
+            fdae.memory.threshold_gyro_error_part[i],
+            bound_record.gyro_error_change_bound_before[i],
+            decay_factor,
         )
         fdae.output.threshold[i] = (
             fdae.memory.threshold_uncertainty_part[i]
             + fdae.memory.threshold_gyro_error_part[i]
-            + bound.gyro_error_change_bound[i]
+            + bound_record.gyro_error_change_bound[i]
         )
 
 

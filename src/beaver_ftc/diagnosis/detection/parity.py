@@ -432,7 +432,7 @@ def innovation_component(view, forces, gust, inertial_gust, innovation, componen
 
 
 @kernel
-def column_entry_and_error(view, forces, bound, G, plane_axis_index):
+def column_entry_and_error(view, forces, bound_record, G, plane_axis_index):
     """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     component, s = view.plane_axes[plane_axis_index], view.orthogonal_to_surface
     if s == VANE_VIEW:
@@ -445,12 +445,14 @@ def column_entry_and_error(view, forces, bound, G, plane_axis_index):
         return force.previous_scaled_force_per_surface_rad[s], force.scaled_force_per_surface_rad_error_bound[
             s
         ]
-    error_bound = bound.surface_error_per_rad[component, s] if bound.has_declared_surface_errors else 0.0
+    error_bound = (
+        bound_record.surface_error_per_rad[component, s] if bound_record.has_declared_surface_errors else 0.0
+    )
     return G[component, s], error_bound
 
 
 @kernel
-def set_view_direction_and_return_leak_share(view, forces, gust, bound, G):
+def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G):
     """Fill `direction` and `unit_column` (5,) of a view across a column of G (3, n) rad/s2 per rad.
 
     Returns the share of the innovation along the column that errors of the column let leak into the view.
@@ -458,8 +460,8 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound, G):
     if view.is_orthogonal_to_rolling_gust:
         return set_direction_across_vane_and_rolling_gust(view, forces, gust)
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
-    first_entry, first_error_bound = column_entry_and_error(view, forces, bound, G, 0)
-    second_entry, second_error_bound = column_entry_and_error(view, forces, bound, G, 1)
+    first_entry, first_error_bound = column_entry_and_error(view, forces, bound_record, G, 0)
+    second_entry, second_error_bound = column_entry_and_error(view, forces, bound_record, G, 1)
     column_length = np.sqrt(first_entry * first_entry + second_entry * second_entry)
     if column_length == 0.0:
         return 0.0
@@ -661,7 +663,7 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
 
 
 @kernel
-def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
+def update_view_directions_and_signatures(views, forces, gust, bound_record, G, Gu):
     """Bring the direction and the signatures of each view to this frame.
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
@@ -672,7 +674,7 @@ def update_view_directions_and_signatures(views, forces, gust, bound, G, Gu):
         )
         if view.is_used:
             view.column_leak_share = (
-                set_view_direction_and_return_leak_share(view, forces, gust, bound, G)
+                set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G)
                 if view.orthogonal_to_surface != AXIS_VIEW
                 else 0.0
             )

@@ -896,10 +896,10 @@ def estimate_loss(blocks, surface):
 
 
 @kernel
-def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measured, u, dt):
+def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt):
     """Prepare the next frame, of dt s: gust, regressors, drift and model noise at this instant.
 
-    bound: the declared bounds; u (n,) rad: positions of healthy surfaces.
+    bound_record: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
     if gust.output.accounts_for_gusts:
@@ -911,14 +911,14 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound, design, measure
             test_config.frame_share_per_instant,
             noise_model,
             blocks,
-            bound.declared_errors,
+            bound_record.declared_errors,
             design,
             measured,
             u,
         )
-    fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measured, dt)
-    if bound.model_error_map.n_boxes > 0:
-        update_uncertainty_change(noise_model, blocks, bound.model_error_map, u)
+    fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt)
+    if bound_record.model_error_map.n_boxes > 0:
+        update_uncertainty_change(noise_model, blocks, bound_record.model_error_map, u)
     if gust.output.accounts_for_gusts:
         gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
@@ -943,7 +943,7 @@ def update_uncertainty_change(noise_model, blocks, error_map, u):
 
 
 @kernel
-def add_instant_to_tests(test_config, noise_model, blocks, gust, bound, design, measured, u, dt):
+def add_instant_to_tests(test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if gust.output.accounts_for_gusts:
         gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
@@ -952,7 +952,7 @@ def add_instant_to_tests(test_config, noise_model, blocks, gust, bound, design, 
             test_config.frame_share_per_instant,
             noise_model,
             blocks,
-            bound.declared_errors,
+            bound_record.declared_errors,
             design,
             measured,
             u,
@@ -972,7 +972,7 @@ def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors
 
 
 @kernel
-def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measured, dt):
+def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt):
     """Fill drift intensity and model noise of each block: for the bounded uncertainty and the unmeasured
     gust."""
     uncertainty_bound, V = noise_model.uncertainty_bound, measured.y[AIRSPEED]
@@ -980,19 +980,21 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound, design, measure
     add_published_bound(
         measured.x,
         design,
-        bound.inertia_coupling,
-        bound.constant_error_bound,
-        bound.earth_rate_rad_s,
+        bound_record.inertia_coupling,
+        bound_record.constant_error_bound,
+        bound_record.earth_rate_rad_s,
         uncertainty_bound,
     )
-    has_error_map = bound.model_error_map.n_boxes > 0
+    has_error_map = bound_record.model_error_map.n_boxes > 0
     for i in range(3):
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
         if has_error_map:
-            uncertainty_bound[i] += min(bound.model_error_map.error_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2)
-        if bound.model_error_map.one_surface_may_be_anywhere:
+            uncertainty_bound[i] += min(
+                bound_record.model_error_map.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
+            )
+        if bound_record.model_error_map.one_surface_may_be_anywhere:
             noise_model.additional_bound_for_surface_anywhere[i] = additional_error_at_travel_level(
-                bound.model_error_map, bound.model_error_map.n_levels - 1, i
+                bound_record.model_error_map, bound_record.model_error_map.n_levels - 1, i
             )
     for block_index, block in enumerate(blocks):
         for i, axis in enumerate(block.axes[: block.n_axes]):

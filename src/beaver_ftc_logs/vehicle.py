@@ -48,9 +48,8 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class QuantityColumn(Section):
-    """A column of the log. Its value in the given unit is scale times the number in the log, plus offset. If
-    a column has its SI unit, its name alone can be written instead of this section.
-    """
+    """A column of the log. Its value in `unit` is `scale` times the number in the log, plus `offset`. If the
+    numbers in the log are in the SI unit, write only the name of the column instead of this section."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
     unit: Literal[tuple(KIND_AND_SI_FACTOR_OF_UNIT)] | None = Field(  # type: ignore[valid-type]
@@ -62,7 +61,7 @@ class QuantityColumn(Section):
     offset: Number = number(
         0.0,
         unit="as the column",
-        says="constant that is added after the multiplication by scale",
+        says="constant that is added after the multiplication by `scale`",
         range="any",
         examples=[-1.5],
     )
@@ -100,7 +99,7 @@ QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_
 
 
 class TimeColumn(Section):
-    """The column of a table with the time."""
+    """The column of a table that contains the time."""
 
     column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
     unit: Literal[tuple(SECONDS_PER_TIME_UNIT)] = Field(  # type: ignore[valid-type]
@@ -109,7 +108,7 @@ class TimeColumn(Section):
 
 
 class RateColumns(Section):
-    """The columns of the three body rates, rad/s."""
+    """The columns of the three body rates. Without `unit`, the numbers are in rad/s."""
 
     p: QuantityColumnOrName = Field(description="column of the roll rate, rad/s", examples=["p_rad_s"])
     q: QuantityColumnOrName = Field(description="column of the pitch rate, rad/s", examples=["q_rad_s"])
@@ -117,8 +116,8 @@ class RateColumns(Section):
 
 
 class AttitudeColumns(Section):
-    """Columns of the attitude. The body rates are checked against them. In turbulence `diagnose --aircraft`
-    requires them."""
+    """Columns of the attitude angles. They show wrong units and signs of the body rates. If turbulence is
+    declared, `diagnose --aircraft` requires these columns."""
 
     roll: QuantityColumnOrName = Field(description="column of the roll angle, rad", examples=["roll_rad"])
     pitch: QuantityColumnOrName | None = Field(
@@ -130,7 +129,7 @@ class AttitudeColumns(Section):
 
 
 class EnergyColumns(Section):
-    """Columns that show an engine failure: altitude and airspeed fall together."""
+    """Columns that show an engine failure. In an engine failure, altitude and airspeed fall together."""
 
     altitude: QuantityColumnOrName = Field(description="column of the altitude, m", examples=["altitude_m"])
     airspeed: QuantityColumnOrName = Field(
@@ -139,94 +138,102 @@ class EnergyColumns(Section):
 
 
 class Vehicle(Section):
-    """The columns in the logs of a vehicle."""
+    """The vehicle, and the columns of its logs."""
 
     name: VehicleName = Field(description="name of the vehicle", examples=["flying-wing"])
     reader: Literal["table", "alfa", "ulog", "ardupilot"] | None = Field(
-        default=None, description="format of the logs, if the path does not show it"
+        default=None,
+        description="format of the logs. `table`: CSV or Parquet. `ulog`: PX4. `ardupilot`: "
+        "ArduPilot. `alfa`: a folder of the ALFA data set; left out: the format follows from the path",
     )
     time: TimeColumn | None = Field(
-        default=None, description="column with the time, in a table without the column `t_s`"
+        default=None,
+        description="column with the time. Only a table without the column `t_s` needs this section",
     )
-    rates: RateColumns
+    rates: RateColumns = Field(description="columns of the three body rates")
     commands: list[QuantityColumnOrName] = Field(
         min_length=1,
         max_length=20,
-        description="columns of the commands, recorded before any part that can fail",
+        description="columns of the commands that the autopilot sends to the servos. Do not use measured "
+        "positions of the servos, because a fault of a servo changes them",
         examples=[["roll_cmd", "pitch_cmd"]],
     )
     signals: list[QuantityColumnOrName] = Field(
         default=[],
         max_length=12,
-        description="further measured columns on which the rates depend",
+        description="columns of further measured quantities from which the model predicts the body rates",
         examples=[["roll_rad", "pitch_rad"]],
     )
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
         max_length=20,
-        description="for each surface, the share of each command in the deflection of the healthy surface",
-        json_schema_extra={"unit": "share of 1", "range": "any"},
+        description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
+        "each multiplied by a weight. The numbers are the weights",
+        json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
     )
     labels: dict[str, QuantityColumnOrName] = Field(
         default={},
-        description="columns with the true effectiveness of each surface, which is 1 if the surface is "
-        "healthy. `identify` and `diagnose --score` read them",
+        description="columns with the true effectiveness of each surface, for test flights with known "
+        "faults. 1: the surface is healthy. `identify` and `diagnose --score` read these columns",
         examples=[{"left": "left_truth"}],
     )
     attitude: AttitudeColumns | None = Field(
-        default=None, description="columns of the attitude. The body rates are checked against them"
+        default=None,
+        description="columns of the attitude angles. They show wrong units and signs of the body rates",
     )
     acceleration: QuantityColumnOrName | None = Field(
         default=None,
-        description="column of the specific force along the z axis, in either sign. The median of its "
-        "magnitude must be about 1 g",
+        description="column of the specific force along the z axis. It shows a wrong unit, because the "
+        "median of its magnitude must be about 1 g. Its sign does not matter",
         json_schema_extra={"unit": "m/s²"},
         examples=["az_m_s2"],
     )
     airspeed: QuantityColumnOrName | None = Field(
         default=None,
-        description="column of the airspeed. The model is valid only in the range of airspeeds that the fit "
-        "used",
+        description="column of the airspeed. With it, the diagnosis draws conclusions only in the range of "
+        "airspeeds that the fit used",
         json_schema_extra={"unit": "m/s"},
         examples=["airspeed_m_s"],
     )
     energy: EnergyColumns | None = Field(
         default=None,
-        description="columns of altitude and airspeed. They prevent an engine failure from being named as a "
-        "surface",
+        description="columns that show an engine failure. While altitude and airspeed fall as after an "
+        "engine failure, the diagnosis names no surface",
     )
     flow: dict[str, QuantityColumnOrName] = Field(
         default={},
-        description="columns of further inputs for `diagnose --aircraft`. The names are those of the "
-        "aircraft file",
+        description="columns of further inputs of the design model, for `diagnose --aircraft`. The keys are "
+        "`alpha_rad`, `beta_rad`, `qdyn_pa` and the signals in the aircraft file",
         examples=[{"alpha_rad": "alpha", "beta_rad": "beta", "qdyn_pa": "qbar"}],
     )
     full_deflection_rad: dict[str, Number] = Field(
         default={},
-        description="deflection of each surface at a command of 1, for `diagnose --aircraft`; left out: 1",
+        description="deflection of each surface at a command of 1. Only `diagnose --aircraft` uses it; left "
+        "out: 1",
         json_schema_extra={"unit": "rad", "range": "any"},
         examples=[{"left": 0.4}],
     )
     reference_airspeed_mps: Number | None = Field(
         default=None,
         gt=0,
-        description="airspeed V0 at which the commands have their full effect. Each command is multiplied "
-        "by (airspeed / V0)^2; left out: `identify` chooses V0 if this improves the fit",
+        description="airspeed V0 at which a command has its full effect. Each command is multiplied by "
+        "(airspeed / V0)^n, with the exponent n from `airspeed_powers`; left out: `identify` chooses V0 "
+        "if this improves the fit",
         json_schema_extra={"unit": "m/s"},
         examples=[20.0],
     )
     airspeed_powers: dict[str, Number] = Field(
         default={},
-        description="exponent of airspeed / V0 (`reference_airspeed_mps`) in the factor on the command of "
-        "each surface. With `other_laws`, `identify` estimates it; left out: 2",
+        description="exponent n of each surface, see `reference_airspeed_mps`. With `other_laws: true`, "
+        "`identify` estimates n; left out: 2",
         json_schema_extra={"unit": "1", "range": "any"},
         examples=[{"left": 1}],
     )
     outputs: dict[str, QuantityColumnOrName] = Field(
         default={},
-        description="columns of the servo outputs. Only the freeze rule, a published detector in "
-        "`compare --flights`, uses them",
+        description="columns of the servo outputs. Only `compare --flights` uses them, for a published "
+        "detector called the freeze rule",
         examples=[{"left": "left_pwm"}],
     )
     false_alarms_per_hour: Number | None = number(
@@ -234,27 +241,27 @@ class Vehicle(Section):
         gt=0,
         le=MAX_SETTABLE_FALSE_ALARMS_PER_HOUR,
         unit="1/h",
-        says="accepted number of false alarms in each hour of healthy flight; left out: 1, if the logs have "
-        "no labels",
+        says="accepted number of false alarms in each hour of healthy flight; left out: 1 for logs without "
+        "labels",
         examples=[2],
     )
     faults: list[FaultKind] = Field(
         default=["loss"],
         min_length=1,
-        description="fault types that the diagnosis tests. `loss`: loss of effectiveness. `stuck`: jam",
+        description="fault types that the diagnosis looks for. `loss`: loss of effectiveness. `stuck`: jam",
         examples=[["loss", "stuck"]],
     )
     other_laws: bool | None = Field(
         default=None,
-        description="true: the control law of the diagnosed flights can differ from the law of the "
-        "identified flights. An alarm and a name then require more evidence; left out: true, if no labels "
-        "show faults",
+        description="true: the diagnosed flights can have another control law than the flights of the fit. "
+        "An alarm and a name then require more evidence; left out: false for logs with labels, otherwise "
+        "true",
         examples=[True],
     )
     moving_air: bool | None = Field(
         default=None,
         description="true: gusts can move the aircraft. The diagnosis then uses every sample, and estimates "
-        "the spectrum of the noise from the flight; left out: true, if no labels show faults",
+        "the spectrum of the noise from the flight; left out: false for logs with labels, otherwise true",
         examples=[True],
     )
     max_rate_hz: Number | None = number(
@@ -262,8 +269,8 @@ class Vehicle(Section):
         gt=0,
         le=1000,
         unit="Hz",
-        says="a log with a higher rate is averaged to this rate; left out: 100 with `moving_air`, otherwise "
-        "20",
+        says="largest sample rate. A log with a higher rate is averaged to this rate; left out: 100 with "
+        "`moving_air: true`, otherwise 20",
         examples=[50],
     )
 

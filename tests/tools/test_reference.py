@@ -182,6 +182,17 @@ def test_each_example_loads(kind, section, beside):
     assert refused == {}
 
 
+@pytest.mark.parametrize("kind", keys.KINDS)
+def test_the_example_of_a_whole_file_loads(kind, tmp_path):
+    text = (keys.EXAMPLES / f"{kind}.yaml").read_text()
+    assert f"```yaml\n{text}```" in page(kind)
+    if kind == "plan-keys":
+        (tmp_path / "plan.yaml").write_text(text)
+        load_plan(str(tmp_path / "plan.yaml"))
+    else:
+        LOADERS[kind](text, tmp_path)
+
+
 def test_an_example_out_of_range_does_not_load(tmp_path):
     found = sections("scenario-keys").found["LossOfEffectiveness"]
     key = next(key for key in found.keys if key.name == "magnitude")

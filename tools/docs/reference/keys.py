@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path as File
 from typing import Any, NamedTuple
 
 import yaml
@@ -17,33 +18,37 @@ from beaver_ftc_logs.vehicle import Vehicle
 from tools.docs.reference.schema import ITEM, NAME, Key, Node, Path, Place, Section, Sections, dotted
 
 _PARTS = ("p", "q", "r", ITEM, NAME)  # of a path: below the key that they are parts of
+EXAMPLES = File(__file__).with_name("examples")  # a whole file of each kind, by the name of its page
 HEAD = ("key", "what it is", "type", "unit", "range", "default", "example")
 _TYPES = {"string": "text", "boolean": "true or false", "integer": "whole number", "number": "number"}
 _PLURALS = {one: f"{one}s" for one in ("text", "choice", "whole number", "number", "value", "section")}
 
 
 class Kind(NamedTuple):
-    """A kind of file: the schema of what loads it, what to say first, and where to go next."""
+    """A kind of file: the schema of what loads it, what to say first, of its example, where to go next."""
 
     schema: Callable[[], Node]
     title: str
     says: str
+    example: str
     next: str
     more: Callable[[], Iterator[str]] = lambda: iter(())
     links: Mapping[str, str] = {}  # path of a section -> link to the page that explains it
 
 
-def page(kind: Kind) -> str:
+def page(name: str) -> str:
     """The page of a kind of file."""
+    kind = KINDS[name]
     sections = list(Sections(kind.schema()))
     more = list(kind.more())
     headings = [part.removeprefix("## ") for part in more if part.startswith("## ")]
     parts = (_section(section, number, kind.links) for number, section in enumerate(sections, 2))
     captioned = _captioned(more, len(sections) + 2)
-    return (
+    return _with_sources(
         "\n\n".join(
             [
-                f"# {kind.title}", kind.says, _READ, _contents(sections, headings), *parts, *captioned,
+                f"# {kind.title}", kind.says, _whole_file(name), _READ, _contents(sections, headings), *parts,
+                *captioned,
                 f"## Next\n\n{kind.next}",
             ]
         )
@@ -51,22 +56,34 @@ def page(kind: Kind) -> str:
     )  # fmt: skip
 
 
+def _with_sources(text: str) -> str:
+    """The page with a link at each key of a source, such as [Zhang2005]."""
+    return re.sub(r"\[([A-Z][A-Za-z]+\d{4}[^\]]*)\](?!\()", r"[[\1]](../REFERENCES.md)", text)
+
+
+def _whole_file(name: str) -> str:
+    text = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
+    return f"## Example\n\n{KINDS[name].example}\n\n```yaml\n{text}```"
+
+
 _READ = """## How to read a table
 
 The file is YAML. Each section of the file has a table below, with a row for each key:
 
-- *what it is*: meaning of the key. Text after "left out:" states the effect if the key is not in the file.
+- *what it is*: meaning of the key. A text after "Left out:" says what happens if the key is not in the file.
 - *type*: kind of value. A link leads to the table of a section below this key. A mapping of names to
   numbers is written `{aileron: 0.1, rudder: 0.2}`.
 - *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction, so that 0.4 is 40 %.
 - *range*: allowed values. A key of the type "choice" has one of the listed values.
 - *default*: value if the key is not in the file. "required": the key must be in the file. "left out": there
   is no value. "none": the value is empty. "see section": the keys of the section have their own defaults.
-- *example*: the key with a value that is accepted.
+- *example*: the key with a value that is accepted. Some examples need a second key; the column *what it is*
+  then names this key.
 
 In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose, or that the
-aircraft has. The [glossary](reference/glossary.md) explains the terms, and the
-[nomenclature](reference/nomenclature.md) explains symbols, axes and signs."""
+aircraft has. A key in brackets, such as [Zhang2005], is an entry of the [sources](../REFERENCES.md). The
+[glossary](reference/glossary.md) explains the terms, and the [nomenclature](reference/nomenclature.md)
+explains symbols, axes and signs."""
 _CONTENTS = "*Table 1. The sections of the file, by their key at the top of the file.*"
 
 
@@ -102,10 +119,10 @@ def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
     if _is_also_a_list(section):
         parts.append("The value is one such mapping, or a list of them.")
     elif elsewhere := _elsewhere(section):
-        parts.append(f"The same keys are also allowed {elsewhere}.")
+        parts.append(f"Sections with the same keys: {elsewhere}.")
     if section.says:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
-    if page := links.get(dotted(section.places[0].path)):
+    if page := links.get(_SENSOR_FAULTS if _is_of_a_sensor(section) else dotted(section.places[0].path)):
         parts.append(f"More: {page}.")
     parts.append(f"*Table {number}. Keys of {_called_file(section)}.*")
     parts.append(markdown_table(HEAD, [_row(key, section.places) for key in section.keys]))
@@ -134,8 +151,12 @@ def _heading(section: Section) -> str:
         return _HEADINGS[section.title]
     beside = [place.path for place in section.places if place.path[:-1] == first[:-1]]
     kind = next((key.choices[0] for key in section.keys if key.name == "type"), "")
-    of = " of a sensor" if any(key.name == "sensor" for key in section.keys) else ""
+    of = " of a sensor" if _is_of_a_sensor(section) else ""
     return _named(beside) + (f", type `{kind}`{of}" if kind else "")
+
+
+def _is_of_a_sensor(section: Section) -> bool:
+    return any(key.name == "sensor" for key in section.keys)
 
 
 def _named(beside: list[Path]) -> str:
@@ -153,18 +174,31 @@ def _is_also_a_list(section: Section) -> bool:
 
 
 def _elsewhere(section: Section) -> str:
-    """Where else it stands."""
+    """Where else it stands: paths below the same key together."""
     first = section.places[0].path[:-1]
-    others = dict.fromkeys(place.path[:-1] for place in section.places)
-    below = [f"`{dotted(path)}`" for path in others if path and path != first]
-    top = ["at the top of the file"] if () in others and first else []
-    return " and ".join([*([f"below {', '.join(below)}"] if below else []), *top])
+    groups: dict[Path, dict[str, None]] = {}
+    for place in section.places if section.places[0].path else ():
+        if place.path[-1] in (ITEM, NAME):
+            groups.setdefault(place.path, {})[""] = None
+        elif place.path[:-1] != first:
+            groups.setdefault(place.path[:-1], {})[place.path[-1]] = None
+    groups.pop(section.places[0].path, None)
+    return "; ".join(_together(above, list(names)) for above, names in groups.items())
+
+
+def _together(above: Path, names: list[str]) -> str:
+    """Keys with what is above them, which stands once."""
+    if not names[0]:
+        return f"`{dotted(above)}`"
+    if len(names) == 1:
+        return f"`{dotted((*above, names[0]))}`"
+    return ", ".join(f"`{name}`" for name in names) + (f" in `{dotted(above)}`" if above else "")
 
 
 def _row(key: Key, places: list[Place]) -> tuple[str, ...]:
     units = list(dict.fromkeys(key.unit(place) for place in places)) if key.number else []
     wanted = ", ".join(f"`{name}: {in_a_line(value)}`" for name, value in key.needs.items())
-    says = _without_unit(key.says, units) + (f"; the example also needs {wanted}" if wanted else "")
+    says = _without_unit(key.says, units) + (f". The example also needs {wanted}" if wanted else "")
     example = "" if key.example is None else f"`{key.name}: {in_a_line(key.example)}`"
     unit = _unit(key, places) if key.number else ""
     return f"`{key.name}`", says, _type(key), unit, _range(key), _default(key), example
@@ -187,7 +221,7 @@ def _unit(key: Key, places: list[Place]) -> str:
 
 def _without_unit(says: str, units: list[str]) -> str:
     """The text in one line and without the unit at its end, for which the table has a column."""
-    says = " ".join(says.split())
+    says = " ".join(says.split()).replace("; left out: ", ". Left out: ")
     return next((says.removesuffix(end) for unit in units if says.endswith(end := f", {unit or 1}")), says)
 
 
@@ -320,14 +354,18 @@ def _preset(of: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 _AS_SCHEMA = (
-    "`beaver-ftc schema{}` prints the same keys as JSON Schema, "
-    "with which an editor completes and checks the file."
+    "`beaver-ftc schema{}` prints the same keys as JSON Schema. "
+    "With this schema, an editor completes and checks the file while you write it."
 )
 _SCENARIOS = "reference/scenarios.md"
+_SENSOR_FAULTS = "faults[] of a sensor"
 _LINKS = {
     "reference": f"[reference signals]({_SCENARIOS}#reference-signals)",
     "autopilot": f"[flight path]({_SCENARIOS}#flight-path), [outer loops](explanation/laws.md#outer-loops)",
-    "faults[]": f"[faults]({_SCENARIOS}#faults), [fault types](explanation/fault-types.md)",
+    "faults[]": f"[faults]({_SCENARIOS}#faults), [fault types](explanation/fault-types.md), "
+    "[signs of the surfaces](reference/beaver.md#surfaces-and-signs)",
+    _SENSOR_FAULTS: f"[names and units of the sensors]({_SCENARIOS}#instruments-that-fail), "
+    "[sensor monitor](explanation/instruments.md)",
     "uncertainty": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
     "actuators": f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)",
     "sensors": f"[real sensors, servos and air]({_SCENARIOS}#real-sensors-servos-and-air)",
@@ -347,13 +385,29 @@ _LINKS = {
     "design_model": f"[truth and design model]({_SCENARIOS}#truth-and-design-model)",
     "expect": f"[expectations]({_SCENARIOS}#expectations)",
 }
+_DERIVED = "explanation/derived-aircraft.md"
+_AIRCRAFT_LINKS = {
+    "surfaces.NAME": "[properties of the Beaver](reference/properties.md), [signs](reference/nomenclature.md"
+    "#axes-and-signs)",
+    "signals.NAME": f"[fit of the terms]({_DERIVED}#3-fit)",
+    "moments.Cl[]": "[terms of the Beaver](reference/properties.md#aerodynamic-terms), "
+    f"[fit of the terms]({_DERIVED}#3-fit)",
+    "model_error_rad_s2": f"[meaning of the bound]({_DERIVED}#what-the-bound-means)",
+    "model_error_map": f"[measurement of the error]({_DERIVED}#4-measure)",
+    "effectors.NAME": "[fly with the engines](how-to/engines.md)",
+    "channels": "[fly under an autopilot](how-to/autopilots.md)",
+    "damage.NAME": "[damage on the GTM](results/gtm.md)",
+}
 KINDS = {
     "scenario-keys": Kind(
         json_schema,
         "Scenario keys",
-        "Which keys can a scenario file have? This page lists every key, for readers who write or read a "
-        "scenario. [Scenarios](reference/scenarios.md) "
+        "Which keys can a scenario file have? A scenario describes one flight. This page lists every key, "
+        "for readers who write or read a scenario. [Scenarios](reference/scenarios.md) "
         f"explains the sections with examples. {_AS_SCHEMA.format('')}",
+        "In this flight, the elevator loses 40 % of its effectiveness at 12 s. One aerodynamic coefficient "
+        "of the simulated aircraft is 5 % too large, and the diagnosis allows for errors of 5 %. Only `name` "
+        "is required; every other key has a default.",
         "[Sweep keys](reference/sweep-keys.md) has the keys of a file with many flights, and "
         "[columns](reference/columns.md) the results of a flight.",
         _of_scenarios,
@@ -365,14 +419,18 @@ KINDS = {
         "Which keys can a sweep file have? This page lists every key, for readers who write a sweep. "
         "A sweep flies one scenario many times with varied values "
         f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
+        "This sweep flies 50 losses of the elevator. Their size and the airspeed are random. At least 90 % "
+        "of the losses must be detected, and half of the losses within 0.2 s.",
         "[Results of a sweep](reference/sweep-results.md) has the files and statistics that a sweep writes.",
     ),
     "plan-keys": Kind(
         plan_json_schema,
         "Plan keys",
-        "Which keys can a plan of evidence have? This page lists every key, for readers who show that "
-        "requirements are met. A plan lists requirements and the flights that test them "
+        "Which keys can a plan of evidence have? A plan lists requirements, and the flights that test them. "
+        "This page lists every key, for readers who write a plan "
         f"([how to write one](how-to/evidence.md)). {_AS_SCHEMA.format(' --plan')}",
+        "This plan has one requirement of each kind. JAM-1 has expectations, RATE-1 has a formula, and "
+        "STAT-1 has a limit for the result of a study.",
         "[Write evidence](how-to/evidence.md) explains the verdicts of a plan with an example.",
         links={"requirements[]": "[tests of a requirement, operators of a formula](how-to/evidence.md)"},
     ),
@@ -380,16 +438,23 @@ KINDS = {
         AircraftFile.model_json_schema,
         "Aircraft file keys",
         "Which keys can an `aircraft.yaml` have? The file describes an aircraft for diagnosis and law: "
-        "its surfaces, mass, the terms of the design model, and limits. `derive` writes the file "
+        "its surfaces, mass, the terms of the design model, and limits. The command `derive` writes the file "
         "([your own aircraft](tutorials/own-aircraft.md)). This page is for readers who read or change it.",
+        "This file has the required sections and a few terms of the Beaver. The file of a real aircraft has "
+        "more terms, and the error of its model. The names after `command`, `position` and `effective` are "
+        "properties of the JSBSim model.",
         "[Derived aircraft](explanation/derived-aircraft.md) explains how terms and errors are found.",
+        links=_AIRCRAFT_LINKS,
     ),
     "vehicle-keys": Kind(
         Vehicle.model_json_schema,
         "Vehicle file keys",
         "Which keys can a vehicle file have? The file states which column of a flight log contains which "
-        "quantity ([prepare a log](how-to/flight-logs.md)). `identify --check` proposes a first version. "
-        "This page is for readers who complete this version.",
+        "quantity ([prepare a log](how-to/flight-logs.md)). The command `identify --check` proposes a first "
+        "version. This page is for readers who complete this version.",
+        "The log of a small flying wing is a table with the columns `time_ms`, `gyro_x`, `gyro_y`, `gyro_z`, "
+        "`roll_cmd`, `pitch_cmd`, `roll_deg`, `pitch_deg`, `airspeed_kmh` and `altitude_m`. The wing has two "
+        "elevons, `right` and `left`. Its file can be:",
         "[Diagnose a flight log](tutorials/flight-log.md) uses such a file.",
     ),
 }

@@ -44,13 +44,13 @@ class OutputSection(Section):
     """One output of an autopilot that moves a surface or the engine.
 
     channel: number of the output, counted from 1
-    share: deflection at full output, divided by the travel to the stop. A negative share moves the surface
-    towards the other stop
-    reversed: true: a longer pulse gives a smaller deflection. A negative `share` reverses the direction once
-    more
+    share: deflection at full output, divided by the travel to the stop. With a negative share, a larger
+    output moves the surface towards its lower stop
+    reversed: true: a longer pulse gives a smaller output. Together with a negative `share`, the direction is
+    the original one again
     pwm_us: shortest and longest pulse, us
-    trim_us: pulse at which a surface is at 0 deg, or a throttle is closed; left out: for a surface the middle
-    of `pwm_us`, for a throttle its lower end, us
+    trim_us: pulse at which the surface is at 0 deg or the throttle is closed; left out: the middle of
+    `pwm_us` for a surface, its lower end for a throttle, us
     """
 
     channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
@@ -72,7 +72,8 @@ class OutputSection(Section):
 
 
 class ChannelsSection(Section):
-    """Outputs of an autopilot, by the part that they move. A surface that is not listed stays at trim.
+    """The outputs of an autopilot, listed by the surface or engine that each output moves. A surface that is
+    not listed stays at trim.
 
     surfaces: the outputs of each surface
     throttle: the output of the engine
@@ -194,27 +195,33 @@ class GeometrySection(Section):
 
 
 class TermSection(Section):
-    """One term of a coefficient: its value times powers of signals and, if given, times a deflection.
+    """One term of a coefficient. The term is `value` times powers of signals (`of`). With `surface`, it is
+    also multiplied by the deflection of this surface.
 
-    name: unique name of the term; `uncertainty.coefficients` uses it
+    name: name of the term. Each name is used once. `uncertainty.coefficients` of a scenario uses this name
     source: source of the value
     description: meaning of the term
     """
 
     name: Name = entry(..., examples=["Cm_alpha"])
     value: Number = number(
-        ..., "1", "coefficient, per rad of each angle or deflection in it", range="any", examples=[-0.6028]
+        ...,
+        "1",
+        "coefficient. Angles and deflections in the term are in rad",
+        range="any",
+        examples=[-0.6028],
     )
     of: dict[str, Power] = Field(
         default_factory=dict,
-        description="exponent of each factor. A factor is `alpha`, `beta` (rad), `ph`, `qh`, `rh` "
-        "(dimensionless rates) or a signal of the file, in `forces` also `betadoth`. A term of `moments` "
-        "with a `surface` has no rate as a factor",
+        description="exponent of each signal. Signals are `alpha` and `beta` in rad, the dimensionless "
+        "rates ph = p b/(2 V), qh = q c/V and rh = r b/(2 V) with span b, chord c and airspeed V, and "
+        "the entries of `signals`. In `forces`, betadoth = betadot b/(2 V) is allowed too. In `moments`, "
+        "a term with a `surface` must not contain a rate",
         examples=[{"alpha": 1}],
     )
     surface: Name | None = Field(
         default=None,
-        description="surface whose deflection is a further factor of the term",
+        description="surface whose deflection multiplies the term",
         examples=["elevator"],
     )
     source: Text = entry("", examples=["TM88"])
@@ -264,15 +271,16 @@ _Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "share 
 
 
 class TrimSection(Section):
-    """Parts that trim moves in addition to the main surface of each axis."""
+    """What trim changes in addition to the main surface of each axis: the power setting, and surfaces that
+    move together."""
 
     throttle: Property = Field(
         description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
     )
     together: dict[Name, dict[Name, _Share]] = Field(
         default_factory=dict,
-        description="for each surface that trims an axis: the other surfaces that move with it. The number "
-        "is the deflection of the other surface, divided by the deflection of the first",
+        description="surfaces that move together in trim. Example: the rudder moves with the aileron, by "
+        "0.2 of its deflection",
         examples=[{"aileron": {"rudder": 0.2}}],
     )
 
@@ -281,8 +289,8 @@ class LimitSection(Section):
     """A property that must be within a range in trim.
 
     property: property of JSBSim
-    says: name of the property in messages
-    unit: unit of the range in messages
+    says: name of the property for messages
+    unit: unit of `range`, for messages
     range: lowest and highest value
     """
 
@@ -323,12 +331,14 @@ _Forces = Annotated[tuple[_Force, ...], Field(min_length=2, max_length=MAX_THRUS
 
 
 class ThrustSection(Section):
-    """Steady force of the engine along the body x axis, by airspeed and by the setting that trim moves.
+    """Steady force of the engine along the body x axis. It depends on airspeed and on the setting that trim
+    moves.
 
     airspeed_mps: true airspeeds, m/s
     setting: values of the property that `trim.throttle` names
-    force_n: one row for each airspeed, with a force for each setting; forces do not decrease, N
-    lag_s: time constant of the thrust, i.e. the time until 63 % of a change is reached, s
+    force_n: table of the force: one row for each airspeed, one column for each setting. In a row, the force
+    must not decrease, N
+    lag_s: time constant of the thrust: the time until 63 % of a change is reached, s
     """
 
     airspeed_mps: Steps = entry(..., unit="m/s", examples=[[40, 60]])
@@ -352,13 +362,14 @@ class ThrustSection(Section):
 
 
 class EngineSection(Section):
-    """Settings of the engine, by their key in the section `initial` of a scenario, and limits of the trim.
+    """Settings of the engine, and limits for trim. The name of a setting is its key in the section `initial`
+    of a scenario.
 
-    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start them,
-    which takes time. `off`: they do not run
+    start: how the engines start. `steady`: they run from the first frame. `run_up`: starters start them, and
+    this takes time. `off`: they do not run
     settings: settings that a scenario can have
     limits: properties that must be within a range in trim
-    thrust: force at each value of the setting that trim moves; left out: airspeed is held with `forces` alone
+    thrust: force at each value of the power setting; left out: the airspeed is held with `forces` alone
     """
 
     settings: dict[Name, SettingSection] = Field(default_factory=dict)
@@ -368,10 +379,11 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine with a lever of its own. The law moves the lever. The force of the engine along the body x
-    axis turns the aircraft about the centre of gravity.
+    """An engine with a lever of its own. The law moves this lever. If the force of the engine does not act
+    through the centre of gravity, it turns the aircraft.
 
-    throttle: property that is added to the lever of this engine alone, in the unit of its setting
+    throttle: property that moves the lever of this engine alone. Its value is added to the common lever, in
+    the unit of the setting
     share: share of the thrust of all engines, `engine.thrust`
     """
 
@@ -384,7 +396,7 @@ class EffectorSection(Section):
 
 
 class ModelErrorSection(Section):
-    """Largest error of the angular accelerations, measured when the terms were derived."""
+    """Largest error of each angular acceleration. `derive` measures it after the fit of the terms."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
@@ -402,8 +414,8 @@ Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
 
 
 class ErrorBox(Section):
-    """A box of states, and the largest error in it. An error has one row for each time in `until_s`, with one
-    value for each share in `travel_share`.
+    """A box of states, and the largest error in it. An error is a table with one row for each time in
+    `until_s`, and one column for each part in `travel_share`.
 
     airspeed_mps: true airspeed, m/s
     alpha_rad: angle of attack, rad
@@ -416,8 +428,8 @@ class ErrorBox(Section):
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: largest magnitude of the yawing moment coefficient Cn that running engines with equal
-    levers cause, apart from the moment of their thrust; left out: unknown
+    engines_apart: largest magnitude of the yawing moment coefficient Cn of running engines with equal levers.
+    The moment of their thrust is not included; left out: unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -441,26 +453,32 @@ class ErrorBox(Section):
 
 
 class ErrorMapSection(Section):
-    """The measured error of the angular accelerations, in nested boxes of states.
+    """The measured error of the angular accelerations. A box is a range of states, and each box contains the
+    boxes before it.
 
     Outside of all boxes the error is unknown, and no alarm is raised.
     boxes: the boxes, the innermost one first
     """
 
     travel_share: Shares = number(
-        ..., "share of 1", "shares of the travel of the surfaces, rising", examples=[[1]]
+        ...,
+        "share of 1",
+        "parts of the travel of the surfaces, rising. For each part, the error is "
+        "measured with deflections in this part",
+        examples=[[1]],
     )
     stand_ins: Number = number(
         1.0,
         unit="share of 1",
-        says="factor on all shares except the last, for surfaces that only replace other surfaces",
+        says="factor on `travel_share` for stand-ins, the surfaces that only replace other surfaces. The "
+        "last share has no factor",
         gt=0,
         le=1,
     )
     until_s: Ages = entry(
         ...,
-        "times since the start of the flight, rising. The error depends on the time because fuel burns "
-        "and the inertia changes, s",
+        "times since the start of the flight, rising. The error depends on the time, because fuel burns and "
+        "the inertia changes, s",
         examples=[[600]],
     )
     boxes: tuple[ErrorBox, ...] = Field(min_length=1, max_length=MAX_BOXES)
@@ -525,28 +543,29 @@ class DamageSection(Section):
 
 
 class AircraftFile(Section):
-    """The whole file.
+    """An aircraft.
 
-    jsbsim: the JSBSim model, a file beside this one
-    groups: groups of surfaces that can replace each other. In each group the surfaces are in the order in
-    which they replace each other
-    model_error_rad_s2: largest model error. It is added to the declared bound
-    model_error_map: largest model error in each part of the envelope, instead of one value
+    jsbsim: file name of the JSBSim model, in the same folder
+    groups: groups of surfaces that can replace each other. A surface is replaced by the next surface of its
+    group
+    model_error_rad_s2: largest error of the design model. It is added to the bound in `fdi.bounds`
+    model_error_map: largest error of the design model for each range of states, instead of one value
     channels: outputs of an autopilot, and the surfaces that they move
     ground: the aircraft on the ground; left out: no flight begins on the ground
     damage: cases of damage that a scenario can have, by name
     name: name of the aircraft
-    description: one line about the aircraft
+    description: description of the aircraft in one line
     surfaces: three or more control surfaces, by name
-    signals: measured dimensionless signals that are factors of terms
+    signals: measured dimensionless signals that multiply terms
     mass: mass and inertia
     geometry: reference dimensions
     moments: terms of the moment coefficients
     forces: terms of the force coefficients; left out: no airspeed can be held
     envelope: range in which the terms are valid
-    trim: parts that trim moves in addition to the main surfaces
+    trim: power setting, and surfaces that move together in trim
     engine: settings and limits of the engine
-    effectors: engines, by name, with which the law turns the aircraft if the surfaces are not sufficient
+    effectors: engines with a lever of their own. If the surfaces are not sufficient, the law turns the
+    aircraft with these engines
     start: flight condition at the start, if the scenario has no other
     """
 

@@ -157,8 +157,8 @@ class Initial(Section):
     altitude_m: Number = number(1828.8, "m", "altitude above sea level", ge=-300, le=6000)
     on_ground: Flag | None = entry(
         None,
-        "true: the aircraft stands on the ground, and altitude_m is the elevation of the ground. Only "
-        "`sitl` accepts true",
+        "true: the aircraft stands on the ground, and `altitude_m` is the elevation of the ground. Only "
+        "`sitl` accepts true; left out: the flight starts in the air",
     )
 
     _airframe: ClassVar[Aircraft | None] = None
@@ -243,8 +243,8 @@ def initial_schema(schema: dict[str, Any]) -> None:
 class ActuatorDynamics(Section):
     """First-order lag, rate limit and stops of one surface.
 
-    bandwidth_rad_s: bandwidth of the first-order lag; 0: no lag, rad/s
-    rate_limit_deg_s: largest rate of the surface; 0: no limit, deg/s
+    bandwidth_rad_s: bandwidth of the first-order lag. 0: no lag, rad/s
+    rate_limit_deg_s: largest rate of the surface. 0: no limit, deg/s
     travel_deg: lower and upper stop; left out: the stops in the aircraft file, deg
     """
 
@@ -273,8 +273,8 @@ PRESETS: dict[str, dict[str, float]] = {
 
 
 class Actuators(Section, extra="allow"):
-    """Dynamics of the actuators. A preset applies to all surfaces. A key directly in this section also
-    applies to all surfaces, and a key below a surface to this surface."""
+    """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
+    in the section of a surface applies only to this surface, and replaces the common value."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
 
@@ -317,18 +317,18 @@ Wind = Annotated[Number, Field(ge=-100, le=100)]
 
 
 class Gust(Section):
-    """A one-minus-cosine gust of JSBSim. Its velocity rises, is held, and fades."""
+    """A gust of JSBSim with the shape one minus cosine. Its velocity rises, stays constant, and falls."""
 
     at_s: Number = number(..., "s", "start of the gust", ge=0, le=360_000, examples=[10])
     velocity_mps: tuple[Wind, Wind, Wind] = number(
         ...,
         "m/s",
-        "largest velocity of the gust, with the components towards north, east and down",
+        "largest velocity of the gust: its components towards north, east and down",
         examples=[[0, 0, -3]],
     )
     rise_s: Number = number(1.0, "s", "duration of the rise", gt=0, le=3600)
     hold_s: Number = number(0.0, "s", "time at the largest velocity", ge=0, le=3600, examples=[2])
-    fade_s: Number = number(1.0, "s", "duration of the fading", gt=0, le=3600)
+    fade_s: Number = number(1.0, "s", "duration of the fall", gt=0, le=3600)
 
     @property
     def end_s(self) -> float:
@@ -359,13 +359,19 @@ class Environment(Section):
     """Wind, turbulence and gusts."""
 
     turbulence: Annotated[Literal["none", "dryden"], BeforeValidator(_no_severity)] = entry(
-        "none", "still air or Dryden turbulence", needs={"severity": "light"}, examples=["dryden"]
+        "none",
+        "`none`: no turbulence. `dryden`: turbulence of the Dryden model",
+        needs={"severity": "light"},
+        examples=["dryden"],
     )
     severity: Severity | None = entry(
         None, "severity of the turbulence", needs={"turbulence": "dryden"}, examples=["light"]
     )
     wind_mps: tuple[Wind, Wind, Wind] = number(
-        (0.0, 0.0, 0.0), "m/s", "steady wind towards north, east, down", examples=[[5, 0, 0]]
+        (0.0, 0.0, 0.0),
+        "m/s",
+        "steady wind: its components towards north, east and down",
+        examples=[[5, 0, 0]],
     )
     gust: (
         Annotated[

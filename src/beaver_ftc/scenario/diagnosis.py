@@ -91,11 +91,11 @@ Pole = Annotated[float, Field(gt=0, le=DEADBEAT_PER_S)]
 
 
 class PerAxis(Section, strict=True):
-    """One non-negative number for each of p, q and r.
+    """One non-negative number for each axis.
 
-    p: value for roll
-    q: value for pitch
-    r: value for yaw
+    p: roll
+    q: pitch
+    r: yaw
     """
 
     p: Bound = entry(0.0, examples=[0.1])
@@ -124,18 +124,18 @@ class Bounds(Section, strict=True):
     """Declared uncertainty. The thresholds follow from it [Zhang2005, sec. VII].
 
     inertia_coupling: largest relative error of the inertia coupling on each axis. The default is the bound in
-    the published study
+    the published study [Zhang2005]
     constant_rad_s2: largest other error of the angular acceleration on each axis. The default is the bound in
     the published study, rad/s2
-    coefficients: largest relative error of the moment coefficients: one number for all terms, or one number
-    for each name of a term
+    coefficients: largest relative error of the moment coefficients. One number is for all terms; a mapping
+    has a number for each term
     inertia: largest relative error of Ix, Iy, Iz and Jxz
-    sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each signal
-    deflection_deg: largest difference between a surface and the model of its actuator, deg
-    turbulence: largest severity of Dryden turbulence. The bound follows from the present height, but it is
-    never below the bound for heights above 2000 ft. No instrument measures the rotation of turbulent air
-    vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor allows for it when it
-    compares altitude and climb, m/s
+    sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
+    deflection_deg: largest difference between the position of a surface and the model of its actuator, deg
+    turbulence: strongest turbulence (Dryden model). The bound depends on the height. At no height is it
+    smaller than above 2000 ft. No instrument measures the rotation of turbulent air
+    vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor uses it when it compares
+    altitude and climb, m/s
     """
 
     inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1")
@@ -160,10 +160,10 @@ class Statistical(Section, strict=True):
     """Likelihood ratio tests in addition to the worst-case thresholds. Their alarm levels follow from the
     keys of this section.
 
-    false_alarms_per_h: largest rate of false alarms per flight hour under the declared noise
+    false_alarms_per_h: largest accepted number of false alarms in each flight hour, under the declared noise
     misnaming: probability that noise excludes the true fault within one second
-    uncertainty_rad_s: highest frequency of the model error. The default is the frequency in the published
-    study, rad/s
+    uncertainty_rad_s: highest angular frequency of the model error. The default is the frequency in the
+    published study, rad/s
     """
 
     false_alarms_per_h: float = number(1e-3, "1/h", gt=0, le=3600)
@@ -172,12 +172,12 @@ class Statistical(Section, strict=True):
 
 
 class Probing(Section):
-    """Active diagnosis: a small movement of the flap, balanced by the elevator, shows which of the two
-    surfaces is faulty.
+    """Active diagnosis of flap and elevator. The flap moves by a small angle, and the elevator moves against
+    it.
 
-    If both surfaces follow their commands, the aircraft does not react. Probing begins after an alarm in
-    pitch, if neither surface is named within the time that a slow oscillation needs to become visible.
-    Probing ends when a surface is named.
+    If both surfaces follow their commands, their effects cancel, and the aircraft does not react. A reaction
+    shows which surface is faulty. Probing begins some time after an alarm in pitch, if neither surface is
+    named. This time is long enough to see a slow oscillation. Probing ends when a surface is named.
     """
 
     amplitude_deg: float = entry(3.0, "largest flap deflection, downwards, deg", gt=0, le=10)
@@ -191,7 +191,8 @@ class Sharpen(Section, strict=True):
 
     pole_bank: bool = entry(
         True,
-        "several detection filters, with the poles in `fdi.pole_bank_per_s`. Each filter can raise the alarm",
+        "several detection filters with different poles (`fdi.pole_bank_per_s`). Each filter can raise the "
+        "alarm",
     )
     memory: bool = entry(True, "each fault must explain the whole flight, not only the time after the alarm")
     shared_effectiveness: bool = entry(
@@ -199,8 +200,8 @@ class Sharpen(Section, strict=True):
     )
     set_membership: bool = entry(
         True,
-        "if `fault_profile` declares a constant parameter, its sets of possible values are intersected "
-        "over time",
+        "with `fault_profile: abrupt`, a value of the parameter stays possible only if it explains every "
+        "frame",
     )
 
     @model_validator(mode="before")
@@ -220,32 +221,35 @@ class Sharpen(Section, strict=True):
 class FdiConfig(Section, strict=True):
     """The diagnosis: scheme, fault class, declared bounds and poles.
 
-    scheme: name of a diagnosis scheme. `beaver-ftc list schemes` prints all names. `none`: no diagnosis
+    scheme: name of the diagnosis scheme. `beaver-ftc list schemes` prints all names. `none`: no diagnosis
     options: parameters of the scheme, by name
     fault_class: faults that the diagnosis looks for. `published`: a loss of effectiveness of aileron,
     elevator or rudder. `all`: all fault types on all surfaces
-    pairs: true: also look for simultaneous faults of two surfaces, one pair in pitch and one pair in roll and
-    yaw. This requires `fault_class: all`
-    sensor_monitor: when the sensor monitor compares the instruments with each other. `auto`: if the scenario
-    has a fault of an instrument
-    slowest_oscillation_rad_s: lowest frequency of an oscillatory failure in the fault class `all`, rad/s
-    slowest_rate_deg_s: lowest rate of a slow surface in the fault class `all`. A slower surface counts as
-    jammed, deg/s
+    pairs: true: also look for simultaneous faults of two surfaces. On the Beaver, the pairs are elevator with
+    flap, and aileron with rudder. This requires `fault_class: all`
+    sensor_monitor: when the sensor monitor compares the instruments with each other. `auto`: only if a sensor
+    fails in the scenario
+    slowest_oscillation_rad_s: lowest angular frequency of an oscillating surface in the fault class `all`,
+    rad/s
+    slowest_rate_deg_s: lowest rate limit of a slow surface in the fault class `all`. A slower surface counts
+    as jammed, deg/s
     probing: active diagnosis, for `fault_class: all`. `{}`: on, with default values; left out: off
     statistical: statistical detector in addition to the worst-case detector. `{}`: on, with default values;
     left out: off
-    authority: detector whose alarms and exclusions count, if the statistical detector is on
-    thresholds: bound of the isolation tests. `interval`: an interval with a lower and an upper end.
-    `published`: the norm of the published study
-    detection_pole_per_s: pole of the first detection filter, the only filter of the published study, 1/s
+    authority: detector that can raise the alarm and exclude candidates: one of the two, or both (`either`).
+    This key matters only with `statistical`
+    thresholds: bound of the isolation tests. `interval`: the residual must stay between a lower and an upper
+    bound. `published`: its magnitude must stay below one bound, as in the published study
+    detection_pole_per_s: pole of the first detection filter. The published study has only this filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
-    forgetting_time_s: time constant with which the estimates forget old data. It should exceed one period of
-    the reference, s
-    sharpen: steps beyond the published scheme: `all`, `none`, or true or false for each step
-    pole_bank_per_s: poles of further detection filters. A filter with the default pole uses only the last
-    frame, 1/s
-    fault_profile: assumption about the parameter of a fault. `any`: the parameter can change with time.
-    `abrupt`: the parameter is constant from the start of the fault
+    forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
+    period of the reference, s
+    sharpen: steps beyond the published scheme. `all` and `none` switch all steps; the section switches each
+    step
+    pole_bank_per_s: poles of the further detection filters. With the default pole, a filter uses only the
+    last frame, 1/s
+    fault_profile: assumption about the parameter of a fault, for example its size. `any`: the parameter can
+    change with time. `abrupt`: the parameter is constant from the start of the fault
     """
 
     scheme: Scheme = entry("adaptive-estimators", examples=["zhang2005"])
@@ -360,17 +364,18 @@ class EnginePower(Section, strict=True):
 
     enabled: false: the engine keeps its trim setting
     speed_gain_inhg_per_mps: reduction of the manifold pressure for each m/s above the mean airspeed. This
-    feedback damps the phugoid, inHg per m/s
+    feedback damps the phugoid, the slow oscillation of airspeed and height, inHg per m/s
     attitude_gain_inhg_per_deg: increase of the manifold pressure for each deg that the pitch attitude is too
     high. More power lowers the nose, inHg per deg
     washout_s: time constant of the mean airspeed. It should be about one period of the phugoid, s
     attitude_memory_s: time constant with which an earlier error of the pitch rate is forgotten, s
-    smoothing_s: time constant of the first-order lag that smooths noise and gusts in the measured airspeed, s
+    smoothing_s: time constant of a first-order lag. The lag smooths noise and gusts in the measured airspeed,
+    s
     lowest_inhg: manifold pressure with the throttle closed, inHg
     highest_inhg: highest manifold pressure. The default is the take-off rating of the engine R-985, inHg
     rate_inhg_s: fastest change of the manifold pressure, inHg/s
     patience_s: time for which both surfaces must be lost before engine power controls pitch, s
-    release_s: time for which a surface must act again before the engine returns to its trim setting, s
+    release_s: time for which a surface must act again until the engine returns to its trim setting, s
     """
 
     enabled: bool = True
@@ -396,14 +401,14 @@ class ControlConfig(Section, strict=True):
     """The control law and its gains. The published study states no gains, so this project chose the default
     values.
 
-    law: name of a control law. `beaver-ftc list laws` prints all names
+    law: name of the control law. `beaver-ftc list laws` prints all names
     options: parameters of the law, by name
-    gain_margin_db: smallest gain margin of every loop of the default law, for larger and for smaller gains,
-    dB
+    gain_margin_db: smallest gain margin of every loop of the default law, both for larger and for smaller
+    gains, dB
     phase_margin_deg: smallest phase margin of every loop of the default law, deg
-    noise_share: with the default law, gyro noise moves the surfaces. This key limits the standard deviation
-    of the surface rate, divided by the rate limit. With 0.5 the rate stays within the limit for 95 % of the
-    time
+    noise_share: limit for the surface rate that gyro noise causes with the default law: its standard
+    deviation, divided by the rate limit of the surface. With 0.5 the rate is below the rate limit for 95 % of
+    the time
     proportional_per_s: proportional gain Kp of the tracking error, 1/s
     integral_per_s2: integral gain Ki of the tracking error. With Ki = Kp^2/4 the error has two equal poles at
     Kp/2, 1/s2
@@ -412,13 +417,13 @@ class ControlConfig(Section, strict=True):
     reference_damping: damping ratio of the reference model. A ratio of 1 or more gives no overshoot
     network_gain_per_s2: learning gain of the network of the laws `adaptive` and `fault-tolerant-published`,
     1/s2
-    network_leak_per_s: rate at which the network forgets. The network forgets from the isolation on, because
-    the isolated fault then explains the error, 1/s
+    network_leak_per_s: rate at which the network forgets after the isolation. The isolated fault then
+    explains the error, 1/s
     network_weight_limit_rad_s2: largest magnitude of each weight of the network, rad/s2
-    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses. This limit prevents jumps
-    of the command, 1/s
+    effectiveness_rate_per_s: fastest change of the effectiveness that the law uses. It prevents jumps of the
+    command, 1/s
     least_effectiveness: smallest effectiveness with which the law still uses a surface
-    hand_over_s: duration of the reallocation from a failed surface to the surface that replaces it, s
+    hand_over_s: duration of the reallocation from a failed surface to its stand-in, s
     power: control of pitch by engine power, if elevator and flap are both lost
     """
 

@@ -171,7 +171,8 @@ MOST_NAMES = 20  # of a flight: as many surfaces as an aircraft may have
 
 class InertiaCoupling(Section):
     """Relative errors of the inertia coupling in the truth. The inertia coupling is the angular acceleration
-    from products of two body rates. In the published study these errors are at most 0.25."""
+    that comes from products of two body rates. In the published study [Zhang2005] these errors are at most
+    0.25."""
 
     p: Number = number(
         0.0, "share of 1", "error in roll, of the coefficient of q r", ge=-1, le=1, examples=[0.2]
@@ -185,7 +186,7 @@ class InertiaCoupling(Section):
 
 
 class Sinusoid(Section):
-    """An error of one angular acceleration: amplitude times sin(frequency t) at the time t."""
+    """An error of one angular acceleration: amplitude times sin(frequency t). t is the time of the flight."""
 
     amplitude_rad_s2: Number = number(0.0, "rad/s2", "amplitude", ge=0, le=10, examples=[0.02])
     frequency_rad_s: Number = number(10.0, "rad/s", "angular frequency", gt=0, le=1000)
@@ -202,9 +203,9 @@ class SinusoidAxes(Section):
 class TrueInertia(Section):
     """Inertia of the truth, divided by the inertia in the aircraft file."""
 
-    Ix: Number = number(1.0, "share of 1", "roll inertia", ge=0.5, le=2)
-    Iy: Number = number(1.0, "share of 1", "pitch inertia", ge=0.5, le=2)
-    Iz: Number = number(1.0, "share of 1", "yaw inertia", ge=0.5, le=2)
+    Ix: Number = number(1.0, "1", "roll inertia", ge=0.5, le=2)
+    Iy: Number = number(1.0, "1", "pitch inertia", ge=0.5, le=2)
+    Iz: Number = number(1.0, "1", "yaw inertia", ge=0.5, le=2)
 
 
 Offset = Annotated[Number, Field(ge=-0.5, le=0.5)]
@@ -214,9 +215,9 @@ class Uncertainty(Section):
     """Differences between the truth and the design model.
 
     inertia_coupling: relative errors of the inertia coupling
-    sinusoid: sinusoidal angular accelerations
-    coefficients: factors on aerodynamic terms of the truth, by name of the term. A factor of 1 is no error
-    mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, share of 1
+    sinusoid: sinusoidal errors of the angular accelerations
+    coefficients: factors on aerodynamic terms of the truth, by name of the term. 1: no error
+    mass: mass of the truth, divided by the mass in the aircraft file. The inertia is not changed, 1
     inertia: inertia of the truth
     cg_m: shift of the true centre of gravity from its position in the aircraft file: forward, right, down, m
     """
@@ -224,7 +225,7 @@ class Uncertainty(Section):
     inertia_coupling: InertiaCoupling = entry(InertiaCoupling)
     sinusoid: SinusoidAxes = entry(SinusoidAxes)
     coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 1.05}])
-    mass: Number = number(1.0, "share of 1", ge=0.5, le=2)
+    mass: Number = number(1.0, "1", ge=0.5, le=2)
     inertia: TrueInertia = entry(TrueInertia)
     cg_m: tuple[Offset, Offset, Offset] = number((0.0, 0.0, 0.0), "m", examples=[[0.05, 0, 0]])
 
@@ -235,9 +236,9 @@ Scale = Annotated[Number, Field(ge=0.1, le=10)]
 class InertiaScale(Section):
     """Inertia of the design model, divided by the inertia in the aircraft file."""
 
-    Ix: Scale = number(1.0, "share of 1", "roll inertia")
-    Iy: Scale = number(1.0, "share of 1", "pitch inertia")
-    Iz: Scale = number(1.0, "share of 1", "yaw inertia")
+    Ix: Scale = number(1.0, "1", "roll inertia")
+    Iy: Scale = number(1.0, "1", "pitch inertia")
+    Iz: Scale = number(1.0, "1", "yaw inertia")
     Jxz: Ratio = number(1.0, "1", "product of inertia")
 
 
@@ -247,18 +248,17 @@ class DesignModel(Section):
     engine_terms: false: the design model has no slipstream terms (`dpt`) in Cl, Cm and Cn, as in the
     published study
     linearised: true: the design model is linearised about the trim at the start
-    frozen_alpha: true: in the design model, alpha always has its trim value
+    frozen_alpha: true: the design model uses the trim value of alpha at all times
     mass: mass of the design model, divided by the mass in the aircraft file. The inertia is multiplied by the
-    same factor, share of 1
+    same factor, 1
     inertia: inertia of the design model
-    coefficients: factors on aerodynamic terms of the design model, by name of the term. A factor of 1 is no
-    error
+    coefficients: factors on aerodynamic terms of the design model, by name of the term. 1: no error
     """
 
     engine_terms: Flag = True
     linearised: Flag = False
     frozen_alpha: Flag = False
-    mass: Scale = number(1.0, "share of 1")
+    mass: Scale = number(1.0, "1")
     inertia: InertiaScale = entry(InertiaScale)
     coefficients: Ratios = entry(dict, examples=[{"Cm_alpha": 0.9}])
 
@@ -289,7 +289,7 @@ class Change(Section):
 
 
 class RmsLimits(Section):
-    """Largest allowed RMS tracking error of each axis."""
+    """Largest allowed root mean square (RMS) of the tracking error on each axis."""
 
     p: Number | None = number(None, "deg/s", "roll rate", ge=0, le=1000, examples=[1.5])
     q: Number | None = number(None, "deg/s", "pitch rate", ge=0, le=1000, examples=[1.5])
@@ -297,8 +297,8 @@ class RmsLimits(Section):
 
 
 class Arrival(Section):
-    """Largest allowed deviations from the commanded flight path at the end of the flight, after a first-order
-    lag of 10 s."""
+    """Largest allowed deviations from the commanded flight path at the end of the flight. Each deviation
+    first passes a first-order lag of 10 s."""
 
     altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
     airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
@@ -320,23 +320,24 @@ class Expect(Section):
 
     detected_within_s: largest allowed time from the fault to the first alarm, s
     isolated_as: name that the diagnosis must give: a surface, an instrument such as `sensor p`, or
-    `unanticipated`. With a list, the diagnosis must give exactly these names, in the order of the faults.
-    Withdrawn names count, but a name given before its fault does not count
+    `unanticipated`. A list contains one name for each fault, in the order of the faults; the diagnosis must
+    give exactly these names. A name that was withdrawn later counts. A name that was given before its fault
+    does not count
     isolated_type: fault type that the diagnosis must name
-    candidate_type: fault type that the diagnosis must name, or must not exclude
-    isolated_within_s: largest allowed time from the fault to the isolation, s
-    no_false_alarm: true: no alarm may be raised before a fault. false: such an alarm must be raised
+    candidate_type: fault type that must be named, or at least must not be excluded
+    isolated_within_s: largest allowed time from the fault to its name, s
+    no_false_alarm: true: no alarm before the first fault. false: an alarm before the first fault is required
     no_departure: true: the aircraft must not be lost. false: the aircraft must be lost
-    pre_fault_rms_deg_s: largest allowed RMS tracking error before the fault. Without a fault the whole flight
-    counts
+    pre_fault_rms_deg_s: largest allowed RMS tracking error before the fault. Without a fault it is computed
+    over the whole flight
     post_fault_rms_deg_s: largest allowed RMS tracking error after the fault
     altitude_within_m: largest allowed deviation from the commanded altitude, m
-    airspeed_within_mps: largest allowed deviation from the commanded airspeed, after a first-order lag of 10
-    s, m/s
-    airspeed_within_limits_mps: largest allowed deviation from the commanded airspeed, limited to the
-    airspeeds that the aircraft can hold after a fault. The deviation has a first-order lag of 10 s, m/s
-    heading_within_deg: largest allowed deviation from the commanded heading. The first 30 s after each change
-    of the command do not count, deg
+    airspeed_within_mps: largest allowed deviation from the commanded airspeed. The deviation first passes a
+    first-order lag of 10 s, m/s
+    airspeed_within_limits_mps: as `airspeed_within_mps`, but the commanded airspeed is first limited to the
+    airspeeds that the aircraft can hold after the fault, m/s
+    heading_within_deg: largest allowed deviation from the commanded heading. After each change of the
+    command, 30 s do not count, deg
     stays_in_envelope: true: the flight must stay inside the validated envelope. false: the flight must leave
     this envelope
     arrives: largest allowed deviations from the commanded flight path at the end of the flight. A lost
@@ -368,14 +369,14 @@ class Expect(Section):
 class Scenario(Section, title="beaver-ftc scenario"):
     """One flight: aircraft, manoeuvre, faults, diagnosis, control law and expectations.
 
-    name: name of the result folder. It consists of letters, digits, - and _
+    name: name of the result folder: letters, digits, - and _
     description: purpose of the flight
-    aircraft: name of a built-in aircraft, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER for
+    aircraft: built-in name of an aircraft, jsbsim:NAME for an aircraft of the JSBSim package, or ./FOLDER for
     an aircraft folder beside this file
     duration_s: length of the flight, s
     rate_hz: frame rate of diagnosis and control, Hz
     substeps: number of JSBSim steps in each frame
-    seed: seed of all random numbers of the flight
+    seed: seed of all random numbers of the flight. The same scenario and seed give the same numbers
     initial: flight condition at the start, trimmed
     reference: commanded body rates
     autopilot: flight path that the outer loops follow; left out: only the body rates are controlled

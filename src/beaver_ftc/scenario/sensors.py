@@ -123,8 +123,8 @@ class DynamicPressure(_Sensor):
 
 
 class AttitudeAngle(FlowVane):
-    """Bank angle, pitch attitude or heading, from a vertical or directional gyro, or from integrated rates.
-    Integrated rates drift."""
+    """Bank angle, pitch attitude or heading. The instrument is a vertical gyro or a directional gyro, or it
+    integrates rates. Integrated rates drift."""
 
     drift_deg_h: Number = number(
         0.0,

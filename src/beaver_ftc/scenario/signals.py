@@ -132,7 +132,7 @@ class _Wave(_Window):
 
 
 class Sine(_Wave):
-    """A sine: amplitude times sin(2 pi frequency tau + phase), with the time tau since start_s."""
+    """A sine: amplitude times sin(2 pi frequency tau + phase). tau is the time since start_s."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -145,7 +145,8 @@ class Sine(_Wave):
 
 
 class Doublet(Section):
-    """Two pulses: +amplitude for width_s, then -amplitude for width_s. Their changes of angle cancel."""
+    """Two pulses: +amplitude for width_s, then -amplitude for width_s. The second pulse turns the aircraft
+    back by the same angle."""
 
     amplitude_deg_s: Number = _amplitude()
     start_s: Number = _start()
@@ -170,8 +171,8 @@ class Step(_Window):
 
 
 class Square(_Wave):
-    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. It has the
-    sign of the `sine` with the same frequency and phase."""
+    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. Its sign is
+    always that of a `sine` with the same amplitude, frequency and phase."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -223,11 +224,11 @@ class Csv(Section):
     """A table in a CSV file. Between two rows the rate is interpolated linearly. Before the first row and
     after the last row it is constant.
 
-    The table is read when the scenario is loaded. It becomes a part of the scenario, as `time_s` and
-    `values_deg_s`. The scenario in a result folder therefore needs no CSV file.
+    The table is read when the scenario is loaded. It then becomes a part of the scenario, as `time_s` and
+    `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
-    column: name of the column that contains the rates in deg/s. The column `t_s` contains the times in s
+    column: name of the column with the rates in deg/s. The times in s are in the column `t_s`
     time_s: times of the rows. Usually they are read from the file, s
     values_deg_s: rates of the rows. Usually they are read from the file, deg/s
     """
@@ -332,7 +333,7 @@ def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
 
 
 class Signal(Section):
-    """One signal: a mapping of exactly one kind to its parameters."""
+    """One signal. The section has exactly one of these keys, the kind of the signal."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
@@ -362,7 +363,8 @@ Signals = tuple[Signal, ...]
 
 
 class Reference(Section):
-    """Commanded body rates. All signals of an axis are added. The command of an axis without signals is 0."""
+    """Commanded body rates. If an axis has several signals, they are added. If an axis has no signal, its
+    command is 0."""
 
     p: Signals = entry((), "signals of the roll rate", max_length=50)
     q: Signals = entry((), "signals of the pitch rate", max_length=50)
@@ -477,13 +479,14 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The flight path. A quantity that is left out is not controlled."""
+    """The flight path. Each quantity has a list of legs. At its time, a leg sets a new `value`, or keeps the
+    present one with `hold: true`. A quantity that is left out is not controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
         "legs of the altitude"
     )
     airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
-        "legs of the true airspeed. Engine power holds it; without an engine, pitch holds it"
+        "legs of the true airspeed. Engine power holds the airspeed. Without an engine, pitch holds it"
     )
     heading_deg: tuple[HeadingLeg, ...] = _legs("legs of the true heading")
     bank_deg: tuple[BankLeg, ...] = _legs("legs of the bank angle")

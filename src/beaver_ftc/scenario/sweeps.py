@@ -59,14 +59,16 @@ _DERIVED = {"name": "follows from the sweep's name", "seed": "follows from the s
 
 
 class Variation(Section):
-    """How one key varies. The mapping has exactly one of these kinds of variation.
+    """How one key varies. The section has exactly one of the kinds `uniform`, `loguniform`, `normal`,
+    `linspace` and `choice`.
 
-    uniform: [lowest, highest]. All values between are equally likely
-    loguniform: [lowest, highest]. All logarithms between are equally likely
-    normal: [mean, standard deviation]
-    within: [lowest, highest] limits of the values of `normal`. Only with `normal`
-    linspace: [first, last, count]. `count` evenly spaced values from first to last, which are flown in order
-    choice: list of values. All are equally likely
+    uniform: [lowest, highest]: all values between are equally likely
+    loguniform: [lowest, highest]: the logarithms of the values are equally likely
+    normal: [mean, standard deviation] of a normal distribution
+    within: [lowest, highest]: limits for the values of `normal`. Allowed only together with `normal`
+    linspace: [first, last, count]: evenly spaced values from first to last, as many as `count`. They are
+    flown in this order
+    choice: list of values: all are equally likely
     """
 
     uniform: Span | None = number(None, "as the key", range="rising", examples=[[0.2, 0.8]])
@@ -124,13 +126,13 @@ class Variation(Section):
 
 
 class Level(Section):
-    """A limit for a rate that is estimated from the flights. With `confidence` the limit applies to the
-    one-sided confidence bound of the rate.
+    """A limit for a rate that is estimated from the flights. Without `confidence`, the estimate must meet the
+    limit. With `confidence`, its one-sided confidence bound must meet the limit: the lower bound for
+    `at_least`, the upper bound for `at_most`.
 
     at_least: smallest allowed value
     at_most: largest allowed value
-    confidence: confidence of the one-sided bound that is compared with the limit; left out: the estimate is
-    compared with the limit
+    confidence: confidence of the one-sided bound; left out: the estimate itself is compared with the limit
     """
 
     at_least: Number | None = entry(None, range="any", examples=[0.9])
@@ -147,11 +149,11 @@ class Level(Section):
 
 
 class QuantileLevel(Level):
-    """A limit for a quantile over the flights.
+    """A limit for a quantile over the flights. With `confidence`, the one-sided confidence bound of the
+    quantile must meet the limit.
 
     at_most: largest allowed value
-    confidence: confidence of the one-sided bound that is compared with the limit; left out: the estimate is
-    compared with the limit
+    confidence: confidence of the one-sided bound; left out: the estimate itself is compared with the limit
     """
 
     at_most: Number | None = entry(None, range="any", examples=[1])
@@ -162,7 +164,7 @@ class QuantileLevel(Level):
     quantile: Number = number(
         0.95,
         "share of 1",
-        "which quantile of the flights is compared with the limit. 0.5 is the median",
+        "quantile that is compared with the limit. 0.5 is the median",
         gt=0,
         lt=1,
         needs={"at_most": 1},
@@ -180,18 +182,19 @@ class AxisLevels(Section):
 class SweepExpect(Section):
     """Conditions on the statistics of a sweep. A condition that is left out is not checked.
 
-    detection_rate: share of the faults that were detected
+    detection_rate: share of faults that were detected
     isolation_rate: share of faults that were named correctly
-    false_alarms_per_hour: number of false alarms per hour without a fault
+    false_alarms_per_hour: number of false alarms in each hour without a fault
     departure_rate: share of flights in which the aircraft was lost
     failure_rate: share of flights that could not be flown
     pass_rate: share of flights that met every expectation of the base scenario
     detection_delay_s: time from the fault to the alarm. For a missed fault this time counts as infinite
     isolation_delay_s: time from the fault to the correct name. For a missing or wrong name this time counts
     as infinite
-    post_fault_rms_deg_s: RMS tracking error after the fault. For a lost aircraft it counts as infinite
-    tracking_ratio: RMS tracking error after the fault, divided by the RMS tracking error before the fault.
-    For a lost aircraft it counts as infinite
+    post_fault_rms_deg_s: root mean square (RMS) of the tracking error after the fault. For a lost aircraft it
+    counts as infinite
+    tracking_ratio: RMS tracking error after the fault, divided by the same error before the fault. For a lost
+    aircraft it counts as infinite
     """
 
     detection_rate: Level | None = number(None, "share of 1")
@@ -209,23 +212,24 @@ class SweepExpect(Section):
 class SweepFile(Section, title="beaver-ftc sweep"):
     """Many flights: a base scenario, the keys that vary, and the conditions that the statistics must meet.
 
-    name: name of the result folder. It consists of letters, digits, - and _
+    name: name of the result folder: letters, digits, - and _
     description: purpose of the sweep
     base: scenario that is varied: a built-in name, a scenario file beside this file, or the keys of a
     scenario
-    set: new values of keys of the base, for all flights. A key is written with dots, e.g.
+    set: new values of keys of the base, the same in all flights. A key is written with dots, e.g.
     `initial.airspeed_mps`
-    runs: number of flights. Fewer flights than points of the grid fly its first points; more flights begin
-    the grid again; left out: one flight for each point of the grid
-    seed: seed of the drawn values and of the flights
-    sampling: how the values of a key are chosen: at random, every point of a grid, by a Latin hypercube or by
-    a Sobol sequence. A grid accepts only `linspace` and `choice`. `linspace` always takes its values in order
-    vary: keys of the base that vary, written with dots, and how each key varies
+    runs: number of flights. If it is smaller than the grid, only the first points of the grid are flown. If
+    it is larger, the grid is flown again; left out: one flight for each point of the grid
+    seed: seed of all random values of the sweep
+    sampling: how the values are chosen. `random`: each flight independently. `lhs`: Latin hypercube. `sobol`:
+    Sobol sequence. Both fill the ranges more evenly than `random`. `grid`: all combinations, only for
+    `linspace` and `choice`. The values of `linspace` are always taken in order
+    vary: keys of the base that vary, and how each key varies. A key is written with dots
     expect: conditions that the statistics must meet
     """
 
     name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["loss-of-the-elevator"])
-    description: str = entry("", max_length=2000, examples=["How small a loss is seen."])
+    description: str = entry("", max_length=2000, examples=["Which losses are detected?"])
     base: str | dict[str, Any] = entry(..., examples=["elevator-partial-loss"])
     set: dict[str, Any] = entry(dict, examples=[{"duration_s": 20}])
     runs: Whole | None = entry(None, ge=1, le=MAX_RUNS, examples=[100])

@@ -66,7 +66,8 @@ class OfSweep(SweepExpect):
 
 
 class OfHandling(Section):
-    """Required level of handling qualities by MIL-F-8785C: in trim, or after the fault of the scenario."""
+    """Required level of handling qualities of the standard MIL-F-8785C. If the scenario has a fault, the
+    level after the fault counts. Otherwise the level in trim counts."""
 
     type: Literal["handling_qualities"]
     level: Whole = number(1, "1", "worst allowed level. 1 is the best level", ge=1, le=3)
@@ -74,11 +75,11 @@ class OfHandling(Section):
 
 class OfMargins(Section):
     """Required stability margins of the loop of each surface. They must hold for the healthy aircraft, and
-    after each loss for which the default law is designed."""
+    also after each loss for which the default law is designed."""
 
     type: Literal["margins"]
     gain_db: Number = number(
-        6.0, "dB", "smallest allowed gain margin, for larger and for smaller gains", ge=0, le=100
+        6.0, "dB", "smallest allowed gain margin, both for larger and for smaller gains", ge=0, le=100
     )
     phase_deg: Number = number(45.0, "deg", "smallest allowed phase margin", ge=0, le=180)
 
@@ -87,16 +88,17 @@ Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
 
 
 class Requirement(Section):
-    """One requirement: its text, its clause, its flights and its condition (`expect`, `formula` or `bar`).
+    """One requirement: its name, its text, its flights and its test. The test is exactly one of `expect`,
+    `formula` and `bar`.
 
     id: name of the requirement: letters, digits, - and _
     text: the requirement in words
-    clause: clause of a regulation or standard, and how it is interpreted
-    over: flights that the requirement is about: names from `flights`, names of built-in scenarios and sweeps,
-    or files in the folder of the plan or below it
+    clause: clause of a regulation or standard from which the requirement comes, and how you read it
+    over: flights that must meet the requirement: names from `flights`, names of built-in scenarios and
+    sweeps, or files in the folder of the plan or below it
     expect: conditions that each flight must meet, as in the `expect` of a scenario
     formula: formula of signal temporal logic over columns of the log. It must be true in each flight
-    bar: limit for the result of a study
+    bar: limit that the result of a study must meet
     """
 
     id: str = entry(..., pattern=NAME_PATTERN, max_length=40, examples=["JAM-1"])
@@ -121,7 +123,8 @@ class PlanFile(Section, title="beaver-ftc plan of evidence"):
 
     name: name of the plan: letters, digits, - and _
     description: purpose of the plan
-    flights: scenarios and sweeps of this plan, by name
+    flights: scenarios and sweeps of this plan, by name. A sweep has at least one of the keys `base`, `vary`
+    and `runs`
     requirements: list of the requirements
     """
 

@@ -127,7 +127,7 @@ class EffectivenessFilter:
 
 
 class AugmentedEkf(EffectivenessFilter):
-    """Extended Kalman filter of effectiveness, chi-square test on the estimates [Jazwinski1970]."""
+    """Extended Kalman filter that estimates effectiveness, with a chi-square test [Jazwinski1970]."""
 
     name: ClassVar[str] = "augmented-ekf"
     # alarm: chi-square value of the largest theta^2 / variance
@@ -167,7 +167,7 @@ class AugmentedEkf(EffectivenessFilter):
 
 
 class AugmentedUkf(EffectivenessFilter):
-    """Unscented Kalman filter of effectiveness, CUSUM on the innovation squared [Julier2004]."""
+    """Unscented Kalman filter that estimates effectiveness, with a CUSUM test [Julier2004]."""
 
     name: ClassVar[str] = "augmented-ukf"
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {

@@ -60,7 +60,7 @@ def posterior_probabilities(predicted_probabilities: np.ndarray, log_likelihoods
 
 
 class InteractingMultipleModels:
-    """Interacting multiple models of lost effectiveness, alarm on the odds of a fault [Blom1988]."""
+    """Interacting multiple models, one for each loss; the odds of a fault raise the alarm [Blom1988]."""
 
     name: ClassVar[str] = "multiple-models"
     defaults: ClassVar[Mapping[str, float]] = {

@@ -80,7 +80,7 @@ def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
 
 
 class ConstantThresholdObserver:
-    """Observer residual with a constant threshold, surface named by least squares [Chen1999]."""
+    """Observer residual with a constant threshold; least squares name the surface [Chen1999]."""
 
     name: ClassVar[str] = "observer-constant"
     defaults: ClassVar[Mapping[str, float]] = {"alarm": 2.0, "pole_per_s": 10.0, "window_s": 0.5}

@@ -69,7 +69,7 @@ class InputOutputPredictionTest:
 
 
 class RlsMonitor:
-    """Recursive least-squares monitor of each surface and its rate, without a model [Keipour2019]."""
+    """Recursive least squares between each surface and its rate, without an aircraft model [Keipour2019]."""
 
     name: ClassVar[str] = "rls-monitor"
     defaults: ClassVar[Mapping[str, float]] = {

@@ -172,7 +172,8 @@ def _wrong(case: str) -> str | None:
 
 
 class Damage(Switched):
-    """A case of damage that the aircraft declares: it changes aerodynamics and mass, and removes surfaces.
+    """A case of damage that the file of the aircraft declares. It changes aerodynamics and mass, and removes
+    surfaces.
 
     case: name of the case in the file of the aircraft
     """
@@ -188,7 +189,7 @@ class Damage(Switched):
 
 
 class LossOfEffectiveness(Gradual):
-    """The surface gives the share 1 - magnitude of its healthy moment.
+    """The moment of the surface is (1 - magnitude) times its healthy moment.
 
     actuator: surface that fails, a surface of the aircraft: `aileron`, `elevator`, `rudder` or `flap` of the
     Beaver
@@ -254,7 +255,7 @@ class Stuck(Switched):
 
 
 class Hardover(Switched):
-    """The surface runs at its rate limit to a stop."""
+    """The surface runs to a stop at its rate limit."""
 
     properties, holds = (("hardover", 0.0),), "hardover"
     adds, size = False, ("at", "deg")
@@ -265,7 +266,9 @@ class Hardover(Switched):
 
     type: Literal["hardover"]
     actuator: Actuator = entry(..., SURFACE_SAYS)
-    direction: Literal[1, -1] = entry(1, "stop to which the surface runs. 1: upper stop. -1: lower stop")
+    direction: Literal[1, -1] = entry(
+        1, "stop to which the surface runs. 1: upper stop, the largest positive deflection. -1: lower stop"
+    )
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["hardover"] = float(self.direction)
@@ -323,7 +326,7 @@ class RateLimit(Gradual):
 
 
 class Oscillatory(Gradual):
-    """The surface oscillates about its command."""
+    """The surface oscillates about the position that its command requires."""
 
     properties = (("oscillation-amplitude-rad", 0.0), ("oscillation-frequency-rad_sec", 0.0))
     truth, size = ("amplitude_deg", 1.0), ("by", "deg")

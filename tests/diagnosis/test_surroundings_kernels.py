@@ -323,7 +323,7 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
         (1e-3, 2e-3, 3e-3),
     )
     (
-        record["gust"]["config"]["only_coarse_estimate"],
+        record["gust"]["config"]["has_only_coarse_estimate"],
         record["gust"]["config"]["rolling_gust_correlation_length"],
         record["gust"]["config"]["wing_span"],
     ) = moving, 20.0, 5.0 * np.pi

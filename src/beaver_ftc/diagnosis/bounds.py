@@ -95,9 +95,9 @@ def declared_errors_dtype(n: int) -> np.dtype:
         constant_gyro_error_bound=3,  # of the offset of a gyro, what does not change
         air_rotation_bound=3, deflection_error_bound=float,
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
-        # far the reading of the altitude can be off, m, and as a share
-        air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_bound_m=float,
-        altitude_error_share=float,
+        # far the reading of the altitude can be off: offset, m, and slope
+        air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_offset_m=float,
+        altitude_error_slope=float,
         # of dpt: see `slipstream_error_bound`
         has_engine_errors=int, engine_power_error_kw=float, density_power_error_kw=float,
         # scratch: magnitudes as measured, and as large as they can be
@@ -614,7 +614,7 @@ def set_air_rotation_bound(declared_errors, measured_altitude_m):
     """Set the bound on the air's rotation, rad/s, for this altitude."""
     if declared_errors.air_rotation_bound_at_1_m > 0.0:
         min_height_m = min_true_height_m(
-            measured_altitude_m, declared_errors.altitude_error_bound_m, declared_errors.altitude_error_share
+            measured_altitude_m, declared_errors.altitude_error_offset_m, declared_errors.altitude_error_slope
         )
         declared_errors.air_rotation_bound[:] = max(
             declared_errors.air_rotation_bound_aloft,
@@ -713,8 +713,8 @@ def fill_declared_errors(
     declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
-    declared_errors["altitude_error_bound_m"] = sensor_errors["altitude"].worst
-    declared_errors["altitude_error_share"] = sensor_errors["altitude"].slope
+    declared_errors["altitude_error_offset_m"] = sensor_errors["altitude"].worst
+    declared_errors["altitude_error_slope"] = sensor_errors["altitude"].slope
     declared_errors["signal_error_offset"] = sensor_errors.each("worst")
     declared_errors["signal_error_slope"] = sensor_errors.each("slope")
     declared_errors["constant_gyro_error_bound"] = sensor_errors.each("steady", AXES)

@@ -71,12 +71,12 @@ MIN_GUST_AXES_TURN_INTENSITY_SHARE = 0.01
 
 GUST_CONFIG_RECORD = record(
     has_force_model=int,  # whether the design model has forces
-    only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
+    has_only_coarse_estimate=int,  # whether only a coarse estimate of the gust is possible
     wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
     # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
     gust_rotation_intensity_per_airspeed_aloft=3, gust_rotation_intensity_per_airspeed_at_1_m=3,
-    altitude_error_bound=float,
-    altitude_error_share=float,  # bound on the altimeter's error: m; share of the reading
+    altitude_error_offset_m=float,
+    altitude_error_slope=float,  # bound on the altimeter's error: offset, m; slope
     # limit of a gust component, m/s; decay of `gust_velocity_change_since_start`, 1/s
     max_gust_velocity=float, gust_velocity_decay_rate=float,
     # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
@@ -138,10 +138,10 @@ def fill_specific_force(gust, x, y, u, out):
     x (3,) rad/s, y (4 + declared,), u (n,) rad. The term of the rate of sideslip is omitted: it is below a
     hundredth of the side force.
     """
-    table = gust.memory.force_table
-    evaluate(table, x, y)
+    force_table = gust.memory.force_table
+    evaluate(force_table, x, y)
     for i in range(3):
-        out[i] = y[QDYN] * gust.config.wing_area_per_mass * whole_sum(table, i, table.power, u)
+        out[i] = y[QDYN] * gust.config.wing_area_per_mass * whole_sum(force_table, i, force_table.power, u)
 
 
 @kernel
@@ -159,12 +159,12 @@ def fill_level_to_body_rotation(phi, theta, level_to_body):
 
 
 @kernel
-def level_component(level_to_body, body_vector, i):
-    """Component i in level axes of a vector (3,) in body axes."""
+def level_component(level_to_body, body_vector, level_axis):
+    """Component along a level axis of a vector (3,) in body axes."""
     return (
-        level_to_body[0, i] * body_vector[0]
-        + level_to_body[1, i] * body_vector[1]
-        + level_to_body[2, i] * body_vector[2]
+        level_to_body[0, level_axis] * body_vector[0]
+        + level_to_body[1, level_axis] * body_vector[1]
+        + level_to_body[2, level_axis] * body_vector[2]
     )
 
 
@@ -177,14 +177,14 @@ def measure_air_relative_velocity(gust, y, attitude):
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
     fill_level_to_body_rotation(attitude[0], attitude[1], gust.memory.level_to_body)
     gust.memory.heading = attitude[2]
-    forward = V * np.cos(alpha) * np.cos(beta)
-    right = V * np.sin(beta)
-    down = V * np.sin(alpha) * np.cos(beta)
+    forward_velocity = V * np.cos(alpha) * np.cos(beta)
+    right_velocity = V * np.sin(beta)
+    down_velocity = V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
         gust.memory.air_relative_velocity[i] = (
-            gust.memory.level_to_body[0, i] * forward
-            + gust.memory.level_to_body[1, i] * right
-            + gust.memory.level_to_body[2, i] * down
+            gust.memory.level_to_body[0, i] * forward_velocity
+            + gust.memory.level_to_body[1, i] * right_velocity
+            + gust.memory.level_to_body[2, i] * down_velocity
         )
 
 
@@ -216,9 +216,14 @@ def update_gust_axes(gust, sin_heading_change, cos_heading_change):
     """
     gust.memory.gust_axes_rate[:] = gust.output.gust_axes_in_body
     for i in range(3):
-        ahead, right = gust.memory.level_to_body[i, 0], gust.memory.level_to_body[i, 1]
-        gust.output.gust_axes_in_body[i, 0] = ahead * cos_heading_change - right * sin_heading_change
-        gust.output.gust_axes_in_body[i, 1] = ahead * sin_heading_change + right * cos_heading_change
+        level_ahead_component = gust.memory.level_to_body[i, 0]
+        level_right_component = gust.memory.level_to_body[i, 1]
+        gust.output.gust_axes_in_body[i, 0] = (
+            level_ahead_component * cos_heading_change - level_right_component * sin_heading_change
+        )
+        gust.output.gust_axes_in_body[i, 1] = (
+            level_ahead_component * sin_heading_change + level_right_component * cos_heading_change
+        )
         gust.output.gust_axes_in_body[i, 2] = gust.memory.level_to_body[i, 2]
 
 
@@ -231,15 +236,15 @@ def update_gust_axes_rate(gust, dt, V):
     rate sigma gust_axes_rate. Over its lag this equals a random walk of (gust_axes_rate lag)^2 / 2 times its
     intensity.
     """
-    fastest_turn = 0.0
+    max_axes_rate = 0.0
     for i in range(3):
-        for g in range(3):
-            gust.memory.gust_axes_rate[i, g] = (
-                gust.output.gust_axes_in_body[i, g] - gust.memory.gust_axes_rate[i, g]
+        for gust_axis in range(3):
+            gust.memory.gust_axes_rate[i, gust_axis] = (
+                gust.output.gust_axes_in_body[i, gust_axis] - gust.memory.gust_axes_rate[i, gust_axis]
             ) / dt
-            fastest_turn = max(fastest_turn, abs(gust.memory.gust_axes_rate[i, g]))
+            max_axes_rate = max(max_axes_rate, abs(gust.memory.gust_axes_rate[i, gust_axis]))
     gust.memory.has_fast_axes_turn = (
-        0.5 * (fastest_turn * gust.config.rolling_gust_correlation_length / V) ** 2
+        0.5 * (max_axes_rate * gust.config.rolling_gust_correlation_length / V) ** 2
         > MIN_GUST_AXES_TURN_INTENSITY_SHARE
     )
 
@@ -283,24 +288,36 @@ def update_gust_rotation(gust, y, attitude, dt):
             1.5 * level_acceleration[i] - 0.5 * gust.memory.level_acceleration_before[i]
         )
     heading_change = wrapped(attitude[2] - gust.memory.heading)
-    sin, cos = np.sin(heading_change), np.cos(heading_change)
-    predicted_ahead = gust.memory.air_relative_velocity[0] * cos + gust.memory.air_relative_velocity[1] * sin
-    predicted_right = gust.memory.air_relative_velocity[1] * cos - gust.memory.air_relative_velocity[0] * sin
-    predicted_down = gust.memory.air_relative_velocity[2]
-    gust.memory.level_acceleration_before[0] = level_acceleration[0] * cos + level_acceleration[1] * sin
-    gust.memory.level_acceleration_before[1] = level_acceleration[1] * cos - level_acceleration[0] * sin
+    sin_heading_change, cos_heading_change = np.sin(heading_change), np.cos(heading_change)
+    predicted_velocity_ahead = (
+        gust.memory.air_relative_velocity[0] * cos_heading_change
+        + gust.memory.air_relative_velocity[1] * sin_heading_change
+    )
+    predicted_velocity_right = (
+        gust.memory.air_relative_velocity[1] * cos_heading_change
+        - gust.memory.air_relative_velocity[0] * sin_heading_change
+    )
+    predicted_velocity_down = gust.memory.air_relative_velocity[2]
+    gust.memory.level_acceleration_before[0] = (
+        level_acceleration[0] * cos_heading_change + level_acceleration[1] * sin_heading_change
+    )
+    gust.memory.level_acceleration_before[1] = (
+        level_acceleration[1] * cos_heading_change - level_acceleration[0] * sin_heading_change
+    )
     gust.memory.level_acceleration_before[2] = level_acceleration[2]
     measure_air_relative_velocity(gust, y, attitude)
-    update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, y[AIRSPEED], dt)
+    update_gust_velocity_and_speed(
+        gust, predicted_velocity_ahead, predicted_velocity_right, predicted_velocity_down, y[AIRSPEED], dt
+    )
     V = gust.output.speed_relative_to_mean_air
-    update_gust_axes(gust, sin, cos)
+    update_gust_axes(gust, sin_heading_change, cos_heading_change)
     update_gust_axes_rate(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    share_before = gust.memory.unmeasured_yawing_share_by_turn_now
+    unmeasured_share_before = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(
         gust, V, heading_change / dt
     )
-    unmeasured_share = max(share_before, gust.memory.unmeasured_yawing_share_by_turn_now)
+    unmeasured_share = max(unmeasured_share_before, gust.memory.unmeasured_yawing_share_by_turn_now)
     gust.memory.unmeasured_yawing_share_by_past_turns = min(
         max(np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns, unmeasured_share),
         1.0,
@@ -309,14 +326,14 @@ def update_gust_rotation(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[1] = np.exp(
         -dt / pitching_lag_s
     ) * gust.memory.air_rotation_in_level_axes[1] + (
-        predicted_down - gust.memory.air_relative_velocity[2]
+        predicted_velocity_down - gust.memory.air_relative_velocity[2]
     ) / (V * pitching_lag_s)
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
     if unmeasured_share < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
-            predicted_right - gust.memory.air_relative_velocity[1]
+            predicted_velocity_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
     else:
         gust.memory.gust_velocity_change_since_start[:], gust.memory.remaining_initial_gust_variance_share = (
@@ -326,10 +343,12 @@ def update_gust_rotation(gust, y, attitude, dt):
 
 
 @kernel
-def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predicted_down, airspeed, dt):
+def update_gust_velocity_and_speed(
+    gust, predicted_velocity_ahead, predicted_velocity_right, predicted_velocity_down, airspeed, dt
+):
     """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
 
-    predicted_ahead, _right, _down, m/s: the velocity relative to the air if the gust had not changed.
+    predicted_velocity_ahead, _right, _down, m/s: velocity relative to the air if the gust had not changed.
     airspeed m/s: it is the speed if no gust is measured.
     """
     gust.output.speed_relative_to_mean_air = airspeed
@@ -339,50 +358,52 @@ def update_gust_velocity_and_speed(gust, predicted_ahead, predicted_right, predi
     gust.memory.remaining_initial_gust_variance_share *= decay_factor * decay_factor
     gust.memory.gust_velocity_change_since_start[0] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[0]
-        + predicted_ahead
+        + predicted_velocity_ahead
         - gust.memory.air_relative_velocity[0]
     )
     gust.memory.gust_velocity_change_since_start[1] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[1]
-        + predicted_right
+        + predicted_velocity_right
         - gust.memory.air_relative_velocity[1]
     )
     gust.memory.gust_velocity_change_since_start[2] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[2]
-        + predicted_down
+        + predicted_velocity_down
         - gust.memory.air_relative_velocity[2]
     )
-    squared_speed = 0.0
+    squared_speed_relative_to_mean_air = 0.0
     for i in range(3):
         gust.memory.gust_velocity_change_since_start[i] = min(
             max(gust.memory.gust_velocity_change_since_start[i], -gust.config.max_gust_velocity),
             gust.config.max_gust_velocity,
         )
-        squared_speed += (
+        squared_speed_relative_to_mean_air += (
             gust.memory.air_relative_velocity[i] + gust.memory.gust_velocity_change_since_start[i]
         ) ** 2
-    gust.output.speed_relative_to_mean_air = max(np.sqrt(squared_speed), 0.5 * airspeed)
+    gust.output.speed_relative_to_mean_air = max(np.sqrt(squared_speed_relative_to_mean_air), 0.5 * airspeed)
 
 
 @kernel
-def set_gust_rotation_intensity(gust, altitude):
-    """Fill the intensity of turbulence at this altitude, m as measured."""
-    height = min_true_height_m(altitude, gust.config.altitude_error_bound, gust.config.altitude_error_share)
+def set_gust_rotation_intensity(gust, measured_altitude_m):
+    """Fill the intensity of turbulence at this altitude."""
+    min_height_m = min_true_height_m(
+        measured_altitude_m, gust.config.altitude_error_offset_m, gust.config.altitude_error_slope
+    )
     gust.memory.gust_rotation_intensity_per_airspeed[0] = max(
         gust.config.gust_rotation_intensity_per_airspeed_aloft[0],
-        gust.config.gust_rotation_intensity_per_airspeed_at_1_m[0] / height**1.5,
+        gust.config.gust_rotation_intensity_per_airspeed_at_1_m[0] / min_height_m**1.5,
     )
-    for g in range(1, 3):
-        gust.memory.gust_rotation_intensity_per_airspeed[g] = max(
-            gust.config.gust_rotation_intensity_per_airspeed_aloft[g],
-            gust.config.gust_rotation_intensity_per_airspeed_at_1_m[g] / height,
+    for gust_axis in range(1, 3):
+        gust.memory.gust_rotation_intensity_per_airspeed[gust_axis] = max(
+            gust.config.gust_rotation_intensity_per_airspeed_aloft[gust_axis],
+            gust.config.gust_rotation_intensity_per_airspeed_at_1_m[gust_axis] / min_height_m,
         )
 
 
 @kernel
-def update_gust_estimate(gust, y, attitude, dt, k):
-    """Start at frame k = 0, and update the gust at later frames; arguments as in `update_gust_rotation`."""
-    if k > 0:
+def update_gust_estimate(gust, y, attitude, dt, frame_index):
+    """Start at frame 0, and update the gust at later frames; arguments as in `update_gust_rotation`."""
+    if frame_index > 0:
         update_gust_rotation(gust, y, attitude, dt)
     else:
         start_gust_estimate(gust, y, attitude)
@@ -396,7 +417,7 @@ def fill_gust_effect(gust, design, x, y, u):
     """
     if gust.output.uses_accelerometers:
         gust.memory.specific_force[:] = gust.memory.accelerometer_reading
-    elif gust.config.only_coarse_estimate:  # lift balances the weight, and turns with the bank
+    elif gust.config.has_only_coarse_estimate:  # lift balances the weight, and turns with the bank
         gust.memory.specific_force[0] = gust.memory.specific_force[1] = 0.0
         gust.memory.specific_force[2] = -gust.config.gravity / max(
             gust.memory.level_to_body[2, 2], MIN_BANK_COSINE
@@ -405,19 +426,21 @@ def fill_gust_effect(gust, design, x, y, u):
         fill_specific_force(gust, x, y, u, gust.memory.specific_force)
     rate_damping(design, x, y, u, gust.memory.scratch, gust.output.rate_damping)
     for i in range(3):
-        air_rotation = (
+        air_rotation_in_body_axis = (
             gust.output.gust_axes_in_body[i, 1] * gust.memory.air_rotation_in_level_axes[1]
             + gust.output.gust_axes_in_body[i, 2] * gust.memory.air_rotation_in_level_axes[2]
         )
         gust.memory.air_rotation_in_body_axes[i] = (
-            air_rotation if gust.output.is_gust_measured or gust.config.only_coarse_estimate else 0.0
+            air_rotation_in_body_axis
+            if gust.output.is_gust_measured or gust.config.has_only_coarse_estimate
+            else 0.0
         )
     for i in range(3):
-        acceleration = 0.0
+        acceleration_by_gust = 0.0
         for j in range(3):
-            acceleration -= gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
+            acceleration_by_gust -= gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
         gust.output.gust_acceleration[i], gust.output.coarse_gust_acceleration[i] = (
-            (acceleration, 0.0) if gust.output.is_gust_measured else (0.0, acceleration)
+            (acceleration_by_gust, 0.0) if gust.output.is_gust_measured else (0.0, acceleration_by_gust)
         )
 
 
@@ -442,9 +465,9 @@ def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
 
 
 @kernel
-def store_accelerometer_reading(gust, force):
-    """Keep the reading of the accelerometers, force (3,) m/s2."""
-    gust.memory.accelerometer_reading[:] = force
+def store_accelerometer_reading(gust, specific_force):
+    """Keep the reading of the accelerometers, specific_force (3,) m/s2."""
+    gust.memory.accelerometer_reading[:] = specific_force
 
 
 @kernel
@@ -462,17 +485,17 @@ def stop_accelerometers(gust):
     gust.output.uses_accelerometers = 0
     if gust.output.is_gust_measured and not gust.config.has_force_model:
         gust.output.is_gust_measured, gust.memory.unmeasured_intensity_share[:] = 0, 1.0
-        half_pitch_length_m = 0.5 * gust_correlation_length(gust, 1)
-        half_yaw_length_m = 0.5 * gust_correlation_length(gust, 2)
+        half_pitching_correlation_length_m = 0.5 * gust_correlation_length(gust, 1)
+        half_yawing_correlation_length_m = 0.5 * gust_correlation_length(gust, 2)
         for i in range(3):
             for j in range(3):
                 gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                    half_pitch_length_m
+                    half_pitching_correlation_length_m
                     * gust.memory.gust_rotation_intensity_per_airspeed[1]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 1)
                 )
                 gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                    half_yaw_length_m
+                    half_yawing_correlation_length_m
                     * gust.memory.gust_rotation_intensity_per_airspeed[2]
                     * gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, 2)
                 )
@@ -480,11 +503,11 @@ def stop_accelerometers(gust):
 
 
 @kernel
-def unmeasured_gust_intensity_share(gust, g):
-    """Share of the intensity of the gust about axis g that is unmeasured in this frame."""
-    if g == 0:
-        return min(gust.memory.unmeasured_intensity_share[g], 1.0)
-    speed_error_share = (
+def unmeasured_gust_intensity_share(gust, gust_axis):
+    """Share of the intensity of the gust about a gust axis that is unmeasured in this frame."""
+    if gust_axis == 0:
+        return min(gust.memory.unmeasured_intensity_share[gust_axis], 1.0)
+    unmeasured_share_by_speed_error = (
         gust.config.unmeasured_share_per_speed_variance
         * (
             gust.config.speed_error_variance
@@ -495,11 +518,11 @@ def unmeasured_gust_intensity_share(gust, g):
         else 0.0
     )
     return min(
-        gust.memory.unmeasured_intensity_share[g]
-        + speed_error_share
+        gust.memory.unmeasured_intensity_share[gust_axis]
+        + unmeasured_share_by_speed_error
         + (
             gust.memory.unmeasured_pitching_share_by_start
-            if g == 1
+            if gust_axis == 1
             else gust.memory.unmeasured_yawing_share_by_past_turns
         ),
         1.0,
@@ -507,50 +530,50 @@ def unmeasured_gust_intensity_share(gust, g):
 
 
 @kernel
-def low_frequency_power_ratio(gust, g):
-    """Power of the gust about axis g at low frequency, over that with the correlation length of the rolling
-    gust.
+def low_frequency_power_ratio(gust, gust_axis):
+    """Power of the gust about a gust axis at low frequency, over that with the correlation length of the
+    rolling gust.
 
     It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
     """
     return (
-        (gust_correlation_length(gust, g) / gust.config.rolling_gust_correlation_length) ** 2
-        if gust.config.only_coarse_estimate
+        (gust_correlation_length(gust, gust_axis) / gust.config.rolling_gust_correlation_length) ** 2
+        if gust.config.has_only_coarse_estimate
         else 1.0
     )
 
 
 @kernel
-def gust_lag_s(gust, g, V):
-    """Lag of the gust about axis g, s, at a speed V m/s: its correlation length over V."""
-    if g == 0:
+def gust_lag_s(gust, gust_axis, V):
+    """Lag of the gust about a gust axis, s, at a speed V m/s: its correlation length over V."""
+    if gust_axis == 0:
         return gust.config.rolling_gust_correlation_length / V
-    return (4.0 if g == 1 else 3.0) * gust.config.wing_span / (pi * V)
+    return (4.0 if gust_axis == 1 else 3.0) * gust.config.wing_span / (pi * V)
 
 
 @kernel
-def gust_correlation_length(gust, g):
-    """Correlation length of the gust about axis g, m, as in `design.rotation_lengths`: its lag at 1 m/s."""
-    return gust_lag_s(gust, g, 1.0)
+def gust_correlation_length(gust, gust_axis):
+    """Correlation length of the gust about a gust axis, m, as in `design.rotation_lengths`: lag at 1 m/s."""
+    return gust_lag_s(gust, gust_axis, 1.0)
 
 
 @kernel
-def unmeasured_gust_drift_intensity(gust, V, i, j, with_rolling_correlation_length=False):
-    """Intensity, (rad/s2)2/s, of the drift of accelerations i and j by the unmeasured rotation; V m/s.
+def unmeasured_gust_drift_intensity(gust, V, axis_i, axis_j, with_rolling_correlation_length=False):
+    """Intensity, (rad/s2)2/s, of the drift of two accelerations by the unmeasured rotation; V m/s.
 
     with_rolling_correlation_length: that of a gust with the correlation length of the rolling gust and equal
     power at low frequency.
     """
-    total = 0.0
-    for g in range(3):
-        power_ratio = low_frequency_power_ratio(gust, g) if with_rolling_correlation_length else 1.0
-        total += (
-            gust_effect_product(gust, gust.output.gust_axes_in_body, i, j, g)
-            * unmeasured_gust_intensity_share(gust, g)
-            * gust.memory.gust_rotation_intensity_per_airspeed[g]
+    drift_intensity_per_airspeed = 0.0
+    for gust_axis in range(3):
+        power_ratio = low_frequency_power_ratio(gust, gust_axis) if with_rolling_correlation_length else 1.0
+        drift_intensity_per_airspeed += (
+            gust_effect_product(gust, gust.output.gust_axes_in_body, axis_i, axis_j, gust_axis)
+            * unmeasured_gust_intensity_share(gust, gust_axis)
+            * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
             * power_ratio
         )
-    return total * max(V, gust.output.speed_relative_to_mean_air)
+    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
@@ -559,8 +582,10 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
     m/s."""
     if not gust.memory.has_fast_axes_turn:
         return
-    rolling_variance = 0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
-    yawing_variance = (
+    rolling_intensity_per_squared_axes_rate = (
+        0.5 * gust_lag_s(gust, 0, V) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[0]
+    )
+    yawing_intensity_per_squared_axes_rate = (
         0.5
         * gust_lag_s(gust, 2, V) ** 2
         * gust.memory.gust_rotation_intensity_per_airspeed[2]
@@ -568,10 +593,15 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
     )
     for i in range(3):
         for j in range(3):
-            roll_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
-            yaw_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
+            rolling_effect_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
+            yawing_effect_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
             gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
-                dt * V * (rolling_variance * roll_product + yawing_variance * yaw_product)
+                dt
+                * V
+                * (
+                    rolling_intensity_per_squared_axes_rate * rolling_effect_product
+                    + yawing_intensity_per_squared_axes_rate * yawing_effect_product
+                )
             )
     gust.memory.n_frames_left_with_axes_turn_variance = 3
 
@@ -602,27 +632,29 @@ def fill_frame_mean_gust(gust, frame_share_per_instant):
 
 
 @kernel
-def full_gust_drift_intensity(gust, V, rate_sensitivity, force_gust_sensitivity):
+def full_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensitivity):
     """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
 
-    rate_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces, about
-    the body axes.
+    rate_gust_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivity of the rates and of the forces,
+    about the body axes.
     """
-    total, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
-    for g in range(3):
+    drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
+    for gust_axis in range(3):
         total_sensitivity = abs(
-            project_on_gust_axis(rate_sensitivity, gust.output.gust_axes_in_body, g)
-        ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
-        total += total_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[g]
+            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis)
+        ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis))
+        drift_intensity_per_airspeed += (
+            total_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
+        )
         if gust.memory.has_fast_axes_turn:
-            total += (
+            drift_intensity_per_airspeed += (
                 0.5
                 * rolling_lag_s
                 * rolling_lag_s
-                * gust.memory.gust_rotation_intensity_per_airspeed[g]
-                * project_on_gust_axis(rate_sensitivity, gust.memory.gust_axes_rate, g) ** 2
+                * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
+                * project_on_gust_axis(rate_gust_sensitivity, gust.memory.gust_axes_rate, gust_axis) ** 2
             )
-    return total * max(V, gust.output.speed_relative_to_mean_air)
+    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
@@ -632,47 +664,51 @@ def remaining_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_se
     rate_gust_sensitivity, force_gust_sensitivity (3,) 1/s: gust sensitivities about the body axes. On the
     forces the whole rotation acts.
     """
-    total = 0.0
-    for g in range(3):
-        unmeasured_sensitivity = np.sqrt(unmeasured_gust_intensity_share(gust, g)) * abs(
-            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, g)
+    drift_intensity_per_airspeed = 0.0
+    for gust_axis in range(3):
+        unmeasured_sensitivity = np.sqrt(unmeasured_gust_intensity_share(gust, gust_axis)) * abs(
+            project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis)
         )
-        total += (
+        drift_intensity_per_airspeed += (
             unmeasured_sensitivity
-            + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, g))
-        ) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[g]
-    return total * max(V, gust.output.speed_relative_to_mean_air)
+            + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis))
+        ) ** 2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
+    return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
 
 @kernel
-def project_on_gust_axis(sensitivity, axes, g):
-    """Sensitivity to the gust about its axis g, from the sensitivity (3,) to rotation about the body axes."""
-    return sensitivity[0] * axes[0, g] + sensitivity[1] * axes[1, g] + sensitivity[2] * axes[2, g]
+def project_on_gust_axis(body_axes_sensitivity, gust_axes, gust_axis):
+    """Sensitivity to the gust about a gust axis, from that (3,) to rotation about the body axes."""
+    return (
+        body_axes_sensitivity[0] * gust_axes[0, gust_axis]
+        + body_axes_sensitivity[1] * gust_axes[1, gust_axis]
+        + body_axes_sensitivity[2] * gust_axes[2, gust_axis]
+    )
 
 
 @kernel
-def gust_effect_product(gust, axes, i, j, g):
-    """Product of the effects of the gust about axis g on accelerations i and j, per (rad/s)2.
+def gust_effect_product(gust, gust_axes, axis_i, axis_j, gust_axis):
+    """Product of the effects of the gust about a gust axis on two accelerations, per (rad/s)2.
 
-    axes (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
+    gust_axes (3, 3): of the gusts, giving 1/s2; or their rate, 1/s, giving 1/s4.
     """
     effect_on_i, effect_on_j = 0.0, 0.0
     for k in range(3):
-        effect_on_i += gust.output.rate_damping[i, k] * axes[k, g]
-        effect_on_j += gust.output.rate_damping[j, k] * axes[k, g]
+        effect_on_i += gust.output.rate_damping[axis_i, k] * gust_axes[k, gust_axis]
+        effect_on_j += gust.output.rate_damping[axis_j, k] * gust_axes[k, gust_axis]
     return effect_on_i * effect_on_j
 
 
 def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
-    turbulence, errors, aircraft = declared.air, declared.sensors, declared.aircraft
+    turbulence, sensor_errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
     gust["output"]["accounts_for_gusts"] = turbulence.moves
     gust["config"]["has_force_model"] = bool(aircraft.measurable_forces)
     gust["output"]["is_gust_measured"] = (
         gust["config"]["has_force_model"] or gust["output"]["uses_accelerometers"]
     )  # only where forces are known
-    gust["config"]["only_coarse_estimate"] = (
+    gust["config"]["has_only_coarse_estimate"] = (
         gust["output"]["accounts_for_gusts"] and not gust["output"]["is_gust_measured"]
     )
     fill_table(gust["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
@@ -685,36 +721,41 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
         gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
         MIN_UNMEASURED_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
-    gust["config"]["altitude_error_bound"] = errors["altitude"].worst
-    gust["config"]["altitude_error_share"] = errors["altitude"].slope
+    gust["config"]["altitude_error_offset_m"] = sensor_errors["altitude"].worst
+    gust["config"]["altitude_error_slope"] = sensor_errors["altitude"].slope
     gust["config"]["turbulence_scale_length"] = SCALE_M
     gust["config"]["rolling_gust_correlation_length"] = rotation_lengths(span_m)[0]
 
 
 def add_gust_estimate_noise(
-    statistical: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt_s: float
+    statistical: np.void,
+    sensor_errors: SensorErrors,
+    design: np.void,
+    y: np.ndarray,
+    u: np.ndarray,
+    dt_s: float,
 ) -> None:
     """Add the noise of the gust estimate to the model noise of the detector.
 
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    flow_angle_noise_std = flow_angle_in_level_axes_noise_std(errors, y[AIRSPEED])
+    flow_angle_noise_std = flow_angle_in_level_axes_noise_std(sensor_errors, y[AIRSPEED])
     span_m = float(statistical["gust"]["config"]["wing_span"])
     if statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]:
         flow_angle_noise_std += (
-            ADAMS_BASHFORTH_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
+            ADAMS_BASHFORTH_NOISE_GAIN * sensor_errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
         )
     if statistical["forces"]["in_use"]:
-        forces = statistical["forces"]["component"][::-1]  # normal to the body, and across
-        flow_angle_noise_by_forces = np.sqrt(forces["accelerometer_innovation_variance"]) / np.abs(
-            forces["axis_and_force_innovation_per_vane_error"][:, 1]
-        )
+        forces_normal_first = statistical["forces"]["component"][::-1]  # normal to the body, and across
+        flow_angle_noise_std_by_forces = np.sqrt(
+            forces_normal_first["accelerometer_innovation_variance"]
+        ) / np.abs(forces_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
         statistical["forces"]["gust_acceleration_noise_std"] = gust_acceleration_noise_std(
-            flow_angle_noise_by_forces, design, y, u, span_m
+            flow_angle_noise_std_by_forces, design, y, u, span_m
         )
-    for name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
-        statistical["noise"][name] += (
+    for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
+        statistical["noise"][field_name] += (
             gust_acceleration_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )
 
@@ -726,29 +767,33 @@ def configure_speed_error(gust: np.void, declared: Declared, alarm_level: float,
     decay rate a, 1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the
     variance sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
-    sigma, errors = declared.air.sigma_mps, declared.sensors
+    gust_velocity_std_mps, sensor_errors = declared.air.sigma_mps, declared.sensors
     if not (gust["output"]["accounts_for_gusts"] and gust["output"]["is_gust_measured"]):
         return
-    gust_return_rate_per_s, airspeed_errors = airspeed_mps / SCALE_M, errors["V"]
-    acceleration_error = (
+    gust_return_rate_per_s, airspeed_errors = airspeed_mps / SCALE_M, sensor_errors["V"]
+    acceleration_error_bound = (
         2.0 * EARTH_RATE_RAD_S * airspeed_mps + MAX_PATH_SLOPE_RAD * EARTH_ACCELERATION_BOUND_M_S2
     )  # Coriolis; gravity with place
-    acceleration_error += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
+    acceleration_error_bound += GRAVITY_MPS2 * (sensor_errors["phi"].steady + sensor_errors["theta"].steady)
     if gust["output"]["uses_accelerometers"]:
-        acceleration_error += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
+        acceleration_error_bound += (
+            sensor_errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * sensor_errors["ax"].slope
+        )
     else:
-        acceleration_error += (
+        acceleration_error_bound += (
             GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
         )
-    gust_velocity_decay_rate = (2.0 * acceleration_error**2 * gust_return_rate_per_s / sigma**2) ** (
-        1.0 / 3.0
-    )
-    gust["config"]["gust_velocity_variance"] = sigma**2
-    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_SIGMA * sigma
+    gust_velocity_decay_rate = (
+        2.0 * acceleration_error_bound**2 * gust_return_rate_per_s / gust_velocity_std_mps**2
+    ) ** (1.0 / 3.0)
+    gust["config"]["gust_velocity_variance"] = gust_velocity_std_mps**2
+    gust["config"]["max_gust_velocity"] = MAX_GUST_VELOCITY_SIGMA * gust_velocity_std_mps
     gust["config"]["gust_velocity_decay_rate"] = gust_velocity_decay_rate
     gust["config"]["speed_error_variance"] = (
-        sigma**2 * gust_velocity_decay_rate / (gust_velocity_decay_rate + gust_return_rate_per_s)
-        + (acceleration_error / gust_velocity_decay_rate) ** 2
+        gust_velocity_std_mps**2
+        * gust_velocity_decay_rate
+        / (gust_velocity_decay_rate + gust_return_rate_per_s)
+        + (acceleration_error_bound / gust_velocity_decay_rate) ** 2
         + airspeed_errors.random**2
     )
     gust["config"]["speed_error_variance"] += (

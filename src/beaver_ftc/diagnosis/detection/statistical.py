@@ -272,7 +272,7 @@ def configure_statistical_detector(
     )
     gust_correlation_lengths_m = (
         rotation_lengths(gust["config"]["wing_span"])
-        if gust["config"]["only_coarse_estimate"]
+        if gust["config"]["has_only_coarse_estimate"]
         else [rolling_gust_correlation_length_m]
     )
     mean_reverting_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
@@ -644,8 +644,8 @@ def update_blocks(
             likelihood.reset_onset_slot(block, onset_slot)
         for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
-        block.has_coarse_gust_estimate = gust.config.only_coarse_estimate
-        if gust.config.only_coarse_estimate:
+        block.has_coarse_gust_estimate = gust.config.has_only_coarse_estimate
+        if gust.config.has_only_coarse_estimate:
             likelihood.set_block_coarse_gust_acceleration(block, gust.output.coarse_gust_acceleration)
         if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)

@@ -11,8 +11,9 @@ from .installation import ROOT
 from .materials import lay_out
 
 SHOWN = shown()
-# A tutorial is flown as a whole (test_tutorials.py).
-ALONE = [command for command in SHOWN if not command.page.startswith("docs/tutorials/")]
+# A tutorial is flown as a whole (test_tutorials.py). The pages for developers show commands of a checkout.
+ELSEWHERE = ("docs/tutorials/", "docs/developers/")
+ALONE = [command for command in SHOWN if not command.page.startswith(ELSEWHERE)]
 TRIED = list(dict.fromkeys(line for line in map(tried, ALONE) if line is not None))
 # No second time in JSON: another line of the same command is shorter, or there is no such option.
 TEXT_ONLY = re.compile(

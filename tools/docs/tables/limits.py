@@ -51,6 +51,6 @@ def _outcome(metrics: dict[str, Any]) -> tuple[str, str, str]:
     detection, isolation = metrics["detection"], metrics["isolation"]
     if not detection["detected"]:
         return "no alarm", "-", "-"
-    named = isolation["fault"] or "nothing"
+    named = isolation["fault"] or "no name"
     left = ", ".join(one.replace("_", " ") for one in isolation["candidates"])
-    return f"{detection['delay_s']:.2f}", named, left or "-"
+    return f"{detection['delay_s']:.2f}", named, left or "none"

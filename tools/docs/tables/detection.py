@@ -122,7 +122,7 @@ def _draw_filter(axis: Axes, made: Filtered, t: np.ndarray, shown: np.ndarray) -
     axis.axvline(0.0, color=GREY, lw=0.9)
     axis.text(-0.003, 0.92, "fault", color=GREY, ha="right", transform=axis.get_xaxis_transform())
     axis.set_title(made.says, loc="left", fontsize=9)
-    axis.set_ylabel("pitch, 1e-3 rad/s")
+    axis.set_ylabel("pitch, 10⁻³ rad/s")
     axis.set_ylim(0.0, 1.05 * E[shown].max())
     axis.set_xlim(-BEFORE_S, AFTER_S)
 
@@ -153,7 +153,7 @@ def feasible_set() -> str:
         axis.axhline(100 * LOSS, color=GREEN, dashes=(6, 3), lw=1.4)
         axis.text(0.02, 23, "grey: one frame alone", color="#5a5a5a")
         axis.text(0.02, 26, "orange: all frames since the alarm", color="#8a5f00")
-        axis.text(0.02, 29, f"dashed: true loss, {LOSS:.0%}", color=GREEN)
+        axis.text(0.02, 29, f"dashed: true loss, {100 * LOSS:g} %", color=GREEN)
         axis.set_xlabel("time since the fault, s")
         axis.set_ylabel("loss of effectiveness, %")
         axis.set_ylim(0.0, 32.0)

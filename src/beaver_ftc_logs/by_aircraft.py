@@ -61,14 +61,14 @@ def load_aircraft_and_declared_errors(aircraft_name: str, scenario: str | None =
         return DiagnosedAircraft(aircraft)
     loaded_scenario = load_scenario(scenario)
     if loaded_scenario.fdi.sensor_monitor == "always":
-        says = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: auto, never"
-        raise BadInput(f"--scenario {scenario}: {says}")
+        reason = "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: auto, never"
+        raise BadInput(f"--scenario {scenario}: {reason}")
     if loaded_scenario.fdi.scheme == "none":
-        says = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
-        raise BadInput(f"--scenario {scenario}: {says}")
+        reason = "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme"
+        raise BadInput(f"--scenario {scenario}: {reason}")
     if loaded_scenario.airframe.name != aircraft.name:
-        says = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
-        raise BadInput(f"--scenario {scenario}: {says}")
+        reason = f"flies {loaded_scenario.airframe.name}, allowed: a scenario of {aircraft.name}"
+        raise BadInput(f"--scenario {scenario}: {reason}")
     return DiagnosedAircraft(loaded_scenario.airframe, declared_errors(loaded_scenario))
 
 
@@ -104,11 +104,11 @@ def read_diagnosis_inputs(
     rate_hz = _log_rate_hz(samples)
     diagnosis = Diagnosis(diagnosed_aircraft.aircraft, rate_hz, **diagnosed_aircraft.declared_errors)
     needs_attitude = diagnosis.declared.air.moves
-    inputs, mean_age_s = _read_sample_inputs(
+    input_arrays, mean_age_s_by_held_column = _read_sample_inputs(
         samples, recording, vehicle, diagnosed_aircraft.aircraft, needs_attitude
     )
-    _check_units_plausible(samples.name, inputs, diagnosed_aircraft.aircraft)
-    has_missing_value = np.asarray(~np.isfinite(np.hstack(inputs)).all(axis=1))
+    _check_units_plausible(samples.name, input_arrays, diagnosed_aircraft.aircraft)
+    has_missing_value = np.asarray(~np.isfinite(np.hstack(input_arrays)).all(axis=1))
     gap_free_stretches = _gap_free_stretches(samples, has_missing_value, rate_hz)
     if not gap_free_stretches:
         raise BadInput(
@@ -121,7 +121,13 @@ def read_diagnosis_inputs(
         samples, commands=samples.commands[:, surface_indices], labels=samples.labels[:, surface_indices]
     )
     return AircraftDiagnosisInputs(
-        samples, diagnosis, rate_hz, inputs, mean_age_s, has_missing_value, gap_free_stretches
+        samples,
+        diagnosis,
+        rate_hz,
+        input_arrays,
+        mean_age_s_by_held_column,
+        has_missing_value,
+        gap_free_stretches,
     )
 
 
@@ -137,7 +143,7 @@ def diagnose_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, diagnosis, inputs, gap_free_stretches, stretch_verdicts = (
+    samples, diagnosis, input_arrays, gap_free_stretches, replayed_by_stretch = (
         aircraft_inputs.samples,
         aircraft_inputs.diagnosis,
         aircraft_inputs.input_arrays,
@@ -146,37 +152,39 @@ def diagnose_inputs(
     )
     for begin, end in gap_free_stretches:
         diagnosis.reset()
-        stretch_verdicts.append(
-            replay_samples(diagnosis, [values[begin:end] for values in inputs], aircraft_inputs.rate_hz)
+        replayed_by_stretch.append(
+            replay_samples(diagnosis, [array[begin:end] for array in input_arrays], aircraft_inputs.rate_hz)
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, stretch_verdicts)
-    replayed = _join_stretch_diagnoses(
-        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), gap_free_stretches, stretch_verdicts
+        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, replayed_by_stretch)
+    replayed_flight = _join_stretch_diagnoses(
+        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), gap_free_stretches, replayed_by_stretch
     )
-    rows = rows_of_replay(samples.t_s, replayed, diagnosed_aircraft.aircraft.surfaces, diagnosis.config)
-    reasons = _undiagnosable_rows_by_reason(
-        inputs[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
-    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed)
-    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, reasons))
+    rows = rows_of_replay(
+        samples.t_s, replayed_flight, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
+    )
+    rows_by_reason = _undiagnosable_rows_by_reason(
+        input_arrays[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
+    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed_flight)
+    rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, rows_by_reason))
     return rows, _verdict_document(
-        samples, rows, replayed, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
+        samples, rows, replayed_flight, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
     )
 
 
 def _check_command_signs(
-    flight_name: str, aircraft: Aircraft, stretch_verdicts: list[ReplayedVerdicts]
+    flight_name: str, aircraft: Aircraft, replayed_by_stretch: list[ReplayedVerdicts]
 ) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
-    for surface, gain in zip(
+    for surface, gain_upper_bound in zip(
         aircraft.surfaces,
-        np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0),
+        np.min([one.command_gain_upper_bounds for one in replayed_by_stretch], axis=0),
         strict=True,
     ):
-        if gain < trust.MAX_REVERSED_GAIN:
-            says = f"the rates answer the command of {surface} the other way round in all of it"
+        if gain_upper_bound < trust.MAX_REVERSED_GAIN:
+            reason = f"the rates answer the command of {surface} the other way round in all of it"
             raise BadInput(
-                f"{flight_name}: {says}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
+                f"{flight_name}: {reason}, allowed: signs as of {aircraft.name}; does `scale: -1` fit?"
             )
 
 
@@ -184,23 +192,23 @@ def _check_log_has_inputs(recording: RecordedFlight, vehicle: Vehicle, aircraft:
     """Raise BadInput if the vehicle file or the log lacks an input of the aircraft's design model."""
     missing_surfaces = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing_surfaces:
-        says = (
+        reason = (
             f"surfaces: no {missing_surfaces[0]}, allowed: what the commands make of "
             f"{', '.join(aircraft.surfaces)}"
         )
-        raise BadInput(f"vehicle {vehicle.name}: {says}")
+        raise BadInput(f"vehicle {vehicle.name}: {reason}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
     flow_names = _flow_input_names(aircraft)
     for name in flow_names:
         if name not in vehicle.flow:
-            says = f"flow: no {name}, allowed: a column for each of {', '.join(flow_names)}"
-            raise BadInput(f"vehicle {vehicle.name}: {says}")
-    for one in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
-        if one.column not in recording.columns:
-            nearest = nearest_names(one.column, recording.columns)
-            says = f"no column {one.column}, allowed: a log that has it; it has {nearest}"
-            raise BadInput(f"{recording.name}: {says}")
+            reason = f"flow: no {name}, allowed: a column for each of {', '.join(flow_names)}"
+            raise BadInput(f"vehicle {vehicle.name}: {reason}")
+    for quantity_column in (vehicle.airspeed, *(vehicle.flow[name] for name in flow_names)):
+        if quantity_column.column not in recording.columns:
+            nearest_text = nearest_names(quantity_column.column, recording.columns)
+            reason = f"no column {quantity_column.column}, allowed: a log that has it; it has {nearest_text}"
+            raise BadInput(f"{recording.name}: {reason}")
 
 
 def _flow_input_names(aircraft: Aircraft) -> list[str]:
@@ -214,13 +222,13 @@ def _vehicle_surface_indices(vehicle: Vehicle, aircraft: Aircraft) -> list[int]:
 
 def _log_rate_hz(samples: Samples) -> float:
     """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
-    first_t_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
-    steps_s = np.diff(first_t_s)
+    first_times_s = samples.t_s[:_MIN_STRETCH_SAMPLES]
+    steps_s = np.diff(first_times_s)
     even_steps_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _MAX_RELATIVE_STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_steps_s.mean() if len(even_steps_s) else samples.dt_s):.4g}")
     if not _MIN_LOG_RATE_HZ <= rate_hz <= _MAX_LOG_RATE_HZ:
-        says = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
-        raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {says}")
+        reason = f"an aircraft's model takes {_MIN_LOG_RATE_HZ:g} to {_MAX_LOG_RATE_HZ:g} Hz"
+        raise BadInput(f"{samples.name}: is logged at {rate_hz:g} Hz, allowed: {reason}")
     return rate_hz
 
 
@@ -229,12 +237,15 @@ def _read_sample_inputs(
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns`, and the mean age
     of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
-    columns, mean_age_s = convert_to_si(recording, vehicle).columns, dict(samples.mean_age_s_by_held_column)
+    si_columns, mean_age_s_by_held_column = (
+        convert_to_si(recording, vehicle).columns,
+        dict(samples.mean_age_s_by_held_column),
+    )
 
     def sampled_values(quantity: QuantityColumn) -> Floats:
-        values, age_s = values_and_age_at(columns[quantity.column], samples.t_s, samples.dt_s)
+        values, age_s = values_and_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
         if age_s is not None:
-            mean_age_s[quantity.column] = age_s
+            mean_age_s_by_held_column[quantity.column] = age_s
         return values
 
     alpha, beta, qdyn, *aircraft_signals = (
@@ -247,22 +258,22 @@ def _read_sample_inputs(
     attitude = np.zeros_like(samples.rates)
     if needs_attitude:
         for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
-            one = getattr(vehicle.attitude, angle) if vehicle.attitude else None
-            if one is None or one.column not in columns:
-                says = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle}: {says}")
-            attitude[:, axis] = sampled_values(one)
+            quantity_column = getattr(vehicle.attitude, angle) if vehicle.attitude else None
+            if quantity_column is None or quantity_column.column not in si_columns:
+                reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
+                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
+            attitude[:, axis] = sampled_values(quantity_column)
     return [
         samples.rates,
         np.column_stack(signals),
         samples.commands[:, surface_indices] * full_deflection_rad,
         attitude,
-    ], mean_age_s
+    ], mean_age_s_by_held_column
 
 
-def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Aircraft) -> None:
+def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    signals, commands = inputs[1], inputs[2]
+    signals, commands = input_arrays[1], input_arrays[2]
     for axis, angle in enumerate(("alpha_rad", "beta_rad")):
         median_angle = _median_without_nan(np.abs(signals[:, axis]))
         if median_angle > 0.5 * pi:
@@ -276,9 +287,9 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
         density_kg_m3.size
         and not _AIR_DENSITY_LIMITS_KG_M3[0] < median_density_kg_m3 < _AIR_DENSITY_LIMITS_KG_M3[1]
     ):
-        says = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
-        allowed = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
-        raise BadInput(f"{flight_name}: {says}, allowed: {allowed}, true airspeed in m/s and Pa")
+        reason = f"airspeed and flow.qdyn_pa make a density of {median_density_kg_m3:.3g} kg/m3"
+        allowed_text = "{:g} to {:g}".format(*_AIR_DENSITY_LIMITS_KG_M3)
+        raise BadInput(f"{flight_name}: {reason}, allowed: {allowed_text}, true airspeed in m/s and Pa")
     for surface_index, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
         max_deflection_rad, max_command_rad = (
@@ -286,26 +297,26 @@ def _check_units_plausible(flight_name: str, inputs: list[Floats], aircraft: Air
             np.nanmax(np.abs(commands[:, surface_index]), initial=0.0),
         )
         if max_command_rad > _MAX_COMMAND_TRAVEL_RATIO * max_deflection_rad:
-            says = (
+            reason = (
                 f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
                 f"{max_deflection_rad:.3g} rad"
             )
-            raise BadInput(f"{flight_name}: {says}; full_deflection_rad says what 1 is")
+            raise BadInput(f"{flight_name}: {reason}; full_deflection_rad says what 1 is")
 
 
 def _median_without_nan(values: Floats) -> float:
     """Median of the values that are numbers; nan if none is."""
-    known = values[~np.isnan(values)]
-    return float(np.median(known)) if known.size else float("nan")
+    numbers = values[~np.isnan(values)]
+    return float(np.median(numbers)) if numbers.size else float("nan")
 
 
 def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: float) -> list[tuple[int, int]]:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
     is_uneven_step = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _MAX_RELATIVE_STEP_JITTER
     is_known = ~has_missing_value
-    is_joined = is_known[1:] & is_known[:-1] & ~is_uneven_step
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_joined, [False]]).astype(int)))
-    begin_end_pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    joins_next_row = is_known[1:] & is_known[:-1] & ~is_uneven_step
+    stretch_edges = np.flatnonzero(np.diff(np.concatenate([[False], joins_next_row, [False]]).astype(int)))
+    begin_end_pairs = zip(stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True)
     return [(begin, end + 1) for begin, end in begin_end_pairs if end + 1 - begin >= _MIN_STRETCH_SAMPLES]
 
 
@@ -313,23 +324,25 @@ def _join_stretch_diagnoses(
     n_samples: int,
     n_surfaces: int,
     gap_free_stretches: list[tuple[int, int]],
-    stretch_verdicts: list[ReplayedVerdicts],
+    replayed_by_stretch: list[ReplayedVerdicts],
 ) -> ReplayedVerdicts:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
-    verdicts, low, high = (
+    verdicts, effectiveness_low, effectiveness_high = (
         [Verdict()] * n_samples,
         np.zeros((n_samples, n_surfaces)),
         np.ones((n_samples, n_surfaces)),
     )
-    gains = np.min([one.command_gain_upper_bounds for one in stretch_verdicts], axis=0)
-    for (begin, end), one in zip(gap_free_stretches, stretch_verdicts, strict=True):
-        verdicts[begin:end], low[begin:end], high[begin:end] = (
-            one.verdicts,
-            one.single_fault_effectiveness_low,
-            one.single_fault_effectiveness_high,
+    command_gain_upper_bounds = np.min(
+        [replayed.command_gain_upper_bounds for replayed in replayed_by_stretch], axis=0
+    )
+    for (begin, end), replayed in zip(gap_free_stretches, replayed_by_stretch, strict=True):
+        verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
+            replayed.verdicts,
+            replayed.single_fault_effectiveness_low,
+            replayed.single_fault_effectiveness_high,
         )
-    return ReplayedVerdicts(verdicts, low, high, gains)
+    return ReplayedVerdicts(verdicts, effectiveness_low, effectiveness_high, command_gain_upper_bounds)
 
 
 def _undiagnosable_rows_by_reason(
@@ -353,7 +366,7 @@ def _undiagnosable_rows_by_reason(
 
 
 def _unexplained_start_rows_by_reason(
-    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed: ReplayedVerdicts
+    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
@@ -362,45 +375,52 @@ def _unexplained_start_rows_by_reason(
         first_second_end = begin + int(
             np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_START_WINDOW_S)
         )
-        if any(verdict.isolated == "unanticipated" for verdict in replayed.verdicts[begin:first_second_end]):
-            first_alarm = next(k for k in range(begin, first_second_end) if replayed.verdicts[k].detected)
-            is_unexplained[first_alarm:end] = True
-    says = "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
-    return {says: is_unexplained}
+        if any(
+            verdict.isolated == "unanticipated"
+            for verdict in replayed_flight.verdicts[begin:first_second_end]
+        ):
+            first_alarm_row = next(
+                k for k in range(begin, first_second_end) if replayed_flight.verdicts[k].detected
+            )
+            is_unexplained[first_alarm_row:end] = True
+    reason = (
+        "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
+    )
+    return {reason: is_unexplained}
 
 
 def _add_rows_after_doubtful_alarm(
-    gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, reasons: dict[str, Mask]
+    gap_free_stretches: list[tuple[int, int]], rows: DiagnosisRows, rows_by_reason: dict[str, Mask]
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
     a reason of its own."""
     has_reason, is_after_doubtful_alarm = (
-        np.logical_or.reduce(list(reasons.values())),
+        np.logical_or.reduce(list(rows_by_reason.values())),
         np.zeros(len(rows.t_s), dtype=bool),
     )
     for begin, end in gap_free_stretches:
         alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarm_rows.size and has_reason[alarm_rows[0]]:
             is_after_doubtful_alarm[alarm_rows[0] : end] = True
-    reasons = reasons | {
+    rows_by_reason = rows_by_reason | {
         "the alarm was raised where nothing can be said": is_after_doubtful_alarm & ~has_reason
     }
-    return {says: mask for says, mask in reasons.items() if mask.any()}
+    return {reason: is_row for reason, is_row in rows_by_reason.items() if is_row.any()}
 
 
 def _verdict_document(
     samples: Samples,
     rows: DiagnosisRows,
-    replayed: ReplayedVerdicts,
+    replayed_flight: ReplayedVerdicts,
     diagnosed_aircraft: DiagnosedAircraft,
     mean_age_s_by_held_column: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
     surfaces = list(diagnosed_aircraft.aircraft.surfaces)
     alarm_rows = np.flatnonzero(rows.faulty)
-    last_verdict = replayed.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
-    same_verdict_rows = [
-        k for k in alarm_rows.tolist() if replayed.verdicts[k].isolated == last_verdict.isolated
+    last_verdict = replayed_flight.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    rows_with_last_verdict = [
+        k for k in alarm_rows.tolist() if replayed_flight.verdicts[k].isolated == last_verdict.isolated
     ]
     held_column_notes = [
         f"{name} is held, {age:.2g} s old on average: errors declared have to cover it"
@@ -416,7 +436,7 @@ def _verdict_document(
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(alarm_rows.size),
         "detection_s": float(samples.t_s[alarm_rows[0]]) if alarm_rows.size else None,
-        "isolation_s": float(samples.t_s[same_verdict_rows[0]]) if last_verdict.isolated else None,
+        "isolation_s": float(samples.t_s[rows_with_last_verdict[0]]) if last_verdict.isolated else None,
         "isolated": last_verdict.isolated,
         "type": last_verdict.type,
         "estimate": last_verdict.estimate,

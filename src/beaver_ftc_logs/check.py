@@ -73,26 +73,26 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
 
     usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
     """
-    lines: list[str] = []
+    remarks: list[str] = []
     guessed_vehicle: Document | None = None
     if vehicle is None:
-        guessed_vehicle = _guess_vehicle(path, reader, lines)
+        guessed_vehicle = _guess_vehicle(path, reader, remarks)
         if guessed_vehicle is None:
-            return {"log": str(path), "usable": False, "lines": lines, "vehicle": None}
+            return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
         vehicle = Vehicle.model_validate(guessed_vehicle)
-    part_findings = [
+    usable_and_lines_by_part = [
         _check_recording(recording, vehicle) for recording in read_parts_for_vehicle(path, vehicle, reader)
     ]
-    for part_number, (_, part_lines) in enumerate(part_findings, 1):
-        lines += (
+    for part_number, (_, part_lines) in enumerate(usable_and_lines_by_part, 1):
+        remarks += (
             part_lines
-            if len(part_findings) == 1
-            else [f"part {part_number} of {len(part_findings)}: {line}" for line in part_lines]
+            if len(usable_and_lines_by_part) == 1
+            else [f"part {part_number} of {len(usable_and_lines_by_part)}: {line}" for line in part_lines]
         )
     return {
         "log": str(path),
-        "usable": all(is_usable for is_usable, _ in part_findings),
-        "lines": lines,
+        "usable": all(is_usable for is_usable, _ in usable_and_lines_by_part),
+        "lines": remarks,
         "vehicle": guessed_vehicle,
     }
 
@@ -103,26 +103,26 @@ def _check_recording(recording: RecordedFlight, vehicle: Vehicle) -> tuple[bool,
         samples = resample(recording, vehicle)
     except BadInput as error:
         return False, [str(error)]
-    still_axes = [
+    motionless_axes = [
         axis
         for axis, rate in zip("pqr", samples.rates.T, strict=True)
         if np.ptp(rate[np.isfinite(rate)]) == 0.0
     ]
-    still_lines = [
-        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still_axes
+    motionless_lines = [
+        f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in motionless_axes
     ]
-    return not still_axes, [
+    return not motionless_axes, [
         _log_size_text(samples),
         *samples.notes,
         *_compare_rates_and_angles(recording, vehicle),
-        *still_lines,
+        *motionless_lines,
     ]
 
 
 def _log_size_text(samples: Samples) -> str:
-    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
+    n_gaps, duration_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
     longest_gap_text = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
-    size_text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s"
+    size_text = f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {duration_s:.4g} s"
     return f"{size_text}; gaps: {n_gaps}{longest_gap_text}"
 
 
@@ -131,24 +131,30 @@ def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> li
     columns, attitude = recording.columns, vehicle.attitude
     if attitude is None or attitude.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
-    rates = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
+    rate_columns = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     pitch = attitude.pitch
     pitch_in_si = _column_in_si(columns, pitch) if pitch is not None and pitch.column in columns else None
-    roll_fit = physics.fit_roll_angle_to_rates(rates, _column_in_si(columns, attitude.roll), pitch_in_si)
+    roll_fit = physics.fit_roll_angle_to_rates(
+        rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si
+    )
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    lines = [_angle_rate_fit_text(roll_fit, attitude.roll.column, vehicle.rates.p.column)]
+    comparison_texts = [_angle_rate_fit_text(roll_fit, attitude.roll.column, vehicle.rates.p.column)]
     if pitch is not None and pitch_in_si is not None:
         pitch_fit = physics.fit_pitch_angle_to_rates(
-            rates, _column_in_si(columns, attitude.roll), pitch_in_si
+            rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si
         )
-        lines += [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
+        comparison_texts += (
+            [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
+        )
     if (yaw := attitude.yaw) is not None and yaw.column in columns:
         yaw_fit = physics.fit_yaw_angle_to_rates(
-            rates, _column_in_si(columns, attitude.roll), pitch_in_si, _column_in_si(columns, yaw)
+            rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si, _column_in_si(columns, yaw)
         )
-        lines += [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
-    return lines
+        comparison_texts += (
+            [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
+        )
+    return comparison_texts
 
 
 def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
@@ -173,22 +179,29 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     check_exists(path)
     reader_name = reader or detect_reader(path)
     time_column = _find_time_column(path, remarks) if reader_name == "table" else None
-    candidates = _recognized_columns(column_names(path)) if reader_name == "table" else None
-    recording = next(read_parts(path, reader_name, time_column, candidates))
-    names = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
+    recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
+    recording = next(read_parts(path, reader_name, time_column, recognized_columns))
+    names_with_numbers = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
     column_of_quantity = {
-        quantity: _matching_column(pattern, names) for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
+        quantity: _matching_column(pattern, names_with_numbers)
+        for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
     }
-    commands = _command_columns(names, column_of_quantity)
-    missing = [axis for axis in "pqr" if column_of_quantity[axis] is None]
-    if missing or not commands:
+    command_columns = _command_columns(names_with_numbers, column_of_quantity)
+    missing_axes = [axis for axis in "pqr" if column_of_quantity[axis] is None]
+    if missing_axes or not command_columns:
         problem = (
-            f"no column looks like the rate {missing[0]}" if missing else "no column looks like a command"
+            f"no column looks like the rate {missing_axes[0]}"
+            if missing_axes
+            else "no column looks like a command"
         )
-        nearest = nearest_names("rate" if missing else "command", recording.columns)
-        remarks.append(f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest}")
+        nearest_text = nearest_names("rate" if missing_axes else "command", recording.columns)
+        remarks.append(
+            f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest_text}"
+        )
         return None
-    return _propose_vehicle(path.stem, recording, reader_name, time_column, column_of_quantity, commands)
+    return _propose_vehicle(
+        path.stem, recording, reader_name, time_column, column_of_quantity, command_columns
+    )
 
 
 def _propose_vehicle(
@@ -243,12 +256,12 @@ def _propose_vehicle(
 def _recognized_columns(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
     pattern = "|".join(f"({one})" for one in _COLUMN_NAME_PATTERNS.values())
-    known = [
+    recognized = [
         name
         for name in names
         if re.fullmatch(pattern, _normalized_name(name)) or _may_be_command_column(name)
     ]
-    return known[:_MAX_READ_COLUMNS]
+    return recognized[:_MAX_READ_COLUMNS]
 
 
 def _may_be_command_column(column_name: str) -> bool:
@@ -275,19 +288,19 @@ def _matching_column(pattern: str, names: Sequence[str]) -> str | None:
 
 
 def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | None]) -> list[str]:
-    other_columns = set(column_of_quantity.values())
-    return [name for name in names if _may_be_command_column(name) and name not in other_columns][
-        :_MAX_COMMANDS
-    ]
+    columns_of_other_quantities = set(column_of_quantity.values())
+    return [
+        name for name in names if _may_be_command_column(name) and name not in columns_of_other_quantities
+    ][:_MAX_COMMANDS]
 
 
 def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
-    names = column_names(path)
-    candidates = [
-        name for name in names if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _normalized_name(name))
+    table_columns = column_names(path)
+    time_like_columns = [
+        name for name in table_columns if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _normalized_name(name))
     ]
-    for name in sorted(candidates, key=lambda name: name != TIME_COLUMN):
+    for name in sorted(time_like_columns, key=lambda name: name != TIME_COLUMN):
         stamps = first_numbers(path, name)
         median_step = float(np.median(np.diff(stamps[np.isfinite(stamps)][:50]))) if len(stamps) > 1 else 0.0
         plausible_units = [
@@ -302,8 +315,11 @@ def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
             if (name, unit) != (TIME_COLUMN, "s"):
                 remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
-    says = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
-    raise BadInput(f"{path}: no column of time, allowed: {says}; it has {nearest_names(TIME_COLUMN, names)}")
+    allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
+    raise BadInput(
+        f"{path}: no column of time, allowed: {allowed_text}; it has "
+        f"{nearest_names(TIME_COLUMN, table_columns)}"
+    )
 
 
 def _is_log_rate_plausible(rate_hz: float) -> bool:
@@ -326,10 +342,10 @@ def _guess_rate_unit(
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
-    rates = [recording.columns[name] for name in rate_columns]
+    logged_rates = [recording.columns[name] for name in rate_columns]
     if roll is not None:
         fit = physics.fit_roll_angle_to_rates(
-            rates, replace(roll, values=roll.values * rad_per_roll_unit), None
+            logged_rates, replace(roll, values=roll.values * rad_per_roll_unit), None
         )
         if fit is not None and abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(fit.slope), 1.5) or "rad/s"
@@ -340,7 +356,7 @@ def _guess_rate_unit(
         return unit_in_name
     return (
         "deg/s"
-        if max(_largest_magnitude(rate.values) for rate in rates) > _MAX_RATE_NUMBER_READ_AS_RAD_S
+        if max(_largest_magnitude(rate.values) for rate in logged_rates) > _MAX_RATE_NUMBER_READ_AS_RAD_S
         else "rad/s"
     )
 

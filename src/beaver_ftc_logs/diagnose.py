@@ -21,7 +21,7 @@ from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
-_MIN_ISOLATION_PROBABILITY = 0.5
+_MIN_GROUP_SHARE_FOR_NAME = 0.5
 _MAX_WRONG_EXCLUSION_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
@@ -79,26 +79,28 @@ class DiagnosisRows:
             fault_probability=np.where(is_removed, 0.0, self.fault_probability),
         )
 
-    def without_verdict(self, reasons: Mapping[str, NDArray[np.bool_]]) -> "DiagnosisRows":
+    def without_verdict(self, rows_by_reason: Mapping[str, NDArray[np.bool_]]) -> "DiagnosisRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true."""
         is_removed = np.zeros(len(self.t_s), dtype=bool)
-        for has_reason in reasons.values():
+        for has_reason in rows_by_reason.values():
             is_removed |= has_reason
         rows = self.without_estimate(is_removed).without_alarm(is_removed)
-        return replace(rows, credible=np.where(is_removed, 0, 1), not_credible_rows_by_reason=reasons)
+        return replace(rows, credible=np.where(is_removed, 0, 1), not_credible_rows_by_reason=rows_by_reason)
 
 
 def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_log_fits_model(samples, model)
     bank = build_hypothesis_bank(model)
-    live_samples = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
-    posterior, _, _ = hypothesis_posterior(live_samples, model, bank)
+    samples_without_frozen_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
+    posterior, _, _ = hypothesis_posterior(samples_without_frozen_rates, model, bank)
     has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = rows_of_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
-        rows = _withdraw_contradicted_isolation(live_samples, model, rows, model.settings.alarm_threshold)
+        rows = _withdraw_contradicted_isolation(
+            samples_without_frozen_rates, model, rows, model.settings.alarm_threshold
+        )
     return blank_rows_not_credible(samples, model, rows, has_no_response)
 
 
@@ -110,23 +112,25 @@ def blank_rows_not_credible(
 ) -> DiagnosisRows:
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. has_no_response (n,): where nothing answers the commands."""
-    reasons = trust.rows_not_credible_by_reason(samples, model)
+    rows_by_reason = trust.rows_not_credible_by_reason(samples, model)
     if has_no_response is not None and has_no_response.any():
-        reasons["nothing answers the commands: on the ground, or these are not what it follows"] = (
+        rows_by_reason["nothing answers the commands: on the ground, or these are not what it follows"] = (
             has_no_response
         )
     if not any(trust.is_group_effect_known(model)):
-        reasons["of no surface is the effect known from the flights fitted"] = np.ones(
+        rows_by_reason["of no surface is the effect known from the flights fitted"] = np.ones(
             len(rows.t_s), dtype=bool
         )
     rows = _add_surfaces_of_unknown_effect_to_names(
         samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
     has_known_gain = np.array(trust.is_group_gain_known(model), dtype=float)[None]
-    is_unknown_gain = np.broadcast_to(
+    has_unknown_gain = np.broadcast_to(
         group_values_by_surface(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
     )
-    return _rows_at_log_stamps(samples, rows.without_estimate(is_unknown_gain).without_verdict(reasons))
+    return _rows_at_log_stamps(
+        samples, rows.without_estimate(has_unknown_gain).without_verdict(rows_by_reason)
+    )
 
 
 def _add_surfaces_of_unknown_effect_to_names(
@@ -145,19 +149,21 @@ def _add_surfaces_of_unknown_effect_to_names(
     )
     has_moved |= "stuck" in model.vehicle.faults
     surfaces_of_unknown_effect = trust.surfaces_of_unknown_effect(model)
-    may_join = has_moved & np.array([surface in surfaces_of_unknown_effect for surface in surfaces])
-    named, high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
+    may_be_added = has_moved & np.array([surface in surfaces_of_unknown_effect for surface in surfaces])
+    names_by_row, effectiveness_high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
-        named_group = set(str(named[k]).split("+"))
-        if not named_group <= set(surfaces):
+        named_surfaces = set(str(names_by_row[k]).split("+"))
+        if not named_surfaces <= set(surfaces):
             continue
-        is_named = np.array([one in named_group or bool(may_join[k, i]) for i, one in enumerate(surfaces)])
-        named[k] = "+".join(compress(surfaces, is_named))
-        if is_named.sum() > len(named_group) or (
-            model.settings.assumes_one_group_at_fault and not _are_in_one_group(named_group, model)
+        is_in_name = np.array(
+            [one in named_surfaces or bool(may_be_added[k, i]) for i, one in enumerate(surfaces)]
+        )
+        names_by_row[k] = "+".join(compress(surfaces, is_in_name))
+        if is_in_name.sum() > len(named_surfaces) or (
+            model.settings.assumes_one_group_at_fault and not _are_in_one_group(named_surfaces, model)
         ):
-            high[k, is_named] = 1.0
-    return replace(rows, isolated_surfaces=named, effectiveness_high=high)
+            effectiveness_high[k, is_in_name] = 1.0
+    return replace(rows, isolated_surfaces=names_by_row, effectiveness_high=effectiveness_high)
 
 
 def _are_in_one_group(isolated_surfaces: set[str], model: Model) -> bool:
@@ -174,16 +180,16 @@ def _withdraw_isolation_after_engine_failure(
     )
     if unpowered_energy_height_rate_mps is None or samples.energy_height_rate_mps is None:
         return rows
-    climb_mps = samples.energy_height_rate_mps
-    named = energy.withdraw_surfaces_after_engine_failure(
+    energy_height_rate_mps = samples.energy_height_rate_mps
+    names = energy.withdraw_surfaces_after_engine_failure(
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces,
-        climb_mps,
+        energy_height_rate_mps,
         unpowered_energy_height_rate_mps,
         rows.evidence_start_time_s,
     )
-    return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
+    return replace(rows.without_estimate(names != rows.isolated_surfaces), isolated_surfaces=names)
 
 
 def _withdraw_contradicted_isolation(
@@ -197,19 +203,28 @@ def _withdraw_contradicted_isolation(
     since gusts have directions too.
     """
     residual = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
-    _, _, response, noise = model.coefficient_arrays()
-    response_directions = np.linalg.solve(np.linalg.cholesky(noise), response.sum(axis=1).T)
+    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    response_directions = np.linalg.solve(
+        np.linalg.cholesky(residual_covariance), command_response.sum(axis=1).T
+    )
     direction_norms = np.linalg.norm(response_directions, axis=0)
     squared_projections = (residual @ (response_directions / np.maximum(direction_norms, MIN_DIVISOR))) ** 2
-    cumulated = np.cumsum(squared_projections, axis=0)
+    cumulated_projections = np.cumsum(squared_projections, axis=0)
     window_begin = np.maximum(
-        np.arange(len(cumulated)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
+        np.arange(len(cumulated_projections)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
     )
-    log_likelihood_gain = 0.5 * model.settings.effective_sample_share * (cumulated - cumulated[window_begin])
-    best_gain, is_contradicted = log_likelihood_gain.max(axis=1), np.zeros(len(residual), dtype=bool)
+    log_likelihood_gain = (
+        0.5
+        * model.settings.effective_sample_share
+        * (cumulated_projections - cumulated_projections[window_begin])
+    )
+    best_log_likelihood_gain, is_contradicted = (
+        log_likelihood_gain.max(axis=1),
+        np.zeros(len(residual), dtype=bool),
+    )
     for group_index, group in enumerate(model.groups):
         is_contradicted |= _rows_isolating_any(rows.isolated_surfaces, set(group)) & (
-            best_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
+            best_log_likelihood_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
         )
     return replace(
         rows.without_estimate(is_contradicted),
@@ -218,13 +233,13 @@ def _withdraw_contradicted_isolation(
 
 
 def standardized_healthy_residual(
-    model: Model, is_predictable: NDArray[np.bool_], unexplained: Floats, responses: Floats
+    model: Model, is_predictable: NDArray[np.bool_], unexplained_rates: Floats, responses: Floats
 ) -> Floats:
     """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
-    intercept, _, _, noise = model.coefficient_arrays()
-    residual = np.where(is_predictable[:, None], unexplained - intercept - responses.sum(axis=1), 0.0)
-    return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(noise)).T)
+    intercept, _, _, residual_covariance = model.coefficient_arrays()
+    residual = np.where(is_predictable[:, None], unexplained_rates - intercept - responses.sum(axis=1), 0.0)
+    return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(residual_covariance)).T)
 
 
 def _rows_isolating_any(isolated_surfaces: NDArray[np.object_], surfaces: set[str]) -> NDArray[np.bool_]:
@@ -249,46 +264,54 @@ def rows_of_posterior(
 ) -> DiagnosisRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
     no_response_probability = posterior[:, bank.no_response_index]
-    probability = posterior[:, bank.is_fault_hypothesis].sum(axis=1)
+    fault_probability = posterior[:, bank.is_fault_hypothesis].sum(axis=1)
     posterior_given_response = (
         posterior[:, : bank.no_response_index]
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
     )
-    is_healthier = posterior[:, 0] + no_response_probability > 0.5
-    threshold = model.settings.alarm_threshold
+    is_health_likelier = posterior[:, 0] + no_response_probability > 0.5
+    alarm_threshold = model.settings.alarm_threshold
     evidence_increments = any_fault_log_odds_gains(posterior, bank)
-    evidence = page_cusum(evidence_increments, threshold or np.inf)
+    fault_evidence = page_cusum(evidence_increments, alarm_threshold or np.inf)
     is_alarm_raised = has_isolation_evidence = _has_held_long_enough(
-        probability >= model.settings.fault_probability_for_alarm, model
+        fault_probability >= model.settings.fault_probability_for_alarm, model
     )
-    if threshold is not None:
-        naming_threshold = model.settings.isolation_evidence_factor * threshold
-        is_alarm_raised = (evidence >= threshold) & ~is_healthier
+    if alarm_threshold is not None:
+        naming_threshold = model.settings.isolation_evidence_factor * alarm_threshold
+        is_alarm_raised = (fault_evidence >= alarm_threshold) & ~is_health_likelier
         has_isolation_evidence = (
             page_cusum(evidence_increments, naming_threshold) >= naming_threshold
-        ) & ~is_healthier
-    faulty = _latch_until_healthy(is_alarm_raised, is_healthier).astype(np.int64)
-    evidence_begin = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
-    by_group = [
+        ) & ~is_health_likelier
+    faulty = _latch_until_healthy(is_alarm_raised, is_health_likelier).astype(np.int64)
+    evidence_start_row = np.maximum.accumulate(
+        np.where(fault_evidence <= 0.0, np.arange(len(fault_evidence)), 0)
+    )
+    estimate_and_bounds_by_group = [
         _group_effectiveness_and_bounds(bank, posterior_given_response, group_index, model)
         for group_index in range(len(model.groups))
     ]
-    estimate, low, high = (np.column_stack(column) for column in zip(*by_group, strict=True))
+    effectiveness, effectiveness_low, effectiveness_high = (
+        np.column_stack(arrays) for arrays in zip(*estimate_and_bounds_by_group, strict=True)
+    )
     has_no_response = no_response_probability > _MAX_NO_RESPONSE_PROBABILITY
-    estimate[has_no_response], low[has_no_response], high[has_no_response] = 1.0, 0.0, 1.0
+    (
+        effectiveness[has_no_response],
+        effectiveness_low[has_no_response],
+        effectiveness_high[has_no_response],
+    ) = 1.0, 0.0, 1.0
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
-        high[faulty == 0] = 1.0
+        effectiveness_high[faulty == 0] = 1.0
     return DiagnosisRows(
         t_s=samples.t_s,
         faulty=faulty,
         isolated_surfaces=_surfaces_at_fault(
-            model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_healthier)
+            model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_health_likelier)
         ),
-        effectiveness=group_values_by_surface(estimate, model),
-        effectiveness_low=group_values_by_surface(low, model),
-        effectiveness_high=group_values_by_surface(high, model),
-        fault_probability=probability,
-        evidence_start_time_s=samples.t_s[evidence_begin],
+        effectiveness=group_values_by_surface(effectiveness, model),
+        effectiveness_low=group_values_by_surface(effectiveness_low, model),
+        effectiveness_high=group_values_by_surface(effectiveness_high, model),
+        fault_probability=fault_probability,
+        evidence_start_time_s=samples.t_s[evidence_start_row],
     )
 
 
@@ -299,11 +322,13 @@ def _group_effectiveness_and_bounds(
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
-    levels, level_probability = _marginal_distribution(bank, posterior, group)
+    levels, level_probability = _group_level_distribution(bank, posterior, group)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
         level_probability = (
             level_probability
-            / _marginal_distribution(bank, bank.prior_probability[None, : bank.no_response_index], group)[1]
+            / _group_level_distribution(bank, bank.prior_probability[None, : bank.no_response_index], group)[
+                1
+            ]
         )
         level_probability /= level_probability.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, level_probability, model.settings.credible_mass)
@@ -314,28 +339,30 @@ def _group_effectiveness_and_bounds(
 
 def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    min_samples = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
+    min_held_samples = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
     held_samples = np.arange(len(condition)) - np.maximum.accumulate(
         np.where(condition, -1, np.arange(len(condition)))
     )
-    return np.asarray(condition & (held_samples > min_samples))
+    return np.asarray(condition & (held_samples > min_held_samples))
 
 
-def _latch_until_healthy(is_raised: NDArray[np.bool_], is_healthier: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _latch_until_healthy(
+    is_raised: NDArray[np.bool_], is_health_likelier: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
     row_index = np.arange(len(is_raised))
-    last_raised = np.maximum.accumulate(np.where(is_raised, row_index, -1))
-    last_healthy = np.maximum.accumulate(np.where(is_healthier & ~is_raised, row_index, -1))
-    return np.asarray((last_raised >= 0) & (last_raised > last_healthy))
+    last_raised_row = np.maximum.accumulate(np.where(is_raised, row_index, -1))
+    last_healthy_row = np.maximum.accumulate(np.where(is_health_likelier & ~is_raised, row_index, -1))
+    return np.asarray((last_raised_row >= 0) & (last_raised_row > last_healthy_row))
 
 
-def _marginal_distribution(bank: HypothesisBank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
+def _group_level_distribution(bank: HypothesisBank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
-    levels, level_of_hypothesis = np.unique(
+    levels, level_index_of_hypothesis = np.unique(
         bank.effectiveness[: bank.no_response_index, group], return_inverse=True
     )
     level_probability = np.zeros((len(posterior), len(levels)))
-    for hypothesis, level_index in enumerate(level_of_hypothesis):
+    for hypothesis, level_index in enumerate(level_index_of_hypothesis):
         level_probability[:, level_index] += posterior[:, hypothesis]
     return levels, level_probability
 
@@ -349,11 +376,11 @@ def _credible_bounds(
     levels: Floats, level_probability: Floats, credible_mass: float
 ) -> tuple[Floats, Floats]:
     """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
-    by_probability = np.argsort(-level_probability, axis=1, kind="stable")
-    ranked_probability = np.take_along_axis(level_probability, by_probability, axis=1)
-    is_inside = np.cumsum(ranked_probability, axis=1) - ranked_probability < credible_mass
-    chosen_levels = np.where(is_inside, levels[by_probability], np.nan)
-    low, high = np.nanmin(chosen_levels, axis=1), np.nanmax(chosen_levels, axis=1)
+    order_by_probability = np.argsort(-level_probability, axis=1, kind="stable")
+    ranked_probability = np.take_along_axis(level_probability, order_by_probability, axis=1)
+    is_in_credible_set = np.cumsum(ranked_probability, axis=1) - ranked_probability < credible_mass
+    credible_levels = np.where(is_in_credible_set, levels[order_by_probability], np.nan)
+    low, high = np.nanmin(credible_levels, axis=1), np.nanmax(credible_levels, axis=1)
     level_edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
     return level_edges[np.searchsorted(levels, low)], level_edges[np.searchsorted(levels, high) + 1]
 
@@ -376,8 +403,8 @@ def _surfaces_at_fault(
         posterior[:, bank.is_fault_of_group(g)].sum(axis=1) / fault_probability
         for g in range(len(model.groups))
     ]
-    group_share = np.column_stack(group_shares)
-    is_likely = (group_share > _MIN_ISOLATION_PROBABILITY) & has_isolation_evidence[:, None]
+    group_share_of_fault = np.column_stack(group_shares)
+    is_group_likely = (group_share_of_fault > _MIN_GROUP_SHARE_FOR_NAME) & has_isolation_evidence[:, None]
     if model.settings.assumes_one_group_at_fault:
         is_single_loss = bank.hypothesis_kind == GROUP_LOSS
         single_loss_probability = np.column_stack(
@@ -386,34 +413,38 @@ def _surfaces_at_fault(
                 for g in range(len(model.groups))
             ]
         )
-        is_likely = (
+        is_group_likely = (
             single_loss_probability
             > _MAX_WRONG_EXCLUSION_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
         ) & has_isolation_evidence[:, None]
-        candidates = single_loss_probability.max(axis=0) > 0.0
-        is_likely &= ~(is_likely[:, candidates].all(axis=1) & (candidates.sum() > 1))[:, None]
-    likely_names = join_flagged_names(is_likely, ["+".join(group) for group in model.groups])
-    named = np.full(len(posterior), "", dtype=object)
-    is_unknown_offset = posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
-    rename_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
+        is_candidate_group = single_loss_probability.max(axis=0) > 0.0
+        is_group_likely &= ~(
+            is_group_likely[:, is_candidate_group].all(axis=1) & (is_candidate_group.sum() > 1)
+        )[:, None]
+    likely_names = join_flagged_names(is_group_likely, ["+".join(group) for group in model.groups])
+    names = np.full(len(posterior), "", dtype=object)
+    is_unknown_offset_likelier = (
+        posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
+    )
+    hold_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
-        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
+        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, names[k - 1] if k else ""
         unchanged_samples = (
             unchanged_samples + 1 if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE) else 0
         )
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
         keeps_name = last_name and (
-            is_unknown_offset[k]
+            is_unknown_offset_likelier[k]
             or (
                 last_name != UNKNOWN_SURFACE
                 and (
-                    unchanged_samples < rename_samples
+                    unchanged_samples < hold_samples
                     or _would_restore_excluded_surfaces(new_name, last_name, model)
                 )
             )
         )
-        named[k] = last_name if keeps_name else new_name
-    return named
+        names[k] = last_name if keeps_name else new_name
+    return names
 
 
 def _would_restore_excluded_surfaces(new_name: str, last_name: str, model: Model) -> bool:
@@ -439,8 +470,9 @@ def _rows_at_log_stamps(samples: Samples, rows: DiagnosisRows) -> DiagnosisRows:
         for name in DiagnosisRows.__dataclass_fields__
         if name not in ("t_s", "not_credible_rows_by_reason")
     ]
-    reasons = {
-        reason: rows_outside[last_rows] for reason, rows_outside in rows.not_credible_rows_by_reason.items()
+    rows_by_reason = {
+        reason: not_credible_rows[last_rows]
+        for reason, not_credible_rows in rows.not_credible_rows_by_reason.items()
     }
     fields = {name: getattr(rows, name)[last_rows] for name in field_names}
-    return DiagnosisRows(t_s=samples.log_stamps_s, not_credible_rows_by_reason=reasons, **fields)
+    return DiagnosisRows(t_s=samples.log_stamps_s, not_credible_rows_by_reason=rows_by_reason, **fields)

@@ -35,7 +35,7 @@ _PROPORTIONAL_GROUP_NOTE = (
 
 def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Document:
     """The document of verdict.json."""
-    found = isolability_document(samples, model)
+    isolability = isolability_document(samples, model)
     return {
         "flight": samples.name,
         "vehicle": model.vehicle.name,
@@ -46,8 +46,8 @@ def verdict_document(samples: Samples, model: Model, rows: DiagnosisRows) -> Doc
         "faulty": bool(rows.faulty.any()),
         "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
-        "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(found)],
-        "isolability": found,
+        "can_separate": [*trust.unknown_effect_sentences(model), *isolability_sentences(isolability)],
+        "isolability": isolability,
         "settings": model.settings.model_dump(by_alias=True),
         "notes": list(samples.notes),
     }
@@ -59,28 +59,28 @@ def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     What lasts less than MAX_BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone
     is brief. This is hindsight, for the reader; the rows have none.
     """
-    _, name = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
-    said = np.column_stack([name, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
-    runs = _join_brief_events(rows, constant_stretches(said))
+    _, name_index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
+    verdict_columns = np.column_stack([name_index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
+    runs = _join_brief_events(rows, constant_stretches(verdict_columns))
     return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
 def _join_brief_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
-    joined: list[tuple[int, int]] = []
+    joined_runs: list[tuple[int, int]] = []
     for begin, end in runs:
-        last = joined[-1] if joined else (begin, begin)
-        goes_on = (
+        last_run = joined_runs[-1] if joined_runs else (begin, begin)
+        continues_event = (
             _is_brief(rows, begin, end)
-            or _is_brief_and_unnamed(rows, *last)
-            or _have_same_verdict(rows, last[0], begin)
+            or _is_brief_and_unnamed(rows, *last_run)
+            or _have_same_verdict(rows, last_run[0], begin)
         )
-        if last[0] < begin and rows.faulty[last[0]] and rows.faulty[begin] and goes_on:
-            joined[-1] = (last[0], end)
+        if last_run[0] < begin and rows.faulty[last_run[0]] and rows.faulty[begin] and continues_event:
+            joined_runs[-1] = (last_run[0], end)
         else:
-            joined.append((begin, end))
-    return joined
+            joined_runs.append((begin, end))
+    return joined_runs
 
 
 def _is_brief(rows: DiagnosisRows, begin: int, end: int) -> bool:
@@ -99,21 +99,25 @@ def _have_same_verdict(rows: DiagnosisRows, first_row: int, second_row: int) -> 
 
 def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event; name and effectiveness as they stood for most of it."""
-    names, count = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
-    named = str(names[count.argmax()])
-    mentioned = surfaces if named in (UNKNOWN_SURFACE, ENGINE) else named.split("+")
-    known = {"estimate": rows.effectiveness, "low": rows.effectiveness_low, "high": rows.effectiveness_high}
-    middles = {key: np.median(values[begin:end], axis=0) for key, values in known.items()}
+    names, n_rows_of_name = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
+    main_name = str(names[n_rows_of_name.argmax()])
+    mentioned_surfaces = surfaces if main_name in (UNKNOWN_SURFACE, ENGINE) else main_name.split("+")
+    effectiveness_arrays = {
+        "estimate": rows.effectiveness,
+        "low": rows.effectiveness_low,
+        "high": rows.effectiveness_high,
+    }
+    medians = {key: np.median(values[begin:end], axis=0) for key, values in effectiveness_arrays.items()}
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
         "brief": _is_brief(rows, begin, end),
-        "named": named,
+        "named": main_name,
         "probability": float(rows.fault_probability[begin:end].max()),
         "effectiveness": {
-            name: {key: float(middle[i]) for key, middle in middles.items()}
+            name: {key: float(median[i]) for key, median in medians.items()}
             for i, name in enumerate(surfaces)
-            if name in mentioned
+            if name in mentioned_surfaces
         },
     }
 
@@ -125,12 +129,21 @@ def lasting_events(events: list[Document]) -> list[Document]:
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    shown, every = lasting_events(verdict["events"]), len(verdict["events"])
-    what = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
-    lines = [f"{verdict['flight']}: {what} in {duration_in_words(verdict)}", *map(_event_text, shown)]
+    shown_events, n_events = lasting_events(verdict["events"]), len(verdict["events"])
+    summary_text = (
+        f"{len(shown_events)} event{'s' if len(shown_events) > 1 else ''}"
+        if shown_events
+        else _no_event_text(verdict)
+    )
+    lines = [
+        f"{verdict['flight']}: {summary_text} in {duration_in_words(verdict)}",
+        *map(_event_text, shown_events),
+    ]
     lines += credibility_text_lines(verdict)
-    if brief := every - len(shown):
-        lines.append(f"  and {brief} brief alarm{'s' if brief > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s")
+    if n_brief := n_events - len(shown_events):
+        lines.append(
+            f"  and {n_brief} brief alarm{'s' if n_brief > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s"
+        )
     lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
@@ -147,12 +160,12 @@ def _no_event_text(verdict: Document) -> str:
 
 def credibility_text_lines(verdict: Document) -> list[str]:
     """Return lines on the parts of a flight without a statement, and the reasons."""
-    known = verdict["credible"]
-    if known["share"] >= 1.0:
+    credibility = verdict["credible"]
+    if credibility["share"] >= 1.0:
         return []
-    reasons = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in known["reasons"]]
+    reasons = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in credibility["reasons"]]
     return [
-        f"  credible in {known['share']:.1%} of the rows; in the others nothing is said, because",
+        f"  credible in {credibility['share']:.1%} of the rows; in the others nothing is said, because",
         *reasons,
     ]
 
@@ -165,18 +178,22 @@ def duration_in_words(verdict: Document) -> str:
 
 
 def _event_text(event: Document) -> str:
-    left = ", ".join(
-        f"{name} {known['estimate']:.2f} ({known['low']:.2f} to {known['high']:.2f})"
-        for name, known in event["effectiveness"].items()
+    effectiveness_text = ", ".join(
+        f"{name} {estimate_and_bounds['estimate']:.2f} "
+        f"({estimate_and_bounds['low']:.2f} to {estimate_and_bounds['high']:.2f})"
+        for name, estimate_and_bounds in event["effectiveness"].items()
     )
-    brief = "  (brief)" if event["brief"] else ""
-    return f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  effectiveness {left}{brief}"
+    brief_text = "  (brief)" if event["brief"] else ""
+    return (
+        f"  {event['from_s']:.1f} to {event['to_s']:.1f} s  {event['named']}  "
+        f"effectiveness {effectiveness_text}{brief_text}"
+    )
 
 
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_hypothesis_bank(model)
-    answers = _whitened_group_responses(samples, model)
+    group_responses = _whitened_group_responses(samples, model)
     return {
         "together": [
             {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
@@ -184,59 +201,80 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
             if len(group) > 1
         ],
         "groups": [
-            {"surfaces": group, **_group_isolability_entry(answers, index, model, bank, samples.dt_s)}
-            for index, group in enumerate(model.groups)
+            {
+                "surfaces": group,
+                **_group_isolability_entry(group_responses, group_index, model, bank, samples.dt_s),
+            }
+            for group_index, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosine_entries(answers, model),
+        "alike": _group_pair_cosine_entries(group_responses, model),
         "columns_held_s": {name: round(age, 4) for name, age in samples.mean_age_s_by_held_column.items()},
     }
 
 
 def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    ok, _, answers = unexplained_rates_and_responses(samples, model)
-    answers, noise = answers[ok], np.array(model.residual_covariance)
-    whitened = np.linalg.solve(np.linalg.cholesky(noise), answers.reshape(-1, 3).T).T
-    return np.asarray(whitened.reshape(answers.shape) * np.sqrt(model.settings.effective_sample_share))
+    is_predictable, _, group_responses = unexplained_rates_and_responses(samples, model)
+    group_responses, residual_covariance = (
+        group_responses[is_predictable],
+        np.array(model.residual_covariance),
+    )
+    whitened_responses = np.linalg.solve(
+        np.linalg.cholesky(residual_covariance), group_responses.reshape(-1, 3).T
+    ).T
+    return np.asarray(
+        whitened_responses.reshape(group_responses.shape) * np.sqrt(model.settings.effective_sample_share)
+    )
 
 
 def _group_isolability_entry(
     group_responses: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
-    odds = _log_odds_needed_for_alarm(model, bank, group, dt_s)
+    required_log_odds = _log_odds_needed_for_alarm(model, bank, group, dt_s)
     if not len(group_responses):
-        return {"information_per_s": 0.0, "smallest_loss": _smallest_detectable_losses(0.0, odds)}
-    own = float((group_responses[:, group] ** 2).sum(axis=1).mean()) / dt_s
-    left = _conditional_fisher_information(group_responses, group) / dt_s
+        return {
+            "information_per_s": 0.0,
+            "smallest_loss": _smallest_detectable_losses(0.0, required_log_odds),
+        }
+    information_per_s = float((group_responses[:, group] ** 2).sum(axis=1).mean()) / dt_s
+    conditional_information_per_s = _conditional_fisher_information(group_responses, group) / dt_s
     return {
-        "information_per_s": own,
-        "information_per_s_of_its_motion": left,
-        "smallest_loss": _smallest_detectable_losses(own, odds),
-        "smallest_loss_by_motion_alone": _smallest_detectable_losses(left, odds),
+        "information_per_s": information_per_s,
+        "information_per_s_of_its_motion": conditional_information_per_s,
+        "smallest_loss": _smallest_detectable_losses(information_per_s, required_log_odds),
+        "smallest_loss_by_motion_alone": _smallest_detectable_losses(
+            conditional_information_per_s, required_log_odds
+        ),
     }
 
 
 def _conditional_fisher_information(group_responses: Floats, group: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
-    n, groups, axes = group_responses.shape
-    constant = np.tile(np.eye(axes), (n, 1))
-    others = [group_responses[:, other].reshape(-1, 1) for other in range(groups) if other != group]
-    nuisance = np.column_stack([constant, *others])
+    n_samples, n_groups, n_axes = group_responses.shape
+    trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
+    other_responses = [
+        group_responses[:, other_group].reshape(-1, 1)
+        for other_group in range(n_groups)
+        if other_group != group
+    ]
+    nuisance = np.column_stack([trim_regressors, *other_responses])
     target = group_responses[:, group].reshape(-1)
-    rest = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
-    return float(rest @ rest) / n
+    unexplained_target = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
+    return float(unexplained_target @ unexplained_target) / n_samples
 
 
 def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, shares = model.settings, bank.transition_share[bank.is_fault_of_group(group)]
-    if not len(shares):
+    settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group)]
+    if not len(transition_shares):
         return float("inf")
-    change = settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
+    change_probability = (
+        settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(transition_shares))
+    )
     return float(
         np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
-        - np.log(change)
+        - np.log(change_probability)
     )
 
 
@@ -244,56 +282,64 @@ def _smallest_detectable_losses(
     information_per_s: float, required_log_odds: float
 ) -> dict[str, float | None]:
     """By horizon in s the loss whose mean log likelihood passes the odds within it; None where none does."""
-    gathered = {f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S}
+    information_by_horizon = {
+        f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S
+    }
     losses = {
-        key: np.sqrt(2.0 * required_log_odds / much) if much > 0.0 else np.inf
-        for key, much in gathered.items()
+        key: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
+        for key, information in information_by_horizon.items()
     }
     return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
 
 
 def _group_pair_cosine_entries(group_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
-    pairs = []
-    for a, b in combinations(range(len(model.groups)), 2):
-        one, other = group_responses[:, a].ravel(), group_responses[:, b].ravel()
-        norms = float(np.sqrt((one @ one) * (other @ other)))
-        cosine = float(one @ other) / max(norms, MIN_DIVISOR)
-        surfaces = [model.groups[a], model.groups[b]]
-        pairs.append(
+    pair_entries = []
+    for first_group, second_group in combinations(range(len(model.groups)), 2):
+        first_response, second_response = (
+            group_responses[:, first_group].ravel(),
+            group_responses[:, second_group].ravel(),
+        )
+        norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
+        cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)
+        surfaces = [model.groups[first_group], model.groups[second_group]]
+        pair_entries.append(
             {
                 "surfaces": surfaces,
                 "cosine": cosine,
                 "separable": abs(cosine) < _MIN_COSINE_OF_PROPORTIONAL_EFFECTS,
             }
         )
-    return pairs
+    return pair_entries
 
 
 def isolability_sentences(isolability: dict[str, Any]) -> list[str]:
     """The statement in words."""
-    said = [entry["says"] for entry in isolability["together"]]
+    sentences = [entry["says"] for entry in isolability["together"]]
     for entry in isolability["groups"]:
-        said.append(
+        sentences.append(
             f"{', '.join(entry['surfaces'])}: {_smallest_detectable_loss_text(entry['smallest_loss'])}"
         )
     for pair in isolability["alike"]:
         if not pair["separable"]:
-            one, other = (" and ".join(names) for names in pair["surfaces"])
-            said.append(
-                f"In this flight the effects of {one} and of {other} were nearly proportional (cosine "
-                f"{pair['cosine']:.2f}): one may be named for the other."
+            first_names, second_names = (" and ".join(names) for names in pair["surfaces"])
+            sentences.append(
+                f"In this flight the effects of {first_names} and of {second_names} were nearly "
+                f"proportional (cosine {pair['cosine']:.2f}): one may be named for the other."
             )
-    return said
+    return sentences
 
 
 def _smallest_detectable_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
-    seen = [
+    loss_texts = [
         f"{loss:.0%} within {horizon} s"
         for horizon, loss in smallest_loss_by_horizon.items()
         if loss is not None
     ]
-    if not seen:
-        longest = f"{DETECTION_HORIZONS_S[-1]:g} s"
-        return f"not even a complete loss would show within {longest} by the mean of this flight's commands."
-    return f"the smallest loss that shows on average is {', '.join(seen)}."
+    if not loss_texts:
+        longest_horizon_text = f"{DETECTION_HORIZONS_S[-1]:g} s"
+        return (
+            f"not even a complete loss would show within {longest_horizon_text} by the mean of this flight's "
+            "commands."
+        )
+    return f"the smallest loss that shows on average is {', '.join(loss_texts)}."

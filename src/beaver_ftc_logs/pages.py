@@ -54,8 +54,8 @@ def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdic
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands."
     )
-    words = {"bounds": "90 % bounds", "quiet": no_alarm_text, "predicts": model_text}
-    return _render_flight_page(samples, list(model.vehicle.surfaces), rows, verdict, words)
+    wording = {"bounds": "90 % bounds", "quiet": no_alarm_text, "predicts": model_text}
+    return _render_flight_page(samples, list(model.vehicle.surfaces), rows, verdict, wording)
 
 
 def _render_flight_page(
@@ -96,8 +96,8 @@ def flight_figure(
     """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault.
     bounds_label: what they are called."""
     figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
-    heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
-    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
+    panel_heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
+    axes = figure.subplots(len(panel_heights), sharex=True, height_ratios=panel_heights)
     _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     rate_limit_deg_s = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
     axes[0].set_ylim(
@@ -152,36 +152,40 @@ def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, boun
 
 def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
     """Shade the time in which the alarm stands."""
-    edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
-    times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
+    alarm_edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
+    times_s = rows.t_s[np.minimum(alarm_edges, len(rows.t_s) - 1)]
     for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
         axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
 def diagnosis_column_names(surfaces: Iterable[str]) -> tuple[str, ...]:
     """Columns of diagnosis.parquet, by the vehicle's surfaces."""
-    each = (f"{surface}_{what}" for surface in surfaces for what in ("effectiveness", "low", "high"))
-    return ("t_s", "faulty", "named", *each, "fault_probability", "credible")
+    effectiveness_columns = (
+        f"{surface}_{suffix}" for surface in surfaces for suffix in ("effectiveness", "low", "high")
+    )
+    return ("t_s", "faulty", "named", *effectiveness_columns, "fault_probability", "credible")
 
 
 def write_diagnosis(
     out: Path, samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]
 ) -> Path:
     """Write the folder `out/<flight>` whole or not at all; returns it."""
-    each = (
-        column
-        for of in zip(rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True)
-        for column in of
+    effectiveness_arrays = (
+        array
+        for arrays in zip(
+            rows.effectiveness.T, rows.effectiveness_low.T, rows.effectiveness_high.T, strict=True
+        )
+        for array in arrays
     )
-    values = (
+    column_values = (
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces.tolist(),
-        *each,
+        *effectiveness_arrays,
         rows.fault_probability,
         rows.credible,
     )
-    columns = dict(zip(diagnosis_column_names(model.vehicle.surfaces), values, strict=True))
+    columns = dict(zip(diagnosis_column_names(model.vehicle.surfaces), column_values, strict=True))
     return write_results(out, samples.name, columns, verdict, render_diagnosis(samples, model, rows, verdict))
 
 
@@ -197,13 +201,13 @@ def write_diagnosis_with_aircraft_model(
     too."""
     from beaver_ftc_logs.stepped import EFFECTIVENESS_BOUND_WINDOW_S
 
-    words = {
+    wording = {
         "bounds": "bounds",
         "quiet": "No residual left the bound of the errors declared.",
         "predicts": f"The model is that of {verdict['aircraft']}; the bounds hold while one surface alone "
         f"is at fault, has stood for {EFFECTIVENESS_BOUND_WINDOW_S:g} s, and the errors declared hold.",
     }
-    page = _render_flight_page(samples, surfaces, rows, verdict, words)
+    page = _render_flight_page(samples, surfaces, rows, verdict, wording)
     return write_results(
         out, samples.name, diagnosis_columns(rows, surfaces), verdict, page, write_extra_files
     )
@@ -242,19 +246,26 @@ def refuse_to_replace_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     usable_flights = fitting.flights_with_usable_rows(flights)
-    fit = fitting.fit_least_squares_of_order(
+    rate_regression = fitting.fit_least_squares_of_order(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
-    names = ["constant", *regressor_names(model)]
+    coefficient_names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=IDENTIFICATION_PAGE_MARK,
         model=model,
         found=model.identification_results,
         used=sum(int(usable_flight.is_usable.sum()) for usable_flight in usable_flights),
-        coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
+        coefficients=list(
+            zip(
+                coefficient_names,
+                rate_regression.coefficients.tolist(),
+                rate_regression.standard_errors.tolist(),
+                strict=True,
+            )
+        ),
         fits=_encode_png(_prediction_figure(usable_flights, model)),
         spectrum=_encode_png(_spectrum_figure(usable_flights, model)),
-        correlation=_encode_png(_coefficient_correlation_figure(fit, names)),
+        correlation=_encode_png(_coefficient_correlation_figure(rate_regression, coefficient_names)),
     )
 
 
@@ -273,17 +284,17 @@ def _encode_png(figure: Any) -> str:
 def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     folds = [
-        (fitting.fit_with_same_order(fitted, model), held_out, name)
-        for fitted, held_out, name in fitting.validation_folds(usable_flights)
+        (fitting.fit_with_same_order(fitted_flights, model), held_out, name)
+        for fitted_flights, held_out, name in fitting.validation_folds(usable_flights)
     ]
-    folds = [part for part in folds if part[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
-    n_shown = max(len(folds), 1)
-    figure = _new_figure(11, 4.6 * n_shown)
-    blocks = figure.subfigures(n_shown, squeeze=False)[:, 0]
-    for block, (fitted, held_out, name) in zip(blocks, folds, strict=False):
-        axes = block.subplots(3, 1, sharex=True)
+    folds = [fold for fold in folds if fold[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
+    n_subfigures = max(len(folds), 1)
+    figure = _new_figure(11, 4.6 * n_subfigures)
+    subfigures = figure.subfigures(n_subfigures, squeeze=False)[:, 0]
+    for subfigure, (fold_model, held_out, name) in zip(subfigures, folds, strict=False):
+        axes = subfigure.subplots(3, 1, sharex=True)
         t_s, rates, residual = _prediction_in_most_active_window(
-            fitted, held_out, round(_PREDICTION_WINDOW_S * model.rate_hz)
+            fold_model, held_out, round(_PREDICTION_WINDOW_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
             residual_deg_s, rate_deg_s = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
@@ -302,23 +313,23 @@ def _prediction_in_most_active_window(
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
     rows, residual = fitting.one_step_residuals(model, held_out)
-    rates, window_residual = (
+    rates_or_nan, residual_or_nan = (
         np.full_like(held_out.samples.rates, np.nan),
         np.full_like(held_out.samples.rates, np.nan),
     )
-    rates[rows], window_residual[rows] = held_out.samples.rates[rows], residual
-    begin = _first_row_of_most_active_window(rates, rows, window_samples)
-    part = slice(begin, begin + window_samples)
-    return held_out.samples.t_s[part], rates[part], window_residual[part]
+    rates_or_nan[rows], residual_or_nan[rows] = held_out.samples.rates[rows], residual
+    first_row = _first_row_of_most_active_window(rates_or_nan, rows, window_samples)
+    window_rows = slice(first_row, first_row + window_samples)
+    return held_out.samples.t_s[window_rows], rates_or_nan[window_rows], residual_or_nan[window_rows]
 
 
 def _first_row_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
     squared_rates = np.zeros(len(rates))
     squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
-    cumulated = np.concatenate([[0.0], np.cumsum(squared_rates)])
+    cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_rates)])
     return (
-        int(np.argmax(cumulated[window_samples:] - cumulated[:-window_samples]))
+        int(np.argmax(cumulated_squares[window_samples:] - cumulated_squares[:-window_samples]))
         if len(rates) > window_samples
         else 0
     )
@@ -329,13 +340,13 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
     residual = np.vstack(
         [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
     )
-    frequency, density = power_spectral_density(residual, 1.0 / model.rate_hz)
+    frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
-        axis.loglog(frequency[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
-        white = residual[:, i].var() / (0.5 * model.rate_hz)
-        axis.axhline(white, color=SERIES[i], linewidth=0.7, linestyle=":")
+        axis.loglog(frequency_hz[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
+        white_density = residual[:, i].var() / (0.5 * model.rate_hz)
+        axis.axhline(white_density, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)
     axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
     _label_axis(axis, "density, (rad/s)² / Hz", which="both")
@@ -343,13 +354,13 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
     return figure
 
 
-def _coefficient_correlation_figure(fit: RateRegression, names: list[str]) -> Any:
+def _coefficient_correlation_figure(rate_regression: RateRegression, coefficient_names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
-    size = 2.5 + 0.19 * len(names)
-    figure = _new_figure(size + 0.8, size)
+    side_in = 2.5 + 0.19 * len(coefficient_names)
+    figure = _new_figure(side_in + 0.8, side_in)
     axis = figure.subplots()
-    image = axis.imshow(fit.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
-    axis.set_yticks(range(len(names)), names, fontsize=6)
+    image = axis.imshow(rate_regression.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
+    axis.set_xticks(range(len(coefficient_names)), coefficient_names, rotation=90, fontsize=6)
+    axis.set_yticks(range(len(coefficient_names)), coefficient_names, fontsize=6)
     figure.colorbar(image, shrink=0.7).ax.tick_params(labelsize=7)
     return figure

@@ -55,16 +55,17 @@ class RecordedFlight:
 def nearest_names(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
     sorted_names = sorted(names)
-    ranked = sorted(
+    ranked_names = sorted(
         sorted_names, key=lambda name: -SequenceMatcher(None, name.lower(), wanted_name.lower()).ratio()
     )
-    shown = (
-        ", ".join(name if name.isprintable() else repr(name) for name in ranked[:_N_NEAREST_NAMES]) or "none"
+    nearest_text = (
+        ", ".join(name if name.isprintable() else repr(name) for name in ranked_names[:_N_NEAREST_NAMES])
+        or "none"
     )
     return (
-        shown
+        nearest_text
         if len(sorted_names) <= _N_NEAREST_NAMES
-        else f"{shown}, and {len(sorted_names) - _N_NEAREST_NAMES} more"
+        else f"{nearest_text}, and {len(sorted_names) - _N_NEAREST_NAMES} more"
     )
 
 
@@ -84,8 +85,10 @@ def refuse_log_unreadable_by_package(
         missing_package = f"reading a {log_kind} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
         raise BadInput(f"{path}: {missing_package}") from None
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
-        says = " ".join(str(error).split()) or type(error).__name__
-        raise BadInput(f"{path}: is no {log_kind} that can be read ({says}), allowed: {file_form}") from None
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadInput(
+            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {file_form}"
+        ) from None
 
 
 def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tuple[dict[str, Column], float]:
@@ -127,17 +130,19 @@ def rows_with_increasing_time(topic: str, t_s: Floats) -> tuple[NDArray[np.int64
     """
     if (np.diff(t_s) > 0).all() and np.isfinite(t_s).all():
         return np.arange(len(t_s)), ""
-    stamped = np.flatnonzero(np.isfinite(t_s))
-    kept_rows = stamped[_longest_increasing_rows(t_s[stamped])]
-    left_out = np.setdiff1d(np.arange(len(t_s)), kept_rows)
-    misplaced_rows = [k for k in left_out.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
+    stamped_rows = np.flatnonzero(np.isfinite(t_s))
+    kept_rows = stamped_rows[_longest_increasing_rows(t_s[stamped_rows])]
+    left_out_rows = np.setdiff1d(np.arange(len(t_s)), kept_rows)
+    misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
     if not misplaced_rows:
         return kept_rows, ""
     n_further = len(misplaced_rows) - 1
-    others = f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(t_s)}" if n_further else ""
+    others_text = (
+        f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(t_s)}" if n_further else ""
+    )
     return (
         kept_rows,
-        f"{topic}: row {misplaced_rows[0] + 1}: its stamp is out of order, the row is left out{others}",
+        f"{topic}: row {misplaced_rows[0] + 1}: its stamp is out of order, the row is left out{others_text}",
     )
 
 
@@ -147,14 +152,14 @@ def _longest_increasing_rows(t_s: Floats) -> NDArray[np.int64]:
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
     negated_ends: list[float] = []
-    places: list[int] = []
-    next_place = np.full(len(t_s), -1)
+    end_rows: list[int] = []
+    next_row = np.full(len(t_s), -1)
     for k in range(len(t_s) - 1, -1, -1):
         length = bisect_left(negated_ends, -t_s[k])
-        next_place[k] = places[length - 1] if length else -1
+        next_row[k] = end_rows[length - 1] if length else -1
         negated_ends[length : length + 1] = [-t_s[k]]
-        places[length : length + 1] = [k]
-    kept = places[-1:]
-    while kept and next_place[kept[-1]] >= 0:
-        kept.append(int(next_place[kept[-1]]))
-    return np.array(kept, dtype=np.int64)
+        end_rows[length : length + 1] = [k]
+    kept_rows = end_rows[-1:]
+    while kept_rows and next_row[kept_rows[-1]] >= 0:
+        kept_rows.append(int(next_row[kept_rows[-1]]))
+    return np.array(kept_rows, dtype=np.int64)

@@ -25,10 +25,10 @@ from beaver_ftc_logs.vehicle import Vehicle
 
 MIN_LOG_RATE_HZ, _MAX_LOG_RATE_HZ = 4.0, 1e5
 _MIN_LOG_SAMPLES = 50
-_MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _IMPLAUSIBLE_RATE_SPREAD_RAD_S = 1e6, 60.0, 3.0
+_MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _IMPLAUSIBLE_RATE_SD_RAD_S = 1e6, 60.0, 3.0
 _DYNAMIC_PRESSURE_RATIO_LIMITS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
-MAX_FIT_SAMPLES, _STRETCH_SAMPLES = 200_000, 5000
+MAX_FIT_SAMPLES, _FIT_STRETCH_SAMPLES = 200_000, 5000
 """Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
 NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
@@ -134,30 +134,30 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
             recording, vehicle, (t_s, stretch_number, step_s)
         ),
     )
-    reference_mps = vehicle.reference_airspeed_mps
+    reference_airspeed_mps = vehicle.reference_airspeed_mps
     return (
         samples
-        if reference_mps is None
-        else scale_by_dynamic_pressure(samples, reference_mps, vehicle.surface_airspeed_powers)
+        if reference_airspeed_mps is None
+        else scale_by_dynamic_pressure(samples, reference_airspeed_mps, vehicle.surface_airspeed_powers)
     )
 
 
 def scale_by_dynamic_pressure(
-    samples: Samples, reference_mps: float, airspeed_powers: Sequence[float] = (2.0,)
+    samples: Samples, reference_airspeed_mps: float, airspeed_powers: Sequence[float] = (2.0,)
 ) -> Samples:
     """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
     surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
     and stability grow with it; as at the reference where the airspeed is unknown."""
     airspeed = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
     pressure_ratio = np.clip(
-        np.nan_to_num(airspeed / reference_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
+        np.nan_to_num(airspeed / reference_airspeed_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
     )[:, None]
     airspeed_products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure_ratio) - 1.0)
-    signals = np.column_stack([samples.signals, airspeed_products])
+    signals_and_products = np.column_stack([samples.signals, airspeed_products])
     return replace(
         samples,
         commands=samples.commands * pressure_ratio ** (0.5 * np.array(airspeed_powers)),
-        signals=signals,
+        signals=signals_and_products,
     )
 
 
@@ -169,24 +169,27 @@ def whiten_samples(
     after a gap, and where a number is missing."""
     from scipy.signal import lfilter
 
-    signal_groups = (samples.rates, samples.commands, samples.signals)
-    values = np.hstack(signal_groups)
-    is_known = np.isfinite(values).all(axis=1)
-    edges = np.flatnonzero((np.diff(is_known) != 0) | (np.diff(samples.stretch_number) != 0)) + 1
-    values[~is_known] = np.nan
-    for begin, end in pairwise([0, *edges.tolist(), len(values)]):
-        first = values[begin]
-        values[begin:end] = first + lfilter(
-            [sum(noise_ma_coefficients)], noise_ma_coefficients, values[begin:end] - first, axis=0
+    arrays = (samples.rates, samples.commands, samples.signals)
+    joined_values = np.hstack(arrays)
+    is_known = np.isfinite(joined_values).all(axis=1)
+    run_edges = np.flatnonzero((np.diff(is_known) != 0) | (np.diff(samples.stretch_number) != 0)) + 1
+    joined_values[~is_known] = np.nan
+    for run_begin, run_end in pairwise([0, *run_edges.tolist(), len(joined_values)]):
+        first_row = joined_values[run_begin]
+        joined_values[run_begin:run_end] = first_row + lfilter(
+            [sum(noise_ma_coefficients)],
+            noise_ma_coefficients,
+            joined_values[run_begin:run_end] - first_row,
+            axis=0,
         )
-    rates, commands, new_signals = np.split(
-        values, np.cumsum([part.shape[1] for part in signal_groups])[:2], axis=1
+    whitened_rates, whitened_commands, whitened_signals = np.split(
+        joined_values, np.cumsum([array.shape[1] for array in arrays])[:2], axis=1
     )
     return replace(
         samples,
-        rates=rates,
-        commands=commands,
-        signals=new_signals,
+        rates=whitened_rates,
+        commands=whitened_commands,
+        signals=whitened_signals,
         noise_ma_coefficients=tuple(noise_ma_coefficients),
         fit_weight=fit_weight,
     )
@@ -202,11 +205,10 @@ def _used_column_defect_texts(
         )
         if (
             name in rate_columns
-            and (rate_spread := float(np.nanstd(recording.columns[name].values)))
-            > _IMPLAUSIBLE_RATE_SPREAD_RAD_S
+            and (rate_sd := float(np.nanstd(recording.columns[name].values))) > _IMPLAUSIBLE_RATE_SD_RAD_S
         ):
             yield (
-                f"{name}: spreads {rate_spread:.3g} rad/s, as hardly an aircraft does: is it "
+                f"{name}: spreads {rate_sd:.3g} rad/s, as hardly an aircraft does: is it "
                 "in deg/s? a factor "
                 "of 0.01745 fits (`unit: deg/s`)"
             )
@@ -228,10 +230,13 @@ def _is_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
     return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
 
 
-def _is_rate_clipped(rates: list[Column], t_s: Floats) -> NDArray[np.bool_]:
+def _is_rate_clipped(rate_columns: list[Column], t_s: Floats) -> NDArray[np.bool_]:
     """Whether a rate is clipped at each sample."""
-    found = [_latest_values(t_s, rate.t_s, signals.is_clipped(rate.values).astype(float)) for rate in rates]
-    return np.asarray(np.nan_to_num(found).any(axis=0))
+    clipped_by_axis = [
+        _latest_values(t_s, rate_column.t_s, signals.is_clipped(rate_column.values).astype(float))
+        for rate_column in rate_columns
+    ]
+    return np.asarray(np.nan_to_num(clipped_by_axis).any(axis=0))
 
 
 def _sampled_airspeed(
@@ -260,20 +265,22 @@ def _sampled_energy_height_rate_mps(
 def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     columns, attitude, mistake = recording.columns, vehicle.attitude, None
-    rates = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if attitude and not signals.is_clipped(next(iter(rates.values())).values).any():
+    rate_columns = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    if attitude and not signals.is_clipped(next(iter(rate_columns.values())).values).any():
         angle_quantities = [attitude.roll, attitude.pitch, attitude.yaw]
-        angles = [
+        angle_columns = [
             (one.column, columns[one.column]) if one and one.column in columns else None
             for one in angle_quantities
         ]
-        other_columns = [
+        other_column_names = [
             *vehicle.signal_columns,
             *(one.column for one in vehicle.flow.values()),
             *vehicle.command_columns,
         ]
-        logged_others = {name: columns[name] for name in dict.fromkeys(other_columns) if name in columns}
-        mistake = physics.find_attitude_mistake(rates, angles, logged_others)
+        other_logged_columns = {
+            name: columns[name] for name in dict.fromkeys(other_column_names) if name in columns
+        }
+        mistake = physics.find_attitude_mistake(rate_columns, angle_columns, other_logged_columns)
     z_acceleration = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and z_acceleration:
         mistake = physics.gravity_remark(z_acceleration, vehicle.acceleration.column)
@@ -298,34 +305,43 @@ def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight
 
 def mixer_matrix(vehicle: Vehicle) -> Floats:
     """Return the share of each command in each surface, (surfaces, commands)."""
-    rows = [[row.get(name, 0.0) for name in vehicle.command_columns] for row in vehicle.surfaces.values()]
-    return np.array(rows, dtype=float)
+    share_rows = [
+        [shares_by_command.get(name, 0.0) for name in vehicle.command_columns]
+        for shares_by_command in vehicle.surfaces.values()
+    ]
+    return np.array(share_rows, dtype=float)
 
 
 def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_columns: list[str]) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
-    missing = [name for name in used_columns if name not in recording.columns]
-    if missing:
-        nearest = nearest_names(missing[0], recording.columns)
-        says = f"no column {missing[0]}, allowed: a log that has it; it has {nearest}"
-        raise BadInput(f"{recording.name}: {says}")
-    largest = {}
+    missing_names = [name for name in used_columns if name not in recording.columns]
+    if missing_names:
+        nearest_text = nearest_names(missing_names[0], recording.columns)
+        reason = f"no column {missing_names[0]}, allowed: a log that has it; it has {nearest_text}"
+        raise BadInput(f"{recording.name}: {reason}")
+    largest_magnitude = {}
     for name in used_columns:
         values = recording.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
-        largest[name] = float(np.nanmax(np.abs(values)))
-        if largest[name] > _MAX_LOGGED_MAGNITUDE:
-            mistake = f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
+        largest_magnitude[name] = float(np.nanmax(np.abs(values)))
+        if largest_magnitude[name] > _MAX_LOGGED_MAGNITUDE:
+            mistake = (
+                f"column {name} holds {largest_magnitude[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
+            )
             raise BadInput(f"{recording.name}: {mistake}")
     for name in rate_columns:
-        if largest[name] > _MAX_BODY_RATE_RAD_S:
-            in_deg_s = np.deg2rad(largest[name])
-            deg_hint = f" (deg/s would be {in_deg_s:.3g} rad/s: `unit: deg/s`)"
+        if largest_magnitude[name] > _MAX_BODY_RATE_RAD_S:
+            max_rate_if_deg_s = np.deg2rad(largest_magnitude[name])
+            deg_hint = (
+                f" (deg/s would be {max_rate_if_deg_s:.3g} rad/s: `unit: deg/s`)"
+                if max_rate_if_deg_s < _MAX_BODY_RATE_RAD_S
+                else ""
+            )
             raise BadInput(
-                f"{recording.name}: column {name} reaches {largest[name]:g}, allowed: rates in rad/s, "
-                f"up to {_MAX_BODY_RATE_RAD_S:g}{deg_hint if in_deg_s < _MAX_BODY_RATE_RAD_S else ''}"
+                f"{recording.name}: column {name} reaches {largest_magnitude[name]:g}, allowed: rates in "
+                f"rad/s, up to {_MAX_BODY_RATE_RAD_S:g}{deg_hint}"
             )
 
 
@@ -352,14 +368,14 @@ def _time_base(
         )
     if rate_hz <= 1.05 * max_rate_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
-    regular_times = _regular_time_base(stamps, 1.0 / max_rate_hz)
-    if len(regular_times[0]) < _MIN_LOG_SAMPLES:
+    regular_time_base = _regular_time_base(stamps, 1.0 / max_rate_hz)
+    if len(regular_time_base[0]) < _MIN_LOG_SAMPLES:
         raise BadInput(
             f"{flight_name}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are "
-            f"{len(regular_times[0])} samples at "
+            f"{len(regular_time_base[0])} samples at "
             f"{max_rate_hz:g} Hz, allowed: at least {_MIN_LOG_SAMPLES}; is time in another unit?"
         )
-    return regular_times
+    return regular_time_base
 
 
 def _other_time_unit_hint(rate_hz: float) -> str:
@@ -413,8 +429,8 @@ def _held_values(column: Column, t_s: Floats) -> tuple[Floats, float]:
 
 def _finite_rows(column: Column) -> Column:
     """The rows of a column that have a number."""
-    known = np.isfinite(column.values)
-    return replace(column, t_s=column.t_s[known], values=column.values[known])
+    is_number = np.isfinite(column.values)
+    return replace(column, t_s=column.t_s[is_number], values=column.values[is_number])
 
 
 def _held_age_s(column: Column, t_s: Floats) -> Floats:
@@ -431,14 +447,14 @@ def _latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
     column = _finite_rows(column)
-    stamps, cumulated = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
+    stamps, cumulated_values = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
     rounding_s = 1e-6 * step_s  # of stamps that are meant to fall on the edge
-    end = np.searchsorted(stamps, t_s + rounding_s, side="right")
-    start = np.searchsorted(stamps, t_s - step_s + rounding_s, side="right")
-    n_rows = end - start
+    end_row = np.searchsorted(stamps, t_s + rounding_s, side="right")
+    start_row = np.searchsorted(stamps, t_s - step_s + rounding_s, side="right")
+    n_rows = end_row - start_row
     held_values, _ = _held_values(column, t_s)
-    mean = (cumulated[end] - cumulated[start]) / np.maximum(n_rows, 1)
-    return np.where(n_rows > 0, mean, held_values), 0.5 * step_s
+    interval_mean = (cumulated_values[end_row] - cumulated_values[start_row]) / np.maximum(n_rows, 1)
+    return np.where(n_rows > 0, interval_mean, held_values), 0.5 * step_s
 
 
 def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:
@@ -475,8 +491,8 @@ def read_parts_for_vehicle(
 def _reader_arguments(
     vehicle: Vehicle, reader: str | None
 ) -> tuple[str | None, tuple[str, str] | None, list[str]]:
-    time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
-    return reader or vehicle.reader, time, vehicle.column_names()
+    time_column_and_unit = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
+    return reader or vehicle.reader, time_column_and_unit, vehicle.column_names()
 
 
 def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
@@ -493,54 +509,60 @@ def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None =
             yield resample(recording, vehicle)
 
 
-def _read_flight(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
+def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
     """A flight; of a long one stretches that are spread over it evenly."""
     kept_stretches: list[Samples] = []
-    keep_every, n_met, read_until_s = 1, 0, -np.inf
+    keep_every_nth, n_stretches, read_until_s = 1, 0, -np.inf
     for part_number, recording in enumerate(read_parts_for_vehicle(path, vehicle, reader), 1):
         samples = resample(recording, vehicle)
         for begin in range(
-            int(np.searchsorted(samples.t_s, read_until_s, side="right")), len(samples.t_s), _STRETCH_SAMPLES
+            int(np.searchsorted(samples.t_s, read_until_s, side="right")),
+            len(samples.t_s),
+            _FIT_STRETCH_SAMPLES,
         ):
-            if n_met % keep_every == 0:
-                kept_stretches.append(_select_rows(samples, slice(begin, begin + _STRETCH_SAMPLES)))
-            n_met += 1
-        while len(kept_stretches) * _STRETCH_SAMPLES > MAX_FIT_SAMPLES and part_number > 1:
-            kept_stretches, keep_every = kept_stretches[::2], 2 * keep_every
+            if n_stretches % keep_every_nth == 0:
+                kept_stretches.append(_select_rows(samples, slice(begin, begin + _FIT_STRETCH_SAMPLES)))
+            n_stretches += 1
+        while len(kept_stretches) * _FIT_STRETCH_SAMPLES > MAX_FIT_SAMPLES and part_number > 1:
+            kept_stretches, keep_every_nth = kept_stretches[::2], 2 * keep_every_nth
         read_until_s = samples.t_s[-1]
     return samples if part_number == 1 else _concatenate(path.stem, kept_stretches, part_number)
 
 
-def first_samples(samples: Samples, count: int) -> Samples:
+def first_samples(samples: Samples, n_samples: int) -> Samples:
     """The first samples."""
-    return samples if count >= len(samples.t_s) else _select_rows(samples, slice(count))
+    return samples if n_samples >= len(samples.t_s) else _select_rows(samples, slice(n_samples))
 
 
 def _select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
     selected = {
-        name: of[rows].copy() for name in _PER_SAMPLE_FIELDS if (of := getattr(samples, name)) is not None
+        name: values[rows].copy()
+        for name in _PER_SAMPLE_FIELDS
+        if (values := getattr(samples, name)) is not None
     }
-    still_s = {name: of[rows].copy() for name, of in samples.time_since_change_s.items()}
-    return replace(samples, log_stamps_s=selected["t_s"], time_since_change_s=still_s, **selected)
+    time_since_change_s = {name: values[rows].copy() for name, values in samples.time_since_change_s.items()}
+    return replace(samples, log_stamps_s=selected["t_s"], time_since_change_s=time_since_change_s, **selected)
 
 
 def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
     """Samples one after the other, with a gap between."""
     field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(flights[0], name) is not None]
-    joined: dict[str, Any] = {
+    joined_fields: dict[str, Any] = {
         name: np.concatenate([getattr(one, name) for one in flights]) for name in field_names
     }
-    is_begin = np.diff(joined["stretch_number"], prepend=joined["stretch_number"][0]) != 0
-    is_begin[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
-    joined["stretch_number"] = np.cumsum(is_begin)
-    still_s = {
+    is_stretch_begin = (
+        np.diff(joined_fields["stretch_number"], prepend=joined_fields["stretch_number"][0]) != 0
+    )
+    is_stretch_begin[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
+    joined_fields["stretch_number"] = np.cumsum(is_stretch_begin)
+    time_since_change_s = {
         name: np.concatenate([one.time_since_change_s[name] for one in flights])
         for name in flights[0].time_since_change_s
     }
     long_log_note = (
-        f"a long log, read in {n_log_parts} parts: {len(is_begin)} samples of it, spread evenly, are looked "
-        "at"
+        f"a long log, read in {n_log_parts} parts: {len(is_stretch_begin)} samples of it, spread evenly, are "
+        "looked at"
     )
     notes = (long_log_note, *dict.fromkeys(note for one in flights for note in one.notes))
     return replace(
@@ -548,9 +570,9 @@ def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples
         name=name,
         notes=notes,
         n_log_parts=n_log_parts,
-        log_stamps_s=joined["t_s"],
-        time_since_change_s=still_s,
-        **joined,
+        log_stamps_s=joined_fields["t_s"],
+        time_since_change_s=time_since_change_s,
+        **joined_fields,
     )
 
 
@@ -561,11 +583,11 @@ def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | 
     mistakes: list[str] = []
     for path in paths:
         try:
-            flights.append(_read_flight(path, vehicle, reader))
+            flights.append(_read_flight_for_fit(path, vehicle, reader))
         except BadInput as error:
             mistakes.append(str(error))
-    for name, count in Counter(samples.name for samples in flights).items():
-        if count > 1:
+    for name, n_flights_of_name in Counter(samples.name for samples in flights).items():
+        if n_flights_of_name > 1:
             mistakes.append(f"two flights are named {name}: one result would replace the other")
     if mistakes:
         raise BadInput("\n".join(mistakes))

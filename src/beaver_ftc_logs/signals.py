@@ -38,7 +38,7 @@ def is_clipped(values: Floats) -> Mask:
 
     Uses nothing later than the row.
     """
-    clipped = np.zeros(len(values), dtype=bool)
+    is_clipped_row = np.zeros(len(values), dtype=bool)
     for signed_values in (values, -values):
         finite_values = np.where(np.isfinite(signed_values), signed_values, -np.inf)
         is_at_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (signed_values > 0.0)
@@ -49,13 +49,15 @@ def is_clipped(values: Floats) -> Mask:
         maximum_number = np.cumsum(
             _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
-        n_met = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(is_at_maximum, maximum_number)
-        clipped |= (
+        n_rows_at_maximum = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(
+            is_at_maximum, maximum_number
+        )
+        is_clipped_row |= (
             is_at_maximum
             & (row_index - at_maximum_since >= _MIN_CLIPPED_ROWS - 1)
-            & (n_met >= _MIN_CLIPPED_TOTAL_ROWS)
+            & (n_rows_at_maximum >= _MIN_CLIPPED_TOTAL_ROWS)
         )
-    return clipped
+    return is_clipped_row
 
 
 def _count_rows_at_previous_maxima(
@@ -78,33 +80,39 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     finite_rows = np.flatnonzero(np.isfinite(values))
     if len(finite_rows) < MIN_STILL_ROWS:
         return finite_rows[:0]
-    steps = np.diff(values[finite_rows])
-    usual_step = float(np.median(np.abs(steps[steps != 0.0]))) if (steps != 0.0).any() else 0.0
-    is_jump = (np.abs(steps[:-1]) > _MIN_SPIKE_STEPS * usual_step) & (
-        np.abs(steps[1:]) > _MIN_SPIKE_STEPS * usual_step
+    value_steps = np.diff(values[finite_rows])
+    median_step = (
+        float(np.median(np.abs(value_steps[value_steps != 0.0]))) if (value_steps != 0.0).any() else 0.0
     )
-    is_jump &= steps[:-1] * steps[1:] < 0.0
-    jumps = finite_rows[1:-1][is_jump]
+    is_spike = (np.abs(value_steps[:-1]) > _MIN_SPIKE_STEPS * median_step) & (
+        np.abs(value_steps[1:]) > _MIN_SPIKE_STEPS * median_step
+    )
+    is_spike &= value_steps[:-1] * value_steps[1:] < 0.0
+    spike_rows = finite_rows[1:-1][is_spike]
     return (
-        jumps if usual_step > 0.0 and len(jumps) <= _MAX_SPIKE_SHARE * len(finite_rows) else finite_rows[:0]
+        spike_rows
+        if median_step > 0.0 and len(spike_rows) <= _MAX_SPIKE_SHARE * len(finite_rows)
+        else finite_rows[:0]
     )
 
 
 def column_defect_texts(name: str, column: Column, is_measured_rate: bool) -> list[str]:
     """Return a line for each mistake in a column over the whole flight. is_measured_rate: a rate, not a
     command."""
-    values, lines = column.values, [column.note] if column.note else []
+    values, defect_texts = column.values, [column.note] if column.note else []
     n_missing = int((~np.isfinite(values)).sum())
     if n_missing:
-        lines.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
+        defect_texts.append(f"{name}: rows without a number: {n_missing} of {len(values)}")
     longest_still_s = float(time_since_change_s(column).max(initial=0.0))
     if is_measured_rate and longest_still_s > MIN_STILL_S:
-        lines.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
+        defect_texts.append(f"{name}: frozen, the same to the last bit for {longest_still_s:.1f} s")
     if not is_measured_rate and values.size and np.nanmin(values) == np.nanmax(values):
-        lines.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if is_measured_rate and (rows := is_clipped(values)).any():
-        lines.append(f"{name}: clipped at {np.abs(values[rows]).max():.4g} in {rows.sum()} rows")
+        defect_texts.append(f"{name}: does not move, nothing can be said of what it moves alone")
+    if is_measured_rate and (is_clipped_row := is_clipped(values)).any():
+        defect_texts.append(
+            f"{name}: clipped at {np.abs(values[is_clipped_row]).max():.4g} in {is_clipped_row.sum()} rows"
+        )
     if is_measured_rate and len(spike_rows := find_spike_rows(values)):
         jump_count_text = "1 jump" if len(spike_rows) == 1 else f"{len(spike_rows)} jumps"
-        lines.append(f"{name}: {jump_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
-    return lines
+        defect_texts.append(f"{name}: {jump_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
+    return defect_texts

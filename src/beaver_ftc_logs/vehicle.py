@@ -276,11 +276,13 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_keys_agree(self) -> "Vehicle":
-        says = "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
+        reason = (
+            "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
+        )
         bad_names = [name for name in self.surfaces if not _VEHICLE_NAME_PATTERN.fullmatch(name)]
-        file_mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {says}") for name in bad_names]
+        mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
         for surface, command_shares in self.surfaces.items():
-            file_mistakes += _unknown_name_mistakes(
+            mistakes += _unknown_name_mistakes(
                 ("surfaces", surface), command_shares, "command", self.command_columns
             )
         tables_by_surface: dict[str, Collection[str]] = {
@@ -290,13 +292,13 @@ class Vehicle(Section):
             "airspeed_powers": self.airspeed_powers,
         }
         for key, table in tables_by_surface.items():
-            file_mistakes += _unknown_name_mistakes((key,), table, "surface", self.surfaces)
-        for location, kind, one in self.quantities_of_known_kind():
-            if one.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[one.unit][0] != kind:
-                says = f"{one.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
-                file_mistakes.append(((*location, "unit"), says))
-        file_mistakes += self._columns_read_in_two_ways()
-        refuse(file_mistakes)
+            mistakes += _unknown_name_mistakes((key,), table, "surface", self.surfaces)
+        for location, kind, quantity in self.quantities_of_known_kind():
+            if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
+                reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
+                mistakes.append(((*location, "unit"), reason))
+        mistakes += self._columns_read_in_two_ways()
+        refuse(mistakes)
         return self
 
     def quantities_of_known_kind(self) -> list[tuple[Location, str, QuantityColumn]]:
@@ -307,8 +309,8 @@ class Vehicle(Section):
         if self.attitude is not None:
             quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
             for angle in ("pitch", "yaw"):
-                if (one := getattr(self.attitude, angle)) is not None:
-                    quantities.append((("attitude", angle), ANGLE, one))
+                if (angle_column := getattr(self.attitude, angle)) is not None:
+                    quantities.append((("attitude", angle), ANGLE, angle_column))
         if self.acceleration is not None:
             quantities.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:
@@ -380,19 +382,22 @@ class Vehicle(Section):
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [one for _, one in self.model_quantities()] + [
-            one for _, _, one in self.quantities_of_known_kind()
+        quantities = [quantity for _, quantity in self.model_quantities()] + [
+            quantity for _, _, quantity in self.quantities_of_known_kind()
         ]
         quantities += [*self.flow.values(), *self.labels.values(), *self.outputs.values()]
-        return list(dict.fromkeys(one.column for one in quantities))
+        return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 
 def _unknown_name_mistakes(
-    location: Location, names: Iterable[str], name_kind: str, known: Collection[str]
+    location: Location, names: Iterable[str], name_kind: str, known_names: Collection[str]
 ) -> list[Conflict]:
     """One mistake for each name below a location that is not known."""
-    unknown = [name for name in names if name not in known]
-    return [((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known)}") for name in unknown]
+    unknown_names = [name for name in names if name not in known_names]
+    return [
+        ((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known_names)}")
+        for name in unknown_names
+    ]
 
 
 def unused_keys_as_comments(used_keys: Collection[str]) -> str:
@@ -426,6 +431,6 @@ def load_vehicle(path_or_name: str | Path) -> Vehicle:
 def with_false_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
     """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
     if not 0.0 < false_alarms_per_hour <= MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:
-        says = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
-        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {says}")
+        allowed_text = f"allowed: more than 0, up to {MAX_SETTABLE_FALSE_ALARMS_PER_HOUR:g} an hour"
+        raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed_text}")
     return vehicle.model_copy(update={"false_alarms_per_hour": false_alarms_per_hour})

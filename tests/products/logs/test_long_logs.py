@@ -34,7 +34,7 @@ def parted(monkeypatch):
     """Parts of 500 rows, fits of 600 samples in stretches of 100."""
     monkeypatch.setattr(readers, "ROWS_PER_PART", 500)
     monkeypatch.setattr(samples, "MAX_FIT_SAMPLES", 600)
-    monkeypatch.setattr(samples, "_STRETCH_SAMPLES", 100)
+    monkeypatch.setattr(samples, "_FIT_STRETCH_SAMPLES", 100)
 
 
 def write(path, columns):

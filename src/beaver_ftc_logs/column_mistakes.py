@@ -38,22 +38,22 @@ def logs_with_one_mistake_corrected(
     """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit.
     surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
     commands."""
-    surfaces, rates = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    surfaces, rate_columns = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
     for a, b in combinations(
         [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
     ):
-        order = list(range(len(surfaces)))
-        order[a], order[b] = b, a
-        exchanged = replace(samples, commands=samples.commands[:, order])
-        yield CorrectedLog(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged)
-    for one, other in combinations(rates, 2):
-        exchanged = _with_exchanged_or_scaled_columns(samples, vehicle, {one: other, other: one}, {})
-        yield CorrectedLog(f"{one} and {other} exchanged", exchanged)
-    for name in [*rates, *vehicle.signal_columns]:
-        for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit for unit in _UNIT_SIZE_RATIOS)):
-            scaled = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
-            log_jacobian = float(np.log(abs(factor))) if name in rates else 0.0
-            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, log_jacobian)
+        surface_order = list(range(len(surfaces)))
+        surface_order[a], surface_order[b] = b, a
+        exchanged_samples = replace(samples, commands=samples.commands[:, surface_order])
+        yield CorrectedLog(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged_samples)
+    for one, other in combinations(rate_columns, 2):
+        exchanged_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {one: other, other: one}, {})
+        yield CorrectedLog(f"{one} and {other} exchanged", exchanged_samples)
+    for name in [*rate_columns, *vehicle.signal_columns]:
+        for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
+            scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
+            log_jacobian = float(np.log(abs(factor))) if name in rate_columns else 0.0
+            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian)
 
 
 def _with_exchanged_or_scaled_columns(
@@ -63,10 +63,10 @@ def _with_exchanged_or_scaled_columns(
     factor_of_column: Mapping[str, float],
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.signal_regressor_names
-    columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
+    column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"] + vehicle.signal_regressor_names
+    columns = dict(zip(column_names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
     new_columns = []
-    for name in names:
+    for name in column_names:
         stem, suffix = name.removesuffix(" by airspeed"), name[len(name.removesuffix(" by airspeed")) :]
         new_columns.append(
             factor_of_column.get(stem, 1.0) * columns[source_of_column.get(stem, stem) + suffix]

@@ -105,17 +105,17 @@ def _check_logs(
 
     vehicle_file = load_vehicle(vehicle) if vehicle is not None else None
     if out is not None and (out.exists() or vehicle_file is not None):
-        says = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
-        raise BadInput(f"identify: --check --out: {says}")
+        reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
+        raise BadInput(f"identify: --check --out: {reason}")
     findings = [check_log(path, vehicle_file, reader) for path in flights]
     guessed_vehicle = next((one["vehicle"] for one in findings if one["vehicle"]), None)
-    lines = [as_text(one) for one in findings]
+    texts = [as_text(one) for one in findings]
     if guessed_vehicle is not None and out is not None:
         _write_vehicle_file(out, vehicle_file_text(guessed_vehicle))
-        lines.append(f"vehicle file: {out}")
+        texts.append(f"vehicle file: {out}")
     elif guessed_vehicle is not None:
-        lines.append(vehicle_file_text(guessed_vehicle))
-    answer(format, {"logs": findings, "vehicle": guessed_vehicle}, lambda: "\n".join(lines))
+        texts.append(vehicle_file_text(guessed_vehicle))
+    answer(format, {"logs": findings, "vehicle": guessed_vehicle}, lambda: "\n".join(texts))
     if not all(one["usable"] for one in findings):
         raise typer.Exit(2)
 
@@ -210,8 +210,8 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
     if options.model is not None:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
     if options.detector != "bank-of-filters":
-        says = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
-        raise BadInput(f"diagnose: --aircraft with {says}")
+        reason = f"--detector {options.detector}: allowed: none, fdi.scheme of --scenario names it"
+        raise BadInput(f"diagnose: --aircraft with {reason}")
 
 
 def _check_replay_options(options: DiagnoseOptions) -> None:
@@ -242,7 +242,7 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    diagnosed = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
+    diagnosed_aircraft = load_aircraft_and_declared_errors(str(options.aircraft), options.scenario)
     verdicts = []
     for path in options.flights:
         check_exists(path)
@@ -251,9 +251,9 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
         vehicle_file = load_vehicle(options.vehicle or str(vehicle_beside_log))
         for recording in read_parts_for_vehicle(path, vehicle_file, options.reader):
-            aircraft_inputs = read_diagnosis_inputs(recording, vehicle_file, diagnosed)
-            rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed)
-            samples, surfaces = aircraft_inputs.samples, diagnosed.aircraft.surfaces
+            aircraft_inputs = read_diagnosis_inputs(recording, vehicle_file, diagnosed_aircraft)
+            rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed_aircraft)
+            samples, surfaces = aircraft_inputs.samples, diagnosed_aircraft.aircraft.surfaces
             if options.score:
                 verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
             write_proof = (
@@ -272,8 +272,8 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
 
     other_logs = [path for path in flights if not is_log_of_run(path)]
     if other_logs:
-        says = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
-        raise BadInput(f"diagnose: {other_logs[0]}: {says}")
+        reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
+        raise BadInput(f"diagnose: {other_logs[0]}: {reason}")
     replays = [replay_run_log(path) for path in flights]
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}

@@ -68,25 +68,27 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
     prior_information = np.diag(
         [*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(regressors.shape[2] - 3, 4.0)]
     )
-    covariance = np.linalg.inv(information + prior_information)
-    estimate = np.einsum("nij,nj->ni", covariance, score_vector)
-    standard_error = np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:], 0.0))
-    return _least_squares_rows(samples, model, 1.0 + estimate[:, 3:], standard_error)
+    estimate_covariance = np.linalg.inv(information + prior_information)
+    trim_and_effectiveness_change = np.einsum("nij,nj->ni", estimate_covariance, score_vector)
+    standard_error = np.sqrt(np.maximum(np.diagonal(estimate_covariance, axis1=1, axis2=2)[:, 3:], 0.0))
+    return _least_squares_rows(samples, model, 1.0 + trim_and_effectiveness_change[:, 3:], standard_error)
 
 
 def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model)
-    noise = model.coefficient_arrays()[3]
-    whitening = np.linalg.inv(np.linalg.cholesky(noise))
-    noise_sizes = np.broadcast_to(np.diag(np.sqrt(np.diag(noise))), (len(is_predictable), 3, 3))
+    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(samples, model)
+    residual_covariance = model.coefficient_arrays()[3]
+    whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance))
+    trim_regressors = np.broadcast_to(
+        np.diag(np.sqrt(np.diag(residual_covariance))), (len(is_predictable), 3, 3)
+    )
     regressors = np.where(
         is_predictable[:, None, None],
-        np.concatenate([noise_sizes, responses.transpose(0, 2, 1)], axis=2),
+        np.concatenate([trim_regressors, responses.transpose(0, 2, 1)], axis=2),
         0.0,
     )
-    return np.einsum("ab,nbi->nai", whitening, regressors), standardized_healthy_residual(
-        model, is_predictable, unexplained, responses
+    return np.einsum("ab,nbi->nai", whitening_matrix, regressors), standardized_healthy_residual(
+        model, is_predictable, unexplained_rates, responses
     )
 
 
@@ -110,25 +112,27 @@ def _least_squares_rows(
     standard deviations."""
     bank = build_hypothesis_bank(model)
     low, high = (
-        np.clip(effectiveness + side * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
-        for side in (-1.0, 1.0)
+        np.clip(effectiveness + sign * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
+        for sign in (-1.0, 1.0)
     )
-    estimate, is_lost = (
+    estimate, has_loss = (
         np.clip(effectiveness, 0.0, 1.0),
         effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
     )
     if model.settings.likely_effectiveness_levels_by_group:
-        for g, group in enumerate(model.groups):
+        for group_index, group in enumerate(model.groups):
             labelled_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
             levels = (
-                np.array([*labelled_levels, 1.0]) if labelled_levels else np.unique(bank.effectiveness[:, g])
+                np.array([*labelled_levels, 1.0])
+                if labelled_levels
+                else np.unique(bank.effectiveness[:, group_index])
             )
-            estimate[:, g] = levels[np.abs(estimate[:, g, None] - levels).argmin(axis=1)]
-        is_lost = estimate < 1.0
+            estimate[:, group_index] = levels[np.abs(estimate[:, group_index, None] - levels).argmin(axis=1)]
+        has_loss = estimate < 1.0
     bounds_by_group = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
-    bounds = {name: group_values_by_surface(edge, model) for name, edge in bounds_by_group.items()}
-    named = join_flagged_names(is_lost, ["+".join(group) for group in model.groups])
-    return _rows_with_default_bounds(samples, named, group_values_by_surface(estimate, model), **bounds)
+    bounds = {name: group_values_by_surface(bound, model) for name, bound in bounds_by_group.items()}
+    names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
+    return _rows_with_default_bounds(samples, names, group_values_by_surface(estimate, model), **bounds)
 
 
 def _rows_with_default_bounds(
@@ -151,30 +155,32 @@ def diagnose_by_freeze_rule(
     recording: RecordedFlight, samples: Samples, model: Model
 ) -> DiagnosisRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
-    names = list(model.vehicle.surfaces)
+    surface_names = list(model.vehicle.surfaces)
     outputs = model.vehicle.outputs
-    logged_outputs = {name: one.column for name, one in outputs.items() if one.column in recording.columns}
+    logged_outputs = {
+        name: output.column for name, output in outputs.items() if output.column in recording.columns
+    }
     if not logged_outputs:
         return None
-    is_frozen = np.zeros((len(samples.t_s), len(names)), dtype=bool)
+    is_frozen = np.zeros((len(samples.t_s), len(surface_names)), dtype=bool)
     for name in logged_outputs:
         column = recording.columns[logged_outputs[name]]
-        last_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
+        last_output_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         has_moved = np.concatenate([[True], np.diff(column.values) != 0.0])
         unchanged_since_s = column.t_s[
             np.maximum.accumulate(np.where(has_moved, np.arange(len(has_moved)), 0))
         ]
-        is_frozen[:, names.index(name)] = (
-            samples.t_s - unchanged_since_s[np.maximum(last_rows, 0)] > MIN_FROZEN_OUTPUT_S
-        ) & (last_rows >= 0)
-    return _rows_with_default_bounds(samples, join_flagged_names(is_frozen, names), 1.0 - is_frozen)
+        is_frozen[:, surface_names.index(name)] = (
+            samples.t_s - unchanged_since_s[np.maximum(last_output_rows, 0)] > MIN_FROZEN_OUTPUT_S
+        ) & (last_output_rows >= 0)
+    return _rows_with_default_bounds(samples, join_flagged_names(is_frozen, surface_names), 1.0 - is_frozen)
 
 
 class LinearRateModel:
     """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
 
-    def __init__(self, past: Floats, dt_s: float) -> None:
-        self._jacobian = (past[:3] - np.eye(3)) / dt_s
+    def __init__(self, past_coefficients: Floats, dt_s: float) -> None:
+        self._jacobian = (past_coefficients[:3] - np.eye(3)) / dt_s
 
     def f(self, x: Floats, y: Floats) -> Floats:
         """Angular acceleration rad/s2 by the rates alone."""
@@ -190,18 +196,18 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
-    groups = surface_indices_by_group(model)
-    if len(groups) > len(LOOP_SURFACES_FOR_GROUPS):
+    surface_groups = surface_indices_by_group(model)
+    if len(surface_groups) > len(LOOP_SURFACES_FOR_GROUPS):
         raise BadInput(
-            f"{model.vehicle.name}: {len(groups)} groups of surfaces, allowed for a detector of the loop: "
-            f"at most {len(LOOP_SURFACES_FOR_GROUPS)}"
+            f"{model.vehicle.name}: {len(surface_groups)} groups of surfaces, allowed for a detector of the "
+            f"loop: at most {len(LOOP_SURFACES_FOR_GROUPS)}"
         )
-    is_predictable, unexplained, responses = unexplained_rates_and_responses(samples, model)
+    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(samples, model)
     intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     previous_rates = np.vstack([rates[:1], rates[:-1]])
     predicted_rates = rates - np.where(
-        is_predictable[:, None], unexplained - intercept - responses.sum(axis=1), 0.0
+        is_predictable[:, None], unexplained_rates - intercept - responses.sum(axis=1), 0.0
     )
     acceleration = (predicted_rates - previous_rates) / dt_s
     contribution, command = (
@@ -209,14 +215,24 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
         np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
     )
     known_responses = np.where(is_predictable[:, None, None], responses, 0.0)
-    for group_index, members in enumerate(groups):
+    for group_index, surface_indices in enumerate(surface_groups):
         contribution[:, :, group_index] = known_responses[:, group_index] / dt_s
-        command[:, group_index] = np.nan_to_num(samples.commands[:, members].sum(axis=1))
+        command[:, group_index] = np.nan_to_num(samples.commands[:, surface_indices].sum(axis=1))
     frames = zip(samples.t_s.tolist(), rates, acceleration, contribution, command, strict=True)
-    error = _model_error_sd_rad_s2(model)
+    model_error_sd_rad_s2 = _model_error_sd_rad_s2(model)
     return [
-        (Measured(t_s, frame_rates, np.zeros(N_Y), expected_rad_s2, by_surfaces, error.copy()), commanded)
-        for t_s, frame_rates, expected_rad_s2, by_surfaces, commanded in frames
+        (
+            Measured(
+                t_s,
+                frame_rates,
+                np.zeros(N_Y),
+                expected_rad_s2,
+                frame_contribution,
+                model_error_sd_rad_s2.copy(),
+            ),
+            frame_command,
+        )
+        for t_s, frame_rates, expected_rad_s2, frame_contribution, frame_command in frames
     ]
 
 
@@ -230,9 +246,9 @@ def loop_detector_context(model: Model) -> Context:
     dt_s = 1.0 / model.rate_hz
     noise_sd = np.zeros(7)
     noise_sd[:3] = _DECLARED_GYRO_NOISE_RAD_S
-    design: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
+    design_model: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
     return Context(
-        dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
+        dt_s=dt_s, substeps=1, model=design_model, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
         trim_rad=np.zeros(_N_LOOP_SURFACES_WITH_FLAP),
         travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES_WITH_FLAP)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
@@ -250,21 +266,26 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Dia
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n_samples, groups = len(verdicts), surface_indices_by_group(model)
+    n_samples, surface_groups = len(verdicts), surface_indices_by_group(model)
     faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
-    estimate, low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
-    named = np.full(n_samples, "", dtype=object)
+    effectiveness, effectiveness_low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
+    names = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACES_FOR_GROUPS[: len(groups)]:
-            named[k], low[k] = UNKNOWN_SURFACE, 0.0
+        if verdicts[k].isolated not in LOOP_SURFACES_FOR_GROUPS[: len(surface_groups)]:
+            names[k], effectiveness_low[k] = UNKNOWN_SURFACE, 0.0
             continue
         group_index = LOOP_SURFACES_FOR_GROUPS.index(str(verdicts[k].isolated))
-        named[k], low[k, groups[group_index]] = "+".join(model.groups[group_index]), 0.0
-        estimate[k, groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
+        names[k], effectiveness_low[k, surface_groups[group_index]] = "+".join(model.groups[group_index]), 0.0
+        effectiveness[k, surface_groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
     return _rows_with_default_bounds(
-        samples, named, estimate, low=low, high=np.ones_like(low), probability=probability
+        samples,
+        names,
+        effectiveness,
+        low=effectiveness_low,
+        high=np.ones_like(effectiveness_low),
+        probability=probability,
     )
 
 
@@ -304,8 +325,12 @@ def diagnose_with_detector(detector_name: str, samples: Samples, model: Model) -
     check_log_fits_model(samples, model)
     if detector_name == BANK_OF_FILTERS_DETECTOR:
         return diagnose(samples, model)
-    live_samples = with_rates_unknown_where_frozen_or_clipped(samples, model)
+    samples_without_frozen_rates = with_rates_unknown_where_frozen_or_clipped(samples, model)
     if detector_name in _FLIGHT_DETECTORS:
-        return blank_rows_not_credible(samples, model, _FLIGHT_DETECTORS[detector_name](live_samples, model))
+        return blank_rows_not_credible(
+            samples, model, _FLIGHT_DETECTORS[detector_name](samples_without_frozen_rates, model)
+        )
     detector: Detector = made(DETECTORS, detector_name)
-    return blank_rows_not_credible(samples, model, run_loop_detector(detector, live_samples, model))
+    return blank_rows_not_credible(
+        samples, model, run_loop_detector(detector, samples_without_frozen_rates, model)
+    )

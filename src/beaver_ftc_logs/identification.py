@@ -343,7 +343,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
                 bic := _min_bic(scale_and_whiten_flights(candidate_vehicle), candidate_vehicle)
             ) < bic_to_beat:
                 bic_to_beat, vehicle = bic, candidate_vehicle
-    return scale_and_whiten_flights(vehicle, whitens=False), vehicle
+    return scale_and_whiten_flights(vehicle, does_whiten=False), vehicle
 
 
 def check_explained_variance(

@@ -15,10 +15,10 @@ from beaver_ftc_logs.recording import Column, Floats
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, KIND_AND_SI_FACTOR_OF_UNIT, RATE, nearest_unit
 
 _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _UNIT_TOLERANCE = 20, 0.7, 1.3
+_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _UNIT_RATIO_TOLERANCE = 20, 0.7, 1.3
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
-_MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW = 1.5, 1.8
-_LOW_CORRELATION, _LOW_CORRELATION_OF_FEW = 0.4, 0.2
+_MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
+_LOW_CORRELATION, _LOW_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
 _GRAVITY_MPS2 = KIND_AND_SI_FACTOR_OF_UNIT["g"][1]
 _PLAUSIBLE_GRAVITY_RANGE_G = (0.5, 2.0)
 _MAX_ROLL_YAW_RAD, _IMPLAUSIBLE_RATE_RAD_S = 1.02 * 2.0 * np.pi, 12.0
@@ -49,21 +49,23 @@ def fit_roll_angle_to_rates(rates: list[Column], roll: Column, pitch: Column | N
     """
     t_s = rates[0].t_s
     p, q, r = (_interpolate_column(column, t_s) for column in rates)
-    phi, circle = _interpolate_column(roll, t_s), _full_circle(roll.values)
-    angle = phi * 2.0 * np.pi / circle  # the circle is known whatever the unit
-    terms, theta = [p], None
+    roll_angle, full_circle = _interpolate_column(roll, t_s), _full_circle(roll.values)
+    roll_rad = roll_angle * 2.0 * np.pi / full_circle  # the circle is known whatever the unit
+    rate_terms, pitch_rad = [p], None
     if pitch is not None:
-        theta = _pitch_rad_at(roll, pitch, t_s)
-        terms += [np.tan(theta) * q * np.sin(angle), np.tan(theta) * r * np.cos(angle)]
-    return _fit_angle_to_rate(t_s, phi, terms, circle, theta)
+        pitch_rad = _pitch_rad_at(roll, pitch, t_s)
+        rate_terms += [np.tan(pitch_rad) * q * np.sin(roll_rad), np.tan(pitch_rad) * r * np.cos(roll_rad)]
+    return _fit_angle_to_rate(t_s, roll_angle, rate_terms, full_circle, pitch_rad)
 
 
 def fit_pitch_angle_to_rates(rates: list[Column], roll: Column, pitch: Column) -> AngleRateFit | None:
     """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
     t_s = rates[0].t_s
     _, q, r = (_interpolate_column(column, t_s) for column in rates)
-    angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
-    return _fit_angle_to_rate(t_s, _interpolate_column(pitch, t_s), [q * np.cos(angle), -r * np.sin(angle)])
+    roll_rad = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
+    return _fit_angle_to_rate(
+        t_s, _interpolate_column(pitch, t_s), [q * np.cos(roll_rad), -r * np.sin(roll_rad)]
+    )
 
 
 def fit_yaw_angle_to_rates(
@@ -73,10 +75,12 @@ def fit_yaw_angle_to_rates(
     turn changes both alike."""
     t_s = rates[0].t_s
     _, q, r = (_interpolate_column(column, t_s) for column in rates)
-    angle = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
-    theta = np.zeros(len(t_s)) if pitch is None else _pitch_rad_at(roll, pitch, t_s)
-    turning = (q * np.sin(angle) + r * np.cos(angle)) / np.cos(theta)
-    return _fit_angle_to_rate(t_s, _interpolate_column(yaw, t_s), [turning], _full_circle(yaw.values), theta)
+    roll_rad = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
+    pitch_rad = np.zeros(len(t_s)) if pitch is None else _pitch_rad_at(roll, pitch, t_s)
+    yaw_rate_term = (q * np.sin(roll_rad) + r * np.cos(roll_rad)) / np.cos(pitch_rad)
+    return _fit_angle_to_rate(
+        t_s, _interpolate_column(yaw, t_s), [yaw_rate_term], _full_circle(yaw.values), pitch_rad
+    )
 
 
 def _pitch_rad_at(roll: Column, pitch: Column, t_s: Floats) -> Floats:
@@ -108,17 +112,17 @@ def _fit_angle_to_rate(
         ]
     )
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
-    begin, end = (
+    window_begin, window_end = (
         np.arange(0, len(t_s) - window_samples, window_samples),
         np.arange(window_samples, len(t_s), window_samples),
     )
-    is_whole = (t_s[end] - t_s[begin]) < 2.0 * _INTEGRATION_WINDOW_S
+    is_window_gap_free = (t_s[window_end] - t_s[window_begin]) < 2.0 * _INTEGRATION_WINDOW_S
     if pitch_rad is not None:
-        steep = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
-        is_whole &= steep[end] == steep[begin]
+        n_steep = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
+        is_window_gap_free &= n_steep[window_end] == n_steep[window_begin]
     angle_changes, rate_integrals = (
-        (angle[end] - angle[begin])[is_whole],
-        (integrals[end] - integrals[begin])[is_whole],
+        (angle[window_end] - angle[window_begin])[is_window_gap_free],
+        (integrals[window_end] - integrals[window_begin])[is_window_gap_free],
     )
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
@@ -149,16 +153,16 @@ def _means_of_neighbours(values: Floats) -> Floats:
 def _interpolate_column(column: Column, t_s: Floats) -> Floats:
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values
-    known = np.isfinite(column.values)
-    if not known.any():
+    is_number = np.isfinite(column.values)
+    if not is_number.any():
         return np.full(len(t_s), np.nan)
-    return np.interp(t_s, column.t_s[known], column.values[known], left=np.nan, right=np.nan)
+    return np.interp(t_s, column.t_s[is_number], column.values[is_number], left=np.nan, right=np.nan)
 
 
 def _full_circle(angle: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
-    largest = float(np.nanmax(np.abs(angle), initial=0.0))
-    return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
+    max_magnitude = float(np.nanmax(np.abs(angle), initial=0.0))
+    return next((circle for circle in (2.0 * np.pi, 360.0) if max_magnitude <= 1.02 * circle), 36000.0)
 
 
 NamedColumn = tuple[str, Column]
@@ -171,30 +175,36 @@ def find_attitude_mistake(
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. other_columns: what may have taken the place
     of a rate."""
-    columns = list(rates.values())
-    for axis, (rate, angle) in enumerate(zip(rates, angles, strict=True)):
-        if angle is None:
+    rate_columns = list(rates.values())
+    for axis, (rate_name, named_angle) in enumerate(zip(rates, angles, strict=True)):
+        if named_angle is None:
             continue
-        if axis == 1 and (says := pitch_angle_unit_remark(angle[1], angle[0])):
-            return says
-        fit = _fit_angle_of_axis(columns, angles, axis)
+        if axis == 1 and (remark := pitch_angle_unit_remark(named_angle[1], named_angle[0])):
+            return remark
+        fit = _fit_angle_of_axis(rate_columns, angles, axis)
         if fit is None:
             continue
-        for other, column in {**rates, **other_columns}.items():
-            other_fit = _fit_angle_of_axis([*columns[:axis], column, *columns[axis + 1 :]], angles, axis)
+        for other_name, other_column in {**rates, **other_columns}.items():
+            other_fit = _fit_angle_of_axis(
+                [*rate_columns[:axis], other_column, *rate_columns[axis + 1 :]], angles, axis
+            )
             if other_fit is not None and abs(other_fit.correlation) > _min_correlation_of_other_column(
-                fit, other in rates
+                fit, other_name in rates
             ):
-                return _exchanged_column_text(angle[0], (rate, fit), (other, other_fit), _RATE_TITLES[axis])
-        if says := angle_rate_remark(fit, rate, angle[0]):
-            return says
+                return _exchanged_column_text(
+                    named_angle[0], (rate_name, fit), (other_name, other_fit), _RATE_TITLES[axis]
+                )
+        if remark := angle_rate_remark(fit, rate_name, named_angle[0]):
+            return remark
     return None
 
 
 def _min_correlation_of_other_column(fit: AngleRateFit, is_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
     own_correlation = abs(fit.correlation)
-    if is_rate and own_correlation < (_LOW_CORRELATION if fit.has_many_windows else _LOW_CORRELATION_OF_FEW):
+    if is_rate and own_correlation < (
+        _LOW_CORRELATION if fit.has_many_windows else _LOW_CORRELATION_OF_FEW_WINDOWS
+    ):
         return _MIN_AGREEING_CORRELATION
     return (
         _HIGH_CORRELATION
@@ -210,22 +220,25 @@ def _fit_angle_of_axis(
 ) -> AngleRateFit | None:
     """How the angle of a place follows the rates; None where too little moves, or it is not known."""
     (roll, pitch, yaw) = (None if one is None else one[1] for one in angles)
-    if roll is None or (known := (roll, pitch, yaw)[axis]) is None:
+    if roll is None or (angle := (roll, pitch, yaw)[axis]) is None:
         return None
     if axis == 2:
-        return fit_yaw_angle_to_rates(rates, roll, pitch, known)
+        return fit_yaw_angle_to_rates(rates, roll, pitch, angle)
     return (
-        fit_pitch_angle_to_rates(rates, roll, known) if axis else fit_roll_angle_to_rates(rates, roll, pitch)
+        fit_pitch_angle_to_rates(rates, roll, angle) if axis else fit_roll_angle_to_rates(rates, roll, pitch)
     )
 
 
 def _exchanged_column_text(
-    angle_column: str, named: tuple[str, AngleRateFit], better: tuple[str, AngleRateFit], rate_title: str
+    angle_column: str,
+    named_rate: tuple[str, AngleRateFit],
+    better_column: tuple[str, AngleRateFit],
+    rate_title: str,
 ) -> str:
-    (named_column, named_fit), (other, other_fit) = named, better
+    (rate_name, rate_fit), (better_name, better_fit) = named_rate, better_column
     return (
-        f"{angle_column} does not follow {named_column} (correlation {named_fit.correlation:.2f}) but "
-        f"{other} ({other_fit.correlation:.2f}): {other} is the {rate_title}"
+        f"{angle_column} does not follow {rate_name} (correlation {rate_fit.correlation:.2f}) but "
+        f"{better_name} ({better_fit.correlation:.2f}): {better_name} is the {rate_title}"
     )
 
 
@@ -236,27 +249,29 @@ def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) ->
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
     slope_magnitude = abs(fit.slope)
-    max_slope_factor = _MAX_SLOPE_FACTOR if fit.has_many_windows else _MAX_SLOPE_FACTOR_OF_FEW
+    max_slope_factor = _MAX_SLOPE_FACTOR if fit.has_many_windows else _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS
     is_near_one = 1.0 / max_slope_factor < slope_magnitude < max_slope_factor
     if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (is_near_one and fit.slope > 0.0):
         return None
-    fits = f"the change of {angle_column} is {fit.slope:.4g} times the integral of {rate_column}"
+    slope_text = f"the change of {angle_column} is {fit.slope:.4g} times the integral of {rate_column}"
     if is_near_one:
-        return f"{fits}: one of them has the other sign, `scale: -1` fits"
+        return f"{slope_text}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
-        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_TOLERANCE)
+        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_RATIO_TOLERANCE)
     ):
         return (
-            f"{fits}: {angle_column} is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+            f"{slope_text}: {angle_column} is in {unit}, a factor of "
+            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         )
     if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
-        unit := nearest_unit(RATE, slope_magnitude, _UNIT_TOLERANCE)
+        unit := nearest_unit(RATE, slope_magnitude, _UNIT_RATIO_TOLERANCE)
     ):
         return (
-            f"{fits}: {rate_column} is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
+            f"{slope_text}: {rate_column} is in {unit}, a factor of "
+            f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         )
     return (
-        f"{fits}: a factor of {slope_magnitude:.4g} on {rate_column} fits, or of "
+        f"{slope_text}: a factor of {slope_magnitude:.4g} on {rate_column} fits, or of "
         f"{1.0 / slope_magnitude:.4g} on {angle_column}"
     )
 
@@ -271,14 +286,14 @@ def pitch_angle_unit_remark(pitch: Column, column_name: str) -> str | None:
         (one for one in ("deg", "cdeg") if max_pitch * KIND_AND_SI_FACTOR_OF_UNIT[one][1] <= _MAX_PITCH_RAD),
         None,
     )
-    fits = (
+    fit_text = (
         f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         if unit
         else "no unit fits"
     )
     return (
-        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fits}; look at the rates' "
-        "too"
+        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fit_text}; look at "
+        "the rates' too"
     )
 
 
@@ -290,12 +305,12 @@ def gravity_remark(acceleration: Column, column_name: str) -> str | None:
     if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
         return None
     unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None
-    fits = (
+    fit_text = (
         f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         if unit
         else "no unit fits: is 1 g in it?"
     )
     return (
         f"{column_name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
-        f"{_GRAVITY_MPS2:.4g}: {fits}"
+        f"{_GRAVITY_MPS2:.4g}: {fit_text}"
     )

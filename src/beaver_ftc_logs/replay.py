@@ -34,23 +34,25 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    inputs = [*stepped.log_input_columns(aircraft), ["altitude_m"]]
-    log = _read_columns(path, ["t_s", *chain.from_iterable(inputs)])
+    input_column_names = [*stepped.log_input_columns(aircraft), ["altitude_m"]]
+    log_columns = _read_columns(path, ["t_s", *chain.from_iterable(input_column_names)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
-    input_arrays = [np.column_stack([log[name] for name in names]) for names in inputs]
+    input_arrays = [np.column_stack([log_columns[name] for name in names]) for names in input_column_names]
     replayed = stepped.replay_samples(diagnosis, input_arrays, scenario.rate_hz)
-    rows = stepped.rows_of_replay(log["t_s"], replayed, aircraft.surfaces, scenario.fdi)
-    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(path, scenario, log, replayed.verdicts)
+    rows = stepped.rows_of_replay(log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi)
+    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(
+        path, scenario, log_columns, replayed.verdicts
+    )
 
 
 def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
     """These columns of a log, and what it says of its own detection if it does."""
-    log = read_numbers(path, [*names, "detected"])
-    missing = [name for name in names if name not in log]
-    if missing:
-        raise BadInput(f"{path}: no column {missing[0]}, allowed: a log.parquet as `run` writes it")
-    check_time(path, log["t_s"])
-    return log
+    log_columns = read_numbers(path, [*names, "detected"])
+    missing_names = [name for name in names if name not in log_columns]
+    if missing_names:
+        raise BadInput(f"{path}: no column {missing_names[0]}, allowed: a log.parquet as `run` writes it")
+    check_time(path, log_columns["t_s"])
+    return log_columns
 
 
 def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
@@ -70,12 +72,14 @@ def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     return columns | {"credible": rows.credible}
 
 
-def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
+def _replay_verdict(
+    path: Path, scenario: Any, log_columns: dict[str, Floats], verdicts: list[Any]
+) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
-    t_s = log["t_s"]
+    t_s = log_columns["t_s"]
     detection_times_s = [float(row_t_s) for row_t_s, one in zip(t_s, verdicts, strict=True) if one.detected]
     isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
-    logged_and_replayed = zip(log.get("detected", []), verdicts, strict=False)
+    logged_and_replayed = zip(log_columns.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
         "replay": True,
@@ -95,19 +99,19 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
 
 def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
     """Since when what is named at last has been named: what was withdrawn before does not count."""
-    since_s, name = None, None
+    named_since_s, name = None, None
     for row_t_s, one in zip(t_s, verdicts, strict=True):
         if one.isolated != name:
-            since_s, name = float(row_t_s) if one.isolated else None, one.isolated
-    return since_s, name
+            named_since_s, name = float(row_t_s) if one.isolated else None, one.isolated
+    return named_since_s, name
 
 
 def _unreplayed_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal_sensors = type(scenario.sensors)()
     declared_sensors = [name for name, value in scenario.sensors if value != getattr(ideal_sensors, name)]
-    not_logged = [name for name in declared_sensors if name not in ("p", "q", "r")]
-    return [f"the declared errors of {name}: the log has the true value" for name in not_logged]
+    sensors_not_logged = [name for name in declared_sensors if name not in ("p", "q", "r")]
+    return [f"the declared errors of {name}: the log has the true value" for name in sensors_not_logged]
 
 
 def _is_as_flown(path: Path, verdict: Document) -> bool | None:
@@ -116,8 +120,8 @@ def _is_as_flown(path: Path, verdict: Document) -> bool | None:
     if not metrics_path.is_file():
         return None
     metrics = Metrics.of(json.loads(metrics_path.read_text(encoding="utf-8")))
-    flown_times = metrics.detection.time_s, metrics.isolation.time_s
-    return all(map(_is_same_time, flown_times, (verdict["detection_s"], verdict["isolation_s"])))
+    flown_times_s = metrics.detection.time_s, metrics.isolation.time_s
+    return all(map(_is_same_time, flown_times_s, (verdict["detection_s"], verdict["isolation_s"])))
 
 
 def _is_same_time(flown_s: float | None, replayed_s: float | None) -> bool:
@@ -136,6 +140,6 @@ def as_text(verdict: Document) -> str:
     )
     if verdict["isolated"]:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
-    comparison = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
-    lines = [f"{verdict['flight']}: {outcome}; {comparison[verdict['as_flown']]}"]
+    comparison_texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
+    lines = [f"{verdict['flight']}: {outcome}; {comparison_texts[verdict['as_flown']]}"]
     return "\n".join([*lines, *(f"  left out: {one}" for one in verdict["left_out"])])

@@ -69,15 +69,17 @@ def _simulate_rows(
         t_s = k * dt_s
         if k % round(_COMMAND_HOLD_S * SAMPLE_RATE_HZ) == 0:
             demanded_attitude = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
-        command = _control_law(attitude, rates, demanded_attitude)
-        measured = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
-        yield [1000.0 * t_s, *measured, *command, *attitude]
-        elevons = np.array([command.sum(), command[0] - command[1]]) / 2.0 * [1.0, left_effectiveness(t_s)]
+        commands = _control_law(attitude, rates, demanded_attitude)
+        measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
+        yield [1000.0 * t_s, *measured_rates_deg_s, *commands, *attitude]
+        elevon_positions = (
+            np.array([commands.sum(), commands[0] - commands[1]]) / 2.0 * [1.0, left_effectiveness(t_s)]
+        )
         turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + np.sqrt(
             dt_s
         ) * _TURBULENCE_INTENSITY * rng.standard_normal(3)
         rates = rates + dt_s * (
-            _DAMPING_PER_S @ rates + elevons @ _ELEVON_EFFECTIVENESS_RAD_S2 + turbulence_rad_s2
+            _DAMPING_PER_S @ rates + elevon_positions @ _ELEVON_EFFECTIVENESS_RAD_S2 + turbulence_rad_s2
         )
         attitude = attitude + dt_s * _euler_rates(rates, attitude)
 

@@ -41,8 +41,8 @@ class ReplayedVerdicts:
 
 def declared_errors(scenario: Any) -> dict[str, Any]:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
-    keys = scenario.model_dump(mode="json", exclude_unset=True)
-    return {key: keys[key] for key in _DECLARING_SCENARIO_KEYS if key in keys}
+    scenario_keys = scenario.model_dump(mode="json", exclude_unset=True)
+    return {key: scenario_keys[key] for key in _DECLARING_SCENARIO_KEYS if key in scenario_keys}
 
 
 def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
@@ -64,21 +64,21 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
     for k, sample in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
         verdicts.append(diagnosis.step(*sample))
         innovation[k], innovation_bound[k], expected_effect[k] = diagnosis.innovation()
-    loss_bounds = _bounds_of_explaining_losses(
+    theta_bounds = _bounds_of_explaining_losses(
         innovation[:, :, None], innovation_bound[:, :, None], expected_effect
     )
-    loss_bounds[0][0], loss_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
+    theta_bounds[0][0], theta_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
     memory_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
-    low, high = (
-        1.0 + _sliding_maximum(loss_bounds[0], memory_samples),
-        1.0 - _sliding_maximum(-loss_bounds[1], memory_samples),
+    effectiveness_low, effectiveness_high = (
+        1.0 + _sliding_maximum(theta_bounds[0], memory_samples),
+        1.0 - _sliding_maximum(-theta_bounds[1], memory_samples),
     )
-    is_unexplained = low > high
+    is_unexplained = effectiveness_low > effectiveness_high
     command_gain_upper_bounds = _command_gain_upper_bounds(innovation, expected_effect)
     return ReplayedVerdicts(
         verdicts,
-        np.where(is_unexplained, 0.0, low),
-        np.where(is_unexplained, 1.0, high),
+        np.where(is_unexplained, 0.0, effectiveness_low),
+        np.where(is_unexplained, 1.0, effectiveness_high),
         command_gain_upper_bounds,
     )
 
@@ -87,22 +87,25 @@ def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> F
     """The upper bounds (S,) of `ReplayedVerdicts`, from the innovation of the rates (n, 3) and the expected
     effect of each surface (n, 3, S)."""
     finite_rows = np.flatnonzero(np.isfinite(innovation).all(axis=1) & (np.arange(len(innovation)) > 0))
-    if (parts := split_into_flight_parts(finite_rows)) is None:
+    if (rows_by_part := split_into_flight_parts(finite_rows)) is None:
         return np.ones(expected_effect.shape[2])
     innovation_sd = np.maximum(innovation[finite_rows].std(axis=0), MIN_DIVISOR)
     regressors = np.concatenate(
         [np.broadcast_to(np.eye(3), (len(expected_effect), 3, 3)), expected_effect / innovation_sd[:, None]],
         axis=2,
     )
-    scaled_innovation, max_gains = innovation / innovation_sd, np.full(expected_effect.shape[2], -np.inf)
-    for part in parts:
-        theta, _ = coefficient_upper_bounds(
-            regressors[part].reshape(3 * len(part), -1),
-            scaled_innovation[part].ravel(),
+    scaled_innovation, gain_upper_bounds = (
+        innovation / innovation_sd,
+        np.full(expected_effect.shape[2], -np.inf),
+    )
+    for part_rows in rows_by_part:
+        coefficient_bounds, _ = coefficient_upper_bounds(
+            regressors[part_rows].reshape(3 * len(part_rows), -1),
+            scaled_innovation[part_rows].ravel(),
             _EFFECTIVE_SAMPLE_SHARE,
         )
-        max_gains = np.maximum(max_gains, 1.0 + theta[3:])
-    return max_gains
+        gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + coefficient_bounds[3:])
+    return gain_upper_bounds
 
 
 def _bounds_of_explaining_losses(
@@ -112,23 +115,31 @@ def _bounds_of_explaining_losses(
     where none does."""
     innovation_bound = innovation_bound + _BOUND_ROUNDING_RAD_S2
     has_effect = np.abs(expected_effect) > MIN_DIVISOR
-    slope = np.where(has_effect, expected_effect, 1.0)
+    nonzero_effect = np.where(has_effect, expected_effect, 1.0)
     interval_ends = np.sort(
-        np.stack([(innovation - innovation_bound) / slope, (innovation + innovation_bound) / slope]), axis=0
+        np.stack(
+            [
+                (innovation - innovation_bound) / nonzero_effect,
+                (innovation + innovation_bound) / nonzero_effect,
+            ]
+        ),
+        axis=0,
     )
     is_within_bound = np.abs(innovation) <= innovation_bound
-    least = np.where(has_effect, interval_ends[0], np.where(is_within_bound, -1.0, 1.0)).max(axis=1)
-    greatest = np.where(has_effect, interval_ends[1], np.where(is_within_bound, 0.0, -2.0)).min(axis=1)
-    return np.maximum(least - _LOSS_ROUNDING, -1.0), np.minimum(greatest + _LOSS_ROUNDING, 0.0)
+    min_theta = np.where(has_effect, interval_ends[0], np.where(is_within_bound, -1.0, 1.0)).max(axis=1)
+    max_theta = np.where(has_effect, interval_ends[1], np.where(is_within_bound, 0.0, -2.0)).min(axis=1)
+    return np.maximum(min_theta - _LOSS_ROUNDING, -1.0), np.minimum(max_theta + _LOSS_ROUNDING, 0.0)
 
 
 def _sliding_maximum(values: Floats, window_samples: int) -> Floats:
     """For each column the maximum over each sample and the `window_samples - 1` samples before it."""
     from scipy.ndimage import maximum_filter1d
 
-    padded = np.concatenate([np.full((window_samples - 1, values.shape[1]), -np.inf), values])
-    found = maximum_filter1d(padded, window_samples, axis=0, origin=(window_samples - 1) // 2)
-    return np.asarray(found[window_samples - 1 :])
+    padded_values = np.concatenate([np.full((window_samples - 1, values.shape[1]), -np.inf), values])
+    filtered_maximum = maximum_filter1d(
+        padded_values, window_samples, axis=0, origin=(window_samples - 1) // 2
+    )
+    return np.asarray(filtered_maximum[window_samples - 1 :])
 
 
 def rows_of_replay(
@@ -136,7 +147,7 @@ def rows_of_replay(
 ) -> DiagnosisRows:
     """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replayed.verdicts])
-    estimate, low, high = (
+    effectiveness, effectiveness_low, effectiveness_high = (
         np.ones_like(replayed.single_fault_effectiveness_low),
         np.zeros_like(replayed.single_fault_effectiveness_low),
         np.ones_like(replayed.single_fault_effectiveness_low),
@@ -148,22 +159,23 @@ def rows_of_replay(
                 verdict,
                 surfaces,
                 (replayed.single_fault_effectiveness_low[k], replayed.single_fault_effectiveness_high[k]),
-                low[k],
-                high[k],
+                effectiveness_low[k],
+                effectiveness_high[k],
             )
         if _gives_effectiveness(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
             surface_index = surfaces.index(verdict.isolated)
-            estimate[k, surface_index] = min(
-                max(1.0 + float(verdict.estimate), low[k, surface_index]), high[k, surface_index]
+            effectiveness[k, surface_index] = min(
+                max(1.0 + float(verdict.estimate), effectiveness_low[k, surface_index]),
+                effectiveness_high[k, surface_index],
             )
     names = [_isolated_name(verdict, surfaces) for verdict in replayed.verdicts]
     return DiagnosisRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
         isolated_surfaces=np.array(names, dtype=object),
-        effectiveness=estimate,
-        effectiveness_low=low,
-        effectiveness_high=high,
+        effectiveness=effectiveness,
+        effectiveness_low=effectiveness_low,
+        effectiveness_high=effectiveness_high,
         fault_probability=faulty.astype(float),
     )
 
@@ -172,24 +184,24 @@ def _fill_effectiveness_bounds(
     verdict: Verdict,
     surfaces: Sequence[str],
     single_fault_bounds: tuple[Floats, Floats],
-    low: Floats,
-    high: Floats,
+    effectiveness_low: Floats,
+    effectiveness_high: Floats,
 ) -> None:
-    """Fill the bounds low and high (S,) of one row, which are given as 0 and 1. single_fault_bounds: low and
-    high (S,) of `ReplayedVerdicts`."""
+    """Fill the bounds effectiveness_low and effectiveness_high (S,) of one row, which are given as 0 and 1.
+    single_fault_bounds: low and high (S,) of `ReplayedVerdicts`."""
     if not verdict.detected:
-        low[:] = single_fault_bounds[0]
+        effectiveness_low[:] = single_fault_bounds[0]
     elif verdict.isolated in surfaces:
-        low[:], surface_index = 1.0, surfaces.index(str(verdict.isolated))
-        low[surface_index], high[surface_index] = (
+        effectiveness_low[:], surface_index = 1.0, surfaces.index(str(verdict.isolated))
+        effectiveness_low[surface_index], effectiveness_high[surface_index] = (
             (single_fault_bounds[0][surface_index], single_fault_bounds[1][surface_index])
             if verdict.type == LOSS_FAULT_TYPE
             else (0.0, 1.0)
         )
     elif verdict.isolated is None and verdict.candidates and set(verdict.candidates) <= set(surfaces):
-        low[:] = 1.0
+        effectiveness_low[:] = 1.0
         for name in verdict.candidates:
-            low[surfaces.index(name)] = single_fault_bounds[0][surfaces.index(name)]
+            effectiveness_low[surfaces.index(name)] = single_fault_bounds[0][surfaces.index(name)]
 
 
 def _gives_effectiveness(verdict: Verdict) -> bool:

@@ -47,21 +47,26 @@ def read_parts(
 
 
 def _read_with_reader(
-    path: Path, reader: str | None, time: tuple[str, str] | None, table_options: dict[str, Any]
+    path: Path,
+    reader: str | None,
+    time_column_and_unit: tuple[str, str] | None,
+    table_options: dict[str, Any],
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
-    name = reader or detect_reader(path)
-    if name not in READERS:
-        raise BadInput(f"--reader {name}: is not known, allowed: {', '.join(READERS)}")
-    module = import_module(f"beaver_ftc_logs.readers.{name}")
-    if name == "table":
-        yield from module.read_parts(path, *(time or ()), **table_options)
+    reader_name = reader or detect_reader(path)
+    if reader_name not in READERS:
+        raise BadInput(f"--reader {reader_name}: is not known, allowed: {', '.join(READERS)}")
+    module = import_module(f"beaver_ftc_logs.readers.{reader_name}")
+    if reader_name == "table":
+        yield from module.read_parts(path, *(time_column_and_unit or ()), **table_options)
         return
-    if time is not None and time != _TIME_COLUMNS[name]:
-        column, unit = _TIME_COLUMNS[name]
-        raise BadInput(f"{path}: time: {' in '.join(time)} is not its time, allowed: {column} in {unit}")
-    wanted = table_options["columns"] if name in ("ulog", "ardupilot") else None
-    yield module.read(path, wanted) if wanted is not None else module.read(path)
+    if time_column_and_unit is not None and time_column_and_unit != _TIME_COLUMNS[reader_name]:
+        column, unit = _TIME_COLUMNS[reader_name]
+        raise BadInput(
+            f"{path}: time: {' in '.join(time_column_and_unit)} is not its time, allowed: {column} in {unit}"
+        )
+    wanted_columns = table_options["columns"] if reader_name in ("ulog", "ardupilot") else None
+    yield module.read(path, wanted_columns) if wanted_columns is not None else module.read(path)
 
 
 def check_exists(path: Path) -> None:
@@ -74,10 +79,10 @@ def detect_reader(path: Path) -> str:
     """The reader that a path asks for by its form. Raises BadInput where none does."""
     if path.is_dir():
         return "alfa"
-    name = _READER_OF_SUFFIX.get(path.suffix.lower())
-    if name is None:
+    reader_name = _READER_OF_SUFFIX.get(path.suffix.lower())
+    if reader_name is None:
         raise BadInput(
             f"{path}: what kind of log this is cannot be seen, allowed: "
             f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READERS)}"
         )
-    return name
+    return reader_name

@@ -29,9 +29,9 @@ _FAILURE_TOPIC_PREFIX = "failure_status-"
 TopicTable = dict[str, Floats]
 
 
-def _travel_share_of_pulse_width(values: Floats) -> Floats:
+def _travel_share_of_pulse_width(pulse_width_us: Floats) -> Floats:
     """Pulse width about its neutral, as a share of the half range of 400 us."""
-    return (values - 1500.0) / 400.0
+    return (pulse_width_us - 1500.0) / 400.0
 
 
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
@@ -45,8 +45,10 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 def _load_column_and_failure_topics() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
-    found: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
-    return found
+    topic_document: dict[str, dict[str, Any]] = json.loads(
+        Path(__file__).with_name("alfa.json").read_text("utf-8")
+    )
+    return topic_document
 
 
 def read(path: Path) -> RecordedFlight:
@@ -56,20 +58,22 @@ def read(path: Path) -> RecordedFlight:
     topics = dict(_read_topic_tables(path))
     if _GYRO_TOPIC not in topics:
         raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
-    ordered = {topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()}
-    origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][ordered[_GYRO_TOPIC][0][0]])
-    columns = dict(_read_columns(topics, ordered, origin_ns))
+    rows_and_note_by_topic = {
+        topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()
+    }
+    origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][rows_and_note_by_topic[_GYRO_TOPIC][0][0]])
+    columns = dict(_read_columns(topics, rows_and_note_by_topic, origin_ns))
     _add_commanded_less_measured_attitude(columns)
     _add_airspeed_from_wind(columns)
-    events = sorted(_failure_events(topics, origin_ns), key=lambda event: event.t_s)
-    return RecordedFlight(path.name, columns, tuple(events))
+    failures = sorted(_failure_events(topics, origin_ns), key=lambda failure: failure.t_s)
+    return RecordedFlight(path.name, columns, tuple(failures))
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    wanted = {topic for topic, _, _ in _load_column_and_failure_topics()["columns"].values()}
+    wanted_topics = {topic for topic, _, _ in _load_column_and_failure_topics()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
-        if topic in wanted or topic.startswith(_FAILURE_TOPIC_PREFIX):
+        if topic in wanted_topics or topic.startswith(_FAILURE_TOPIC_PREFIX):
             table = read_numbers(file)
             if np.isfinite(table.get(_TIME_FIELD, np.empty(0))).any():
                 yield topic, table
@@ -97,7 +101,7 @@ def _add_commanded_less_measured_attitude(columns: dict[str, Column]) -> None:
 
 def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
     """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own."""
-    names = [f"{what}_{to}_m_s" for to in ("north", "east") for what in ("ground", "wind")]
+    names = [f"{vector}_{direction}_m_s" for direction in ("north", "east") for vector in ("ground", "wind")]
     if any(name not in columns or not len(columns[name].t_s) for name in names):
         return
     stamps = columns[names[0]].t_s
@@ -113,12 +117,15 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
 def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
     for topic, table in topics.items():
         if topic.startswith(_FAILURE_TOPIC_PREFIX):
-            part = topic.removeprefix(_FAILURE_TOPIC_PREFIX)
+            failed_part = topic.removeprefix(_FAILURE_TOPIC_PREFIX)
             stamps = table[_TIME_FIELD]
             codes = np.where(np.isfinite(stamps), table.get("field.data", np.nan), np.nan)
             for code in sorted(set(codes[np.isfinite(codes)])):
-                first = int(np.argmax(codes == code))
-                t_s = float((stamps[first] - origin_ns) * _S_PER_NS)
+                first_row = int(np.argmax(codes == code))
+                t_s = float((stamps[first_row] - origin_ns) * _S_PER_NS)
                 yield LoggedFailure(
-                    t_s, _load_column_and_failure_topics()["failures"].get(f"{part} {int(code)}", part)
+                    t_s,
+                    _load_column_and_failure_topics()["failures"].get(
+                        f"{failed_part} {int(code)}", failed_part
+                    ),
                 )

@@ -43,29 +43,33 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
     ):
         from pymavlink import DFReader
 
-        text = path.suffix.lower() == ".log"
-        log = (DFReader.DFReader_text if text else DFReader.DFReader_binary)(str(path))
-        while (message := log.recv_msg()) is not None:
+        is_text_log = path.suffix.lower() == ".log"
+        log_reader = (DFReader.DFReader_text if is_text_log else DFReader.DFReader_binary)(str(path))
+        while (message := log_reader.recv_msg()) is not None:
             fields = message.to_dict()
-            numbers = {k: float(value) for k, value in fields.items() if isinstance(value, int | float)}
-            if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numbers:
+            numeric_fields = {
+                field_name: float(value)
+                for field_name, value in fields.items()
+                if isinstance(value, int | float)
+            }
+            if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numeric_fields:
                 name = _message_name(message.get_type(), fields)
                 for field, values in values_of_message.setdefault(
-                    name, _empty_arrays_of_wanted_fields(name, numbers, wanted_columns)
+                    name, _empty_arrays_of_wanted_fields(name, numeric_fields, wanted_columns)
                 ).items():
-                    values.append(numbers.get(field, nan))
+                    values.append(numeric_fields.get(field, nan))
     return values_of_message
 
 
 def _empty_arrays_of_wanted_fields(
-    name: str, numbers: ValuesByField, wanted_columns: Collection[str] | None
+    name: str, numeric_fields: ValuesByField, wanted_columns: Collection[str] | None
 ) -> ValuesByField:
-    kept = [
+    kept_fields = [
         field
-        for field in numbers
+        for field in numeric_fields
         if wanted_columns is None or field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
     ]
-    return {field: array("d") for field in kept}
+    return {field: array("d") for field in kept_fields}
 
 
 @contextmanager

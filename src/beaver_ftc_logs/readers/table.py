@@ -53,21 +53,26 @@ def read_parts(
 ) -> Iterator[RecordedFlight]:
     """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
     numbered, each of which begins with the end of the one before: memory does not grow with the file."""
-    name = time or TIME_COLUMN
-    names, parts = _table_parts(path, None if columns is None else {name, *columns}, rows_per_part)
-    if name not in names:
-        says = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
-        raise BadInput(f"{path}: no column {name}, allowed: {says}; it has {nearest_names(name, names)}")
+    time_column = time or TIME_COLUMN
+    all_columns, parts = _table_parts(
+        path, None if columns is None else {time_column, *columns}, rows_per_part
+    )
+    if time_column not in all_columns:
+        reason = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
+        raise BadInput(
+            f"{path}: no column {time_column}, allowed: {reason}; it has "
+            f"{nearest_names(time_column, all_columns)}"
+        )
     for part_number, (cells, remarks, has_more) in enumerate(parts, 1):
-        table = _with_unread_columns_as_nan(names, cells)
+        table = _with_unread_columns_as_nan(all_columns, cells)
         notes: dict[str, str] = {}
-        for column, line in remarks:
-            notes[column] = f"{notes[column]}\n{line}" if column in notes else line
-        t_s = table.pop(name) * SECONDS_PER_TIME_UNIT[unit]
-        kept_rows, lost_lines = _rows_with_time(path, name, t_s)
+        for column, remark in remarks:
+            notes[column] = f"{notes[column]}\n{remark}" if column in notes else remark
+        t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[unit]
+        kept_rows, lost_lines = _rows_with_time(path, time_column, t_s)
         row_selection = slice(None) if kept_rows is None else kept_rows
         t_s = t_s[row_selection]
-        check_time(path, t_s, name, cells.n_rows_before)
+        check_time(path, t_s, time_column, cells.n_rows_before)
         flight_columns = {
             key: Column(t_s, values[row_selection], notes.get(key, "")) for key, values in table.items()
         }
@@ -78,22 +83,25 @@ def read_parts(
         )
 
 
-def _with_unread_columns_as_nan(names: Sequence[str], cells: TableCells) -> NumberTable:
+def _with_unread_columns_as_nan(all_columns: Sequence[str], cells: TableCells) -> NumberTable:
     """All columns, those that were not read nan."""
-    nothing = np.broadcast_to(np.nan, cells.n_rows)
-    return {name: cells.numbers.get(name, nothing) for name in names}
+    nan_values = np.broadcast_to(np.nan, cells.n_rows)
+    return {name: cells.numbers.get(name, nan_values) for name in all_columns}
 
 
 def _rows_with_time(path: Path, time_column: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
-    n_lost = int(np.isnan(t_s).sum())
-    if not n_lost:
+    n_without_time = int(np.isnan(t_s).sum())
+    if not n_without_time:
         return None, []
-    if n_lost > len(t_s) // 2:
+    if n_without_time > len(t_s) // 2:
         raise BadInput(
-            f"{path}: {time_column}: {n_lost} of {len(t_s)} rows hold no number, allowed: increasing time"
+            f"{path}: {time_column}: {n_without_time} of {len(t_s)} rows hold no number, "
+            "allowed: increasing time"
         )
-    return np.isfinite(t_s), [f"{time_column}: rows without a number, left out: {n_lost} of {len(t_s)}"]
+    return np.isfinite(t_s), [
+        f"{time_column}: rows without a number, left out: {n_without_time} of {len(t_s)}"
+    ]
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
@@ -118,8 +126,8 @@ def _text_table_layout(path: Path) -> TableLayout:
     try:
         return find_layout(path)
     except OSError as error:
-        says = (error.strerror or str(error)).lower()
-        raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
+        reason = (error.strerror or str(error)).lower()
+        raise BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet") from None
 
 
 @contextmanager
@@ -130,8 +138,8 @@ def _refuse_unreadable(path: Path) -> Iterator[None]:
     try:
         yield
     except (pa.ArrowException, OSError, ValueError) as error:
-        says = " ".join(str(error).split())[:200]
-        raise BadInput(f"{path}: is no table that can be read ({says}), allowed: CSV or Parquet") from None
+        reason = " ".join(str(error).split())[:200]
+        raise BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet") from None
 
 
 def check_time(path: Path, t_s: Floats, time_column: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
@@ -178,21 +186,21 @@ def _join_blocks_into_parts(
             if rows_per_part is None and n_held_rows > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
             while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:
-                joined = join_blocks(held_blocks)
-                first_rows, rest = (
-                    joined.select_rows(0, rows_per_part),
-                    joined.select_rows(rows_per_part - round(_OVERLAP_SHARE * rows_per_part)),
+                joined_cells = join_blocks(held_blocks)
+                part_cells, remaining_cells = (
+                    joined_cells.select_rows(0, rows_per_part),
+                    joined_cells.select_rows(rows_per_part - round(_OVERLAP_SHARE * rows_per_part)),
                 )
-                first_rows.text_cell_summaries, first_rows.broken_lines = (
-                    joined.text_cell_summaries,
-                    joined.broken_lines,
+                part_cells.text_cell_summaries, part_cells.broken_lines = (
+                    joined_cells.text_cell_summaries,
+                    joined_cells.broken_lines,
                 )
-                held_blocks, n_held_rows = [rest], rest.n_rows
-                yield first_rows, list(text_cell_remarks(layout, first_rows)) if layout else [], True
-        joined = join_blocks(held_blocks)
+                held_blocks, n_held_rows = [remaining_cells], remaining_cells.n_rows
+                yield part_cells, list(text_cell_remarks(layout, part_cells)) if layout else [], True
+        joined_cells = join_blocks(held_blocks)
         if layout:
-            check_broken_lines(path, layout, joined)
-        yield joined, list(text_cell_remarks(layout, joined)) if layout else [], False
+            check_broken_lines(path, layout, joined_cells)
+        yield joined_cells, list(text_cell_remarks(layout, joined_cells)) if layout else [], False
 
 
 def _parquet_and_number_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
@@ -202,11 +210,11 @@ def _parquet_and_number_columns(path: Path, columns: Collection[str] | None) -> 
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        numbers = [field.name for field in schema if _is_number_type(field.type)]
+        number_columns = [field.name for field in schema if _is_number_type(field.type)]
         _check_parquet_size(
-            path, file.metadata, [name for name in numbers if columns is None or name in columns]
+            path, file.metadata, [name for name in number_columns if columns is None or name in columns]
         )
-    return list(schema.names), numbers
+    return list(schema.names), number_columns
 
 
 def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCells]:
@@ -224,19 +232,21 @@ def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCel
 
 
 def _check_names_unique(path: Path, names: Sequence[str]) -> None:
-    twice = next((name for name, count in Counter(names).items() if count > 1), None)
-    if twice is not None:
-        raise BadInput(f"{path}: has two columns {twice}, allowed: one of a name")
+    duplicate_name = next((name for name, n_of_name in Counter(names).items() if n_of_name > 1), None)
+    if duplicate_name is not None:
+        raise BadInput(f"{path}: has two columns {duplicate_name}, allowed: one of a name")
 
 
 def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
     """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
     if metadata.num_rows > _MAX_ROWS:
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
-    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
+    row_groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
+    column_chunks = [row_group.column(i) for row_group in row_groups for i in range(row_group.num_columns)]
     stored_bytes = sum(
-        chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in set(names)
+        column_chunk.total_uncompressed_size
+        for column_chunk in column_chunks
+        if column_chunk.path_in_schema in set(names)
     )
     n_bytes = max(stored_bytes, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
     if n_bytes > _MAX_NUMBER_BYTES:
@@ -245,10 +255,10 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
         )
 
 
-def _is_number_type(kind: Any) -> bool:
+def _is_number_type(arrow_type: Any) -> bool:
     import pyarrow as pa
 
-    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
+    return bool(pa.types.is_integer(arrow_type) or pa.types.is_floating(arrow_type))
 
 
 def _column_as_numbers(column: Any) -> Floats:

@@ -4,7 +4,7 @@ Read in blocks, the columns wanted alone. A cell that holds no number costs itse
 many cells costs itself; both are counted.
 """
 
-import csv as lines_of
+import csv as csv_lines
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -46,24 +46,24 @@ class TableCells:
     text_cell_summaries: dict[str, tuple[int, int, str]] = field(default_factory=dict)
     broken_lines: list[str] = field(default_factory=list)
 
-    def select_rows(self, first: int, end: int | None = None) -> "TableCells":
-        """The rows from the first to the end, of which nothing else is said."""
-        numbers = {name: values[first:end].copy() for name, values in self.numbers.items()}
-        return TableCells(numbers, len(range(self.n_rows)[first:end]), self.n_rows_before + first)
+    def select_rows(self, first_row: int, end_row: int | None = None) -> "TableCells":
+        """The rows from first_row to before end_row, of which nothing else is said."""
+        numbers = {name: values[first_row:end_row].copy() for name, values in self.numbers.items()}
+        return TableCells(numbers, len(range(self.n_rows)[first_row:end_row]), self.n_rows_before + first_row)
 
 
 def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     """Blocks that follow one another as one; they are used up."""
-    first = blocks[0]
-    names = list(first.numbers)
-    numbers = {name: np.concatenate([one.numbers.pop(name) for one in blocks]) for name in names}
-    joined = TableCells(numbers, sum(one.n_rows for one in blocks), first.n_rows_before)
+    first_block = blocks[0]
+    column_names = list(first_block.numbers)
+    numbers = {name: np.concatenate([one.numbers.pop(name) for one in blocks]) for name in column_names}
+    joined_cells = TableCells(numbers, sum(one.n_rows for one in blocks), first_block.n_rows_before)
     for one in blocks:
-        joined.broken_lines += one.broken_lines
+        joined_cells.broken_lines += one.broken_lines
         for name, (n_cells, row, cell) in one.text_cell_summaries.items():
-            earlier = joined.text_cell_summaries.get(name, (0, row, cell))
-            joined.text_cell_summaries[name] = (earlier[0] + n_cells, *earlier[1:])
-    return joined
+            earlier = joined_cells.text_cell_summaries.get(name, (0, row, cell))
+            joined_cells.text_cell_summaries[name] = (earlier[0] + n_cells, *earlier[1:])
+    return joined_cells
 
 
 def find_layout(path: Path) -> TableLayout:
@@ -95,11 +95,11 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
         has_as_many_cells = [len(row) == len(names) for row in rows_below]
         if len(names) < 2 or any(_is_number_cell(name) for name in names) or not any(has_as_many_cells):
             continue
-        numbers = [
+        number_cells = [
             cell for row in rows_below if len(row) == len(names) for cell in row if _is_number_cell(cell)
         ]
-        if numbers:
-            has_decimal_comma = delimiter != "," and any("," in cell for cell in numbers)
+        if number_cells:
+            has_decimal_comma = delimiter != "," and any("," in cell for cell in number_cells)
             column_names = tuple(name.strip() for name in (names[0].lstrip("# "), *names[1:]))
             return TableLayout(line_index, column_names, delimiter, "," if has_decimal_comma else ".")
     return None
@@ -107,8 +107,8 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
 
 def _split_cells(line: str, delimiter: str) -> list[str]:
     try:
-        return next(lines_of.reader([line], delimiter=delimiter), [])
-    except lines_of.Error:  # a cell longer than any
+        return next(csv_lines.reader([line], delimiter=delimiter), [])
+    except csv_lines.Error:  # a cell longer than any
         return []
 
 
@@ -118,15 +118,15 @@ def _is_number_cell(cell: str) -> bool:
 
 def _describe_unreadable(lines: Sequence[str]) -> str:
     """Describe the content of a file that has no names and numbers."""
-    first = next((line for line in lines if line.strip()), None)
-    if first is None:
+    first_line = next((line for line in lines if line.strip()), None)
+    if first_line is None:
         return "it is empty"
-    if not all(character.isprintable() or character == "\t" for character in first[:80]):
+    if not all(character.isprintable() or character == "\t" for character in first_line[:80]):
         return "it holds bytes that are no text"
-    cells = max((_split_cells(first, delimiter) for delimiter in _DELIMITER_TITLES), key=len)
+    cells = max((_split_cells(first_line, delimiter) for delimiter in _DELIMITER_TITLES), key=len)
     if all(map(_is_number_cell, cells)):
-        return f"its first line holds numbers and no names: {first[:60]!r}"
-    return f"no line of names with a line of as many numbers below it; it begins {first[:60]!r}"
+        return f"its first line holds numbers and no names: {first_line[:60]!r}"
+    return f"no line of names with a line of as many numbers below it; it begins {first_line[:60]!r}"
 
 
 def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -> Iterator[TableCells]:
@@ -163,9 +163,9 @@ def check_broken_lines(path: Path, layout: TableLayout, cells: TableCells) -> No
     """Raise BadInput where too many lines have another number of cells than the header."""
     n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
     if n_broken > _MAX_BROKEN_LINE_SHARE * n_lines:
-        text = f"{n_broken} of {n_lines} lines have another number of cells than the header"
+        reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
         raise _unreadable_error(
-            path, f"{text}, {len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
+            path, f"{reason}, {len(layout.column_names)}: the first {cells.broken_lines[0]!r}"
         )
 
 
@@ -189,7 +189,7 @@ def _all_text_conversion(names: Sequence[str], wanted_columns: Sequence[str]) ->
     )
 
 
-def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, recorded_in: TableCells) -> Floats:
+def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, table_cells: TableCells) -> Floats:
     """A block's column as numbers; text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
@@ -201,34 +201,34 @@ def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, recorded
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
         is_number = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
-        _record_text_cells(column_name, cells, is_number, recorded_in)
+        _record_text_cells(column_name, cells, is_number, table_cells)
         numbers = compute.cast(compute.if_else(is_number, cells, None), pa.float64())
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _record_text_cells(column_name: str, cells: Any, is_number: Any, recorded_in: TableCells) -> None:
-    places = np.flatnonzero(~is_number.to_numpy(zero_copy_only=False))
-    text_places = [place for place in places.tolist() if cells[place].as_py()]
-    if text_places:
-        recorded_in.text_cell_summaries[column_name] = (
-            len(text_places),
-            recorded_in.n_rows_before + text_places[0] + 1,
-            str(cells[text_places[0]]),
+def _record_text_cells(column_name: str, cells: Any, is_number: Any, table_cells: TableCells) -> None:
+    rows_without_number = np.flatnonzero(~is_number.to_numpy(zero_copy_only=False))
+    text_rows = [row for row in rows_without_number.tolist() if cells[row].as_py()]
+    if text_rows:
+        table_cells.text_cell_summaries[column_name] = (
+            len(text_rows),
+            table_cells.n_rows_before + text_rows[0] + 1,
+            str(cells[text_rows[0]]),
         )
 
 
 def text_cell_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
-    for name, (n_cells, row, first) in table_cells.text_cell_summaries.items():
+    for name, (n_cells, row, first_cell) in table_cells.text_cell_summaries.items():
         if np.isfinite(table_cells.numbers[name]).any():
-            cells = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
-            yield name, f"{name}: {cells} no number, the first in row {row}: {first[:30]!r}"
+            cells_text = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
+            yield name, f"{name}: {cells_text} no number, the first in row {row}: {first_cell[:30]!r}"
     if layout.header_line:
         yield "", f"names are in line {layout.header_line + 1}, what is above is left out"
     if layout.delimiter != ",":
-        comma = ", with a decimal comma" if layout.decimal_mark == "," else ""
-        yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{comma}"
+        comma_text = ", with a decimal comma" if layout.decimal_mark == "," else ""
+        yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{comma_text}"
     if table_cells.broken_lines:
         yield "", f"lines with too few or too many cells, left out: {len(table_cells.broken_lines)}"

@@ -41,7 +41,9 @@ def _topic_name(topic: Any) -> str:
 
 def _select_wanted_fields(name: str, data: dict[str, Any], wanted_columns: Collection[str]) -> dict[str, Any]:
     return {
-        field: of for field, of in data.items() if field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
+        field: values
+        for field, values in data.items()
+        if field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
     }
 
 
@@ -56,9 +58,9 @@ def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any
                 _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES
             ):  # pyulog writes every field of one out
                 raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
-        names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted_columns or ()}
-        names = (names | {one.partition(".")[0] for one in wanted_columns or ()}) & set(formats)
-        topics = list(ULog(str(path), sorted(names) if names else None).data_list)
+        topic_names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted_columns or ()}
+        topic_names = (topic_names | {one.partition(".")[0] for one in wanted_columns or ()}) & set(formats)
+        topics = list(ULog(str(path), sorted(topic_names) if topic_names else None).data_list)
     return topics
 
 
@@ -69,6 +71,6 @@ def _min_message_bytes(formats: dict[str, Any], name: str, enclosing_messages: t
     if name not in formats:  # a number, or a type that pyulog complains about
         return 1
     return sum(
-        max(count, 1) * _min_message_bytes(formats, kind, (*enclosing_messages, name))
-        for kind, count, _ in formats[name].fields
+        max(n_elements, 1) * _min_message_bytes(formats, field_type, (*enclosing_messages, name))
+        for field_type, n_elements, _ in formats[name].fields
     )

@@ -70,13 +70,15 @@ def load_data_sets(folder: Path) -> list[FlightDataSet]:
     """The data sets below a folder. Raises BadInput where there is none, or a flight cannot be used."""
     if not folder.is_dir():
         raise BadInput(f"compare: --flights {folder}: no such folder, allowed: a folder of recorded flights")
-    found = [entry for path in (folder, *sorted(folder.iterdir())) if (entry := _load_data_set(path))]
-    if not found:
+    data_sets = [
+        data_set for path in (folder, *sorted(folder.iterdir())) if (data_set := _load_data_set(path))
+    ]
+    if not data_sets:
         raise BadInput(
             f"compare: --flights {folder}: holds no data set, allowed: folders with tables and a "
             f"{VEHICLE_FILE}, or with processed folders of the ALFA data set"
         )
-    return found
+    return data_sets
 
 
 def _load_data_set(path: Path) -> FlightDataSet | None:
@@ -85,10 +87,14 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
     if (path / VEHICLE_FILE).is_file():
         tables = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
         return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), tables) if tables else None
-    alfa = sorted(
-        flight for flight in path.iterdir() if flight.is_dir() and any(flight.glob(_ALFA_GYRO_FILE_PATTERN))
+    alfa_flight_folders = sorted(
+        flight_folder
+        for flight_folder in path.iterdir()
+        if flight_folder.is_dir() and any(flight_folder.glob(_ALFA_GYRO_FILE_PATTERN))
     )
-    return _read_data_set(path.name, load_vehicle("alfa"), alfa) if alfa else None
+    return (
+        _read_data_set(path.name, load_vehicle("alfa"), alfa_flight_folders) if alfa_flight_folders else None
+    )
 
 
 def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
@@ -114,27 +120,29 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
     usable_flights, is_single_flight = flights_with_usable_rows(data_set.flights), len(data_set.flights) == 1
     # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
     # fitted to the whole flight.
-    shared = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
-    flights: list[Document] = []
-    for fitted, held_out, name in validation_folds(usable_flights):
-        model = add_fitted_ranges_and_alarm_threshold(fitted, fit_model(fitted, data_set.vehicle, shared))
+    shared_settings = settings_of_whole_flight(usable_flights, data_set) if is_single_flight else None
+    flight_entries: list[Document] = []
+    for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
+        model = add_fitted_ranges_and_alarm_threshold(
+            fitted_flights, fit_model(fitted_flights, data_set.vehicle, shared_settings)
+        )
         recording = next(one for one in data_set.recordings if one.name == held_out.samples.name)
-        flights += [
-            {"left_out": name, "method": method, **_score_against_log(held_out, rows, model)}
+        flight_entries += [
+            {"left_out": held_out_name, "method": method, **_score_against_log(held_out, rows, model)}
             for method, rows in _diagnosis_rows_of_methods(recording, held_out, model)
         ]
-    labelled = "classes" in flights[0]
-    summarise = summarize_labels if labelled else summarize_failures
-    methods = dict.fromkeys(one["method"] for one in flights)
-    rows_of = {m: [one for one in flights if one["method"] == m] for m in methods}
+    has_labels = "classes" in flight_entries[0]
+    summarize = summarize_labels if has_labels else summarize_failures
+    methods = dict.fromkeys(one["method"] for one in flight_entries)
+    entries_of_method = {name: [one for one in flight_entries if one["method"] == name] for name in methods}
     return {
         "set": data_set.name,
         "vehicle": data_set.vehicle.name,
-        "scored_by": "labels" if labelled else "events",
+        "scored_by": "labels" if has_labels else "events",
         "left_out": "halves of the one flight in turn" if is_single_flight else "each flight in turn",
-        "rows": [{"method": method, **summarise(scores)} for method, scores in rows_of.items()],
+        "rows": [{"method": method, **summarize(scores)} for method, scores in entries_of_method.items()],
         "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data_set.name, []),
-        "flights": flights,
+        "flights": flight_entries,
     }
 
 
@@ -147,9 +155,9 @@ def _diagnosis_rows_of_methods(
             METHOD_TITLES.get(name, f"{name}, of the loop"),
             diagnose_with_detector(name, held_out.samples, model),
         )
-    frozen = diagnose_by_freeze_rule(recording, held_out.samples, model)
-    if frozen is not None:
-        yield FREEZE_RULE_TITLE, frozen
+    freeze_rule_rows = diagnose_by_freeze_rule(recording, held_out.samples, model)
+    if freeze_rule_rows is not None:
+        yield FREEZE_RULE_TITLE, freeze_rule_rows
 
 
 def settings_of_whole_flight(
@@ -186,24 +194,28 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
     failed_flights = [one for one in scores if one["failure"]]
     engine_failures = [one for one in failed_flights if ENGINE in one["failure"]]
     surface_failures = [one for one in failed_flights if ENGINE not in one["failure"]]
-    found_failures = [one for one in surface_failures if one["detected"]]
+    detected_failures = [one for one in surface_failures if one["detected"]]
     false_alarm_flights = [one for one in scores if one["false_alarms"]]
     healthy_flights = [one for one in scores if one["failure"] is None]
     quiet_flights = [one for one in healthy_flights if not one["false_alarms"]]
     hours = sum(one["healthy_s"] for one in scores) / 3600.0
-    alarms = poisson(sum(one["false_alarms"] for one in scores), hours)
-    n_right = len(found_failures) + len(quiet_flights)
+    false_alarm_rate = poisson(sum(one["false_alarms"] for one in scores), hours)
+    n_right = len(detected_failures) + len(quiet_flights)
     return {
         "surface_failures": len(surface_failures),
-        "found": len(found_failures),
-        "precision": len(found_failures) / max(len(found_failures) + len(false_alarm_flights), 1),
-        "recall": len(found_failures) / max(len(surface_failures), 1),
+        "found": len(detected_failures),
+        "precision": len(detected_failures) / max(len(detected_failures) + len(false_alarm_flights), 1),
+        "recall": len(detected_failures) / max(len(surface_failures), 1),
         "accuracy": n_right / max(len(surface_failures) + len(healthy_flights), 1),
         "healthy_flights": len(healthy_flights),
         "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_flights),
-        "false_alarms_per_hour": {"value": alarms.value, "low": alarms.low, "high": alarms.high},
+        "false_alarms_per_hour": {
+            "value": false_alarm_rate.value,
+            "low": false_alarm_rate.low,
+            "high": false_alarm_rate.high,
+        },
         "healthy_hours": hours,
-        "wrong_group": sum(one["right_group"] is False for one in found_failures),
+        "wrong_group": sum(one["right_group"] is False for one in detected_failures),
         "delay_s": {kind: _summarize_delays(surface_failures, kind) for kind in SURFACE_KINDS},
         "engine_failures_with_an_alarm": sum(one["detected"] for one in engine_failures),
     }
@@ -240,28 +252,35 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set."""
     if "other_days" in document:
         return _tables_of_other_days(document["other_days"])
-    found = []
-    for part in document["sets"]:
-        header, row_of = (
+    titled_tables = []
+    for data_set in document["sets"]:
+        header, cells_of_row = (
             (LABEL_TABLE_HEADER, _label_score_cells)
-            if part["scored_by"] == "labels"
+            if data_set["scored_by"] == "labels"
             else (FAILURE_TABLE_HEADER, _failure_score_cells)
         )
-        rows = [row_of(row) for row in (*part["rows"], *part["published"])]
-        found.append((f"{part['set']}: left out, {part['left_out']}", (header, rows)))
-    return found
+        rows = [cells_of_row(row) for row in (*data_set["rows"], *data_set["published"])]
+        titled_tables.append((f"{data_set['set']}: left out, {data_set['left_out']}", (header, rows)))
+    return titled_tables
 
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
     header = ["day", *SCORE_TITLES.values(), "classes by sliding least squares"]
-    found = []
-    for part in document["sets"]:
-        cells = [[row["day"], *_score_texts(row)] for row in part["rows"] if row["kind"] == "one change"]
-        for one in part["summary"]:
-            cells += [[f"{one['kind']}: {what}", *_score_texts(one[what])] for what in ("mean", "worst")]
-        found.append((f"{part['set']}: other days made of it, halves left out in turn", (header, cells)))
-    return found
+    titled_tables = []
+    for data_set in document["sets"]:
+        table_rows = [
+            [row["day"], *_score_texts(row)] for row in data_set["rows"] if row["kind"] == "one change"
+        ]
+        for kind_summary in data_set["summary"]:
+            table_rows += [
+                [f"{kind_summary['kind']}: {statistic}", *_score_texts(kind_summary[statistic])]
+                for statistic in ("mean", "worst")
+            ]
+        titled_tables.append(
+            (f"{data_set['set']}: other days made of it, halves left out in turn", (header, table_rows))
+        )
+    return titled_tables
 
 
 def _score_texts(row: Document) -> list[str]:
@@ -282,16 +301,18 @@ def _label_score_cells(row: Document) -> list[str]:
 
 def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
-    delays = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
-    cells = [row["method"], *_share_texts(row, FAILURE_TABLE_HEADER[1:4]), *map(_delay_text, delays)]
+    delay_summaries = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
+    cells = [row["method"], *_share_texts(row, FAILURE_TABLE_HEADER[1:4]), *map(_delay_text, delay_summaries)]
     if "false_alarms_per_hour" not in row:
         return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
-    n_soon, n_failures = (sum(delay[key] for delay in delays[:2]) for key in ("within_5_s", "failures"))
-    alarms = row["false_alarms_per_hour"]
+    n_within_5_s, n_failures = (
+        sum(delay[key] for delay in delay_summaries[:2]) for key in ("within_5_s", "failures")
+    )
+    false_alarm_rate = row["false_alarms_per_hour"]
     return [
         *cells,
-        f"{n_soon} of {n_failures}",
-        f"{alarms['value']:.1f} ({alarms['low']:.1f} to {alarms['high']:.1f})",
+        f"{n_within_5_s} of {n_failures}",
+        f"{false_alarm_rate['value']:.1f} ({false_alarm_rate['low']:.1f} to {false_alarm_rate['high']:.1f})",
         f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
         str(row["wrong_group"]),
     ]
@@ -304,8 +325,10 @@ def _share_texts(row: Document, keys: Iterable[str]) -> list[str]:
 def _delay_text(delay_summary: Document) -> str:
     if delay_summary.get("mean") is None:
         return "not found" if delay_summary.get("failures") else ""
-    count = f" ({delay_summary['found']} of {delay_summary['failures']})" if "found" in delay_summary else ""
-    return f"{delay_summary['mean']:.1f}{count}"
+    count_text = (
+        f" ({delay_summary['found']} of {delay_summary['failures']})" if "found" in delay_summary else ""
+    )
+    return f"{delay_summary['mean']:.1f}{count_text}"
 
 
 def as_text(document: Document) -> str:
@@ -315,8 +338,10 @@ def as_text(document: Document) -> str:
 
 def as_markdown(document: Document) -> str:
     """The tables for a Markdown page."""
-    found = score_tables(document)
-    return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in found)
+    titled_tables = score_tables(document)
+    return "\n".join(
+        f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in titled_tables
+    )
 
 
 def table_markers(document: Document) -> tuple[str, str]:
@@ -332,14 +357,16 @@ def update_page(document: Document, page: Path) -> None:
 
 def draw_comparison_figure(document: Document) -> Any:
     """How late each method found each failure, and how near it came to the labels: a panel a data set."""
-    sets = document["sets"]
-    figure, grid = panels(len(sets), 1, 8.6, sum(0.27 * len(_method_titles(part)) + 1.3 for part in sets))
-    for axis, part in zip(grid[:, 0], sets, strict=True):
-        draw = _draw_label_shares if part["scored_by"] == "labels" else _draw_failure_delays
-        draw(axis, part)
-        axis.set_title(f"{part['set']}: left out, {part['left_out']}", fontsize=10, loc="left")
-        axis.set_yticks(range(len(_method_titles(part))), _method_titles(part))
-        axis.set_ylim(len(_method_titles(part)) - 0.5, -0.5)
+    data_sets = document["sets"]
+    figure, axes_grid = panels(
+        len(data_sets), 1, 8.6, sum(0.27 * len(_method_titles(data_set)) + 1.3 for data_set in data_sets)
+    )
+    for axis, data_set in zip(axes_grid[:, 0], data_sets, strict=True):
+        draw_panel = _draw_label_shares if data_set["scored_by"] == "labels" else _draw_failure_delays
+        draw_panel(axis, data_set)
+        axis.set_title(f"{data_set['set']}: left out, {data_set['left_out']}", fontsize=10, loc="left")
+        axis.set_yticks(range(len(_method_titles(data_set))), _method_titles(data_set))
+        axis.set_ylim(len(_method_titles(data_set)) - 0.5, -0.5)
         axis.tick_params(labelsize=8)
         axis.grid(color=GRID, linewidth=0.5)
         axis.set_axisbelow(True)
@@ -365,13 +392,13 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
         delays_s = [
             _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in shown_flights
         ]
-        heights = [
+        mark_heights = [
             methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(surfaces) - 0.5) for one in shown_flights
         ]
         label = surface.replace("_", " ").replace("+", " + ")
         axis.plot(
             [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
-            heights,
+            mark_heights,
             marker(i),
             color=SERIES[i],
             label=label,
@@ -383,11 +410,21 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
 
 def _draw_label_shares(axis: Any, data_set: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
-    keys = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
+    label_of_figure = {
+        "classes": "class",
+        "healthy_or_faulty": "healthy or faulty",
+        "side": "side of the aircraft",
+    }
     rows = [*data_set["rows"], *data_set["published"]]
-    for i, (key, label) in enumerate(keys.items()):
-        known = [place for place, row in enumerate(rows) if row.get(key) is not None]
-        heights = [place + 0.22 * (i - 1) for place in known]
-        axis.plot([rows[place][key] for place in known], heights, marker(i), color=SERIES[i], label=label)
+    for i, (key, label) in enumerate(label_of_figure.items()):
+        rows_with_figure = [row_index for row_index, row in enumerate(rows) if row.get(key) is not None]
+        mark_heights = [row_index + 0.22 * (i - 1) for row_index in rows_with_figure]
+        axis.plot(
+            [rows[row_index][key] for row_index in rows_with_figure],
+            mark_heights,
+            marker(i),
+            color=SERIES[i],
+            label=label,
+        )
     axis.set_xlim(0, 1)
     axis.set_xlabel("share of the rows that are right", fontsize=9)

@@ -92,9 +92,9 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
-    for i, surface in enumerate(np.eye(len(mixer))):
+    for i, unit_row in enumerate(np.eye(len(mixer))):
         for gain in (0.94, 1.06):
-            surface_gains = np.where(surface, gain, 1.0)
+            surface_gains = np.where(unit_row, gain, 1.0)
             days.append(
                 replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=surface_gains)
             )
@@ -133,12 +133,14 @@ def apply_day_changes(
     commands = trim_commands + day.motion_scale * (commands - trim_commands) / (
         day.common_gain * day.surface_gains
     )
-    trim_wander = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
-    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + trim_wander) / effectiveness
+    trim_drift = day.trim_drift_sd_commands * _coloured_noise(rng, commands.shape, 300.0 / samples.dt_s)
+    commands = commands + day.neutral_shift_commands + (day.trim_shift_commands + trim_drift) / effectiveness
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
-    extra_noise = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
-    rates = rates + extra_noise * _rates_under_noise(rng, past_coefficients, noise_covariance, len(rates))
+    extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
+    rates = rates + extra_noise_sd_ratio * _rates_under_noise(
+        rng, past_coefficients, noise_covariance, len(rates)
+    )
     return replace(samples, commands=commands, rates=rates)
 
 
@@ -160,51 +162,60 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlatio
     from scipy.signal import lfilter
 
     retention = np.exp(-1.0 / correlation_samples)
-    white = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
-    return np.asarray(lfilter([1.0], [1.0, -retention], white, axis=0))
+    white_noise = rng.standard_normal(shape) * np.sqrt(1.0 - retention**2)
+    return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
 
 
 def _rates_under_noise(
     rng: np.random.Generator, past_coefficients: Floats, noise_covariance: Floats, n_samples: int
 ) -> Floats:
     """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
-    moments = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
+    process_noise = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
     n_lags = len(past_coefficients) // 3
     rates = np.zeros((n_samples + n_lags, 3))
     for k in range(n_samples):
-        rates[k + n_lags] = rates[k : k + n_lags][::-1].ravel() @ past_coefficients[: 3 * n_lags] + moments[k]
+        rates[k + n_lags] = (
+            rates[k : k + n_lags][::-1].ravel() @ past_coefficients[: 3 * n_lags] + process_noise[k]
+        )
     return rates[n_lags:]
 
 
 def run_other_days(folder: Path) -> Document:
     """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
-    labelled = [
-        data for data in benchmark.load_data_sets(folder) if np.isfinite(data.flights[0].labels).any()
+    labelled_data_sets = [
+        data_set
+        for data_set in benchmark.load_data_sets(folder)
+        if np.isfinite(data_set.flights[0].labels).any()
     ]
-    if not labelled:
+    if not labelled_data_sets:
         raise BadInput(f"compare: --other-days: {folder} holds no labelled flight, allowed: one with labels")
-    return {"sets": [_test_data_set_on_days(data) for data in labelled]}
+    return {"sets": [_test_data_set_on_days(data_set) for data_set in labelled_data_sets]}
 
 
 def _test_data_set_on_days(data_set: benchmark.FlightDataSet) -> Document:
     usable_flights = flights_with_usable_rows(data_set.flights)
     settings = benchmark.settings_of_whole_flight(usable_flights, data_set)
     models_and_held_out = [
-        (fit_model(fitted, data_set.vehicle, settings), held_out)
-        for fitted, held_out, _ in validation_folds(usable_flights)
+        (fit_model(fitted_flights, data_set.vehicle, settings), held_out)
+        for fitted_flights, held_out, _ in validation_folds(usable_flights)
     ]
-    whole = fit_model(usable_flights, data_set.vehicle, settings)
-    surfaces = len(data_set.vehicle.surfaces)
-    kinds = {
+    whole_flight_model = fit_model(usable_flights, data_set.vehicle, settings)
+    n_surfaces = len(data_set.vehicle.surfaces)
+    days_by_kind = {
         "one change": one_change_days(mixer_matrix(data_set.vehicle), data_set.vehicle.command_columns),
-        "drawn, settings chosen on these": random_days(surfaces, TUNING_SEEDS),
-        "drawn, not looked at": random_days(surfaces, TEST_SEEDS),
+        "drawn, settings chosen on these": random_days(n_surfaces, TUNING_SEEDS),
+        "drawn, not looked at": random_days(n_surfaces, TEST_SEEDS),
     }
-    rows = [
-        row for kind, days in kinds.items() for row in _score_days(kind, days, models_and_held_out, whole)
+    day_rows = [
+        day_row
+        for kind, days in days_by_kind.items()
+        for day_row in _score_days(kind, days, models_and_held_out, whole_flight_model)
     ]
-    summaries = [_summarize_days(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
-    return {"set": data_set.name, "rows": rows, "summary": summaries}
+    summaries = [
+        _summarize_days(kind, [day_row for day_row in day_rows if day_row["kind"] == kind])
+        for kind in days_by_kind
+    ]
+    return {"set": data_set.name, "rows": day_rows, "summary": summaries}
 
 
 def _score_days(
@@ -220,13 +231,15 @@ def _score_days(
     for day in days:
         scores: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in models_and_held_out:
-            altered, labels = (
+            altered_samples, labels = (
                 apply_day_changes(day, held_out.samples, past_coefficients, noise_covariance),
                 benchmark.labels_in_usable_span(held_out),
             )
-            for name, method_scores in scores.items():
+            for detector_name, method_scores in scores.items():
                 method_scores.append(
-                    scoring.score_against_labels(diagnose_with_detector(name, altered, model), labels)
+                    scoring.score_against_labels(
+                        diagnose_with_detector(detector_name, altered_samples, model), labels
+                    )
                 )
         rival_classes = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
         yield {
@@ -240,9 +253,11 @@ def _score_days(
 def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
     values = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
-    mean = {key: float(np.mean(of)) for key, of in values.items()}
+    mean = {key: float(np.mean(figure_values)) for key, figure_values in values.items()}
     return {
         "kind": kind,
         "mean": mean,
-        "worst": {k: _WORST_FUNCTION_BY_SCORE.get(k, min)(of) for k, of in values.items()},
+        "worst": {
+            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(figure_values) for k, figure_values in values.items()
+        },
     }

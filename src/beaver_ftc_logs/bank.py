@@ -66,9 +66,9 @@ class HypothesisBank(NamedTuple):
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
         return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
 
-    def is_fault_of_group(self, group: int) -> np.ndarray:
+    def is_fault_of_group(self, group_index: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
-        return np.asarray((self.effectiveness[:, group] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
+        return np.asarray((self.effectiveness[:, group_index] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
 
 
 def build_hypothesis_bank(model: Model) -> HypothesisBank:
@@ -76,10 +76,12 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     n_groups, settings = len(model.groups), model.settings
     has_known_effect = is_group_effect_known(model)
     groups_with_hypotheses = [
-        group for group in range(n_groups) if has_known_effect[group] or not any(has_known_effect)
+        group_index
+        for group_index in range(n_groups)
+        if has_known_effect[group_index] or not any(has_known_effect)
     ]
     hypothesis_rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
-    n_surfaces_with_hypotheses = sum(len(model.groups[group]) for group in groups_with_hypotheses)
+    n_surfaces_with_hypotheses = sum(len(model.groups[group_index]) for group_index in groups_with_hypotheses)
     may_surfaces_be_stuck = "stuck" in model.vehicle.faults
     has_pair_hypotheses = len(groups_with_hypotheses) > 1
     single_fault_share = (
@@ -87,19 +89,19 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         - (_PAIR_LOSS_TRANSITION_SHARE if has_pair_hypotheses else 0.0)
         - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_surfaces_be_stuck else 0.0)
     )
-    for group in groups_with_hypotheses:
-        levels, level_shares = _effectiveness_levels_and_prior_shares(model, group)
+    for group_index in groups_with_hypotheses:
+        levels, level_shares = _effectiveness_levels_and_prior_shares(model, group_index)
         group_fault_share = (
             single_fault_share
-            * len(model.groups[group])
+            * len(model.groups[group_index])
             / n_surfaces_with_hypotheses
             / len(model.vehicle.faults)
         )
-        for offset_variance in _rate_offset_variance_per_fault_kind(model, group):
+        for offset_variance in _rate_offset_variance_per_fault_kind(model, group_index):
             for level, level_share in zip(levels, level_shares, strict=True):
                 hypothesis_rows.append(
                     (
-                        _group_effectiveness_row(n_groups, {group: level}),
+                        _group_effectiveness_row(n_groups, {group_index: level}),
                         GROUP_LOSS,
                         group_fault_share * level_share,
                         offset_variance,
@@ -115,7 +117,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         )
     hypothesis_rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
     effectiveness, hypothesis_kind, transition_share, offset_variance = (
-        np.array(values) for values in zip(*hypothesis_rows, strict=True)
+        np.array(per_hypothesis_values) for per_hypothesis_values in zip(*hypothesis_rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
     change_probability_per_sample = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
@@ -133,17 +135,19 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     )
 
 
-def _group_effectiveness_row(n_groups: int, level_of_group: dict[int, float]) -> Floats:
+def _group_effectiveness_row(n_groups: int, level_by_group_index: dict[int, float]) -> Floats:
     effectiveness = np.ones(n_groups)
-    for group, level in level_of_group.items():
-        effectiveness[group] = level
+    for group_index, level in level_by_group_index.items():
+        effectiveness[group_index] = level
     return effectiveness
 
 
-def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Floats, Floats]:
+def _effectiveness_levels_and_prior_shares(model: Model, group_index: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled_levels = settings.likely_effectiveness_levels_by_group.get("+".join(model.groups[group]), [])
+    labelled_levels = settings.likely_effectiveness_levels_by_group.get(
+        "+".join(model.groups[group_index]), []
+    )
     grid_levels = np.arange(
         0.0, 1.0 - 0.5 * settings.effectiveness_level_step, settings.effectiveness_level_step
     )
@@ -159,11 +163,13 @@ def _effectiveness_levels_and_prior_shares(model: Model, group: int) -> tuple[Fl
     )
 
 
-def _rate_offset_variance_per_fault_kind(model: Model, group: int) -> list[Floats]:
+def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
     _, _, command_response, residual_covariance = model.coefficient_arrays()
-    summed_response_sd = np.abs(command_response[group]).sum(axis=0) / np.sqrt(np.diag(residual_covariance))
+    summed_response_sd = np.abs(command_response[group_index]).sum(axis=0) / np.sqrt(
+        np.diag(residual_covariance)
+    )
     relative_axis_response = np.clip(
         summed_response_sd / max(summed_response_sd.max(), MIN_DIVISOR), 0.3, 1.0
     )
@@ -177,17 +183,17 @@ def _rate_offset_variance_per_fault_kind(model: Model, group: int) -> list[Float
 
 def _pair_hypotheses(n_groups: int, groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
-    groups_and_levels = list(
+    group_and_level_pairs = list(
         product(combinations(groups_with_hypotheses, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
     )
     return [
         (
-            _group_effectiveness_row(n_groups, dict(zip(groups, levels, strict=True))),
+            _group_effectiveness_row(n_groups, dict(zip(group_pair, level_pair, strict=True))),
             PAIR_LOSS,
-            _PAIR_LOSS_TRANSITION_SHARE / len(groups_and_levels),
+            _PAIR_LOSS_TRANSITION_SHARE / len(group_and_level_pairs),
             np.zeros(3),
         )
-        for groups, levels in groups_and_levels
+        for group_pair, level_pair in group_and_level_pairs
     ]
 
 

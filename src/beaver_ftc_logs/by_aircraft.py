@@ -248,11 +248,11 @@ def _read_sample_inputs(
             mean_age_s_by_held_column[quantity.column] = age_s
         return values
 
-    alpha, beta, qdyn, *aircraft_signals = (
+    alpha_rad, beta_rad, qdyn_pa, *aircraft_signals = (
         sampled_values(vehicle.flow[name]) for name in _flow_input_names(aircraft)
     )
     assert vehicle.airspeed is not None  # as `_check_log_has_inputs` has seen
-    signals = [alpha, beta, sampled_values(vehicle.airspeed), qdyn, *aircraft_signals]
+    signals = [alpha_rad, beta_rad, sampled_values(vehicle.airspeed), qdyn_pa, *aircraft_signals]
     surface_indices = _vehicle_surface_indices(vehicle, aircraft)
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
@@ -354,14 +354,18 @@ def _undiagnosable_rows_by_reason(
     is_outside_stretches = np.ones(len(signals), dtype=bool)
     for begin, end in gap_free_stretches:
         is_outside_stretches[begin:end] = False
-    airspeed, alpha = signals[:, 2], signals[:, 0]
+    airspeed_mps, alpha_rad = signals[:, 2], signals[:, 0]
     return {
         "a number is missing": has_missing_value,
         "samples are not evenly spaced": is_outside_stretches & ~has_missing_value,
-        f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (airspeed < min_airspeed_mps)
-        | (airspeed > max_airspeed_mps),
-        f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (alpha < min_alpha_rad)
-        | (alpha > max_alpha_rad),
+        f"airspeed is outside {min_airspeed_mps:g} to {max_airspeed_mps:g} m/s": (
+            airspeed_mps < min_airspeed_mps
+        )
+        | (airspeed_mps > max_airspeed_mps),
+        f"angle of attack is outside {min_alpha_rad:.3g} to {max_alpha_rad:.3g} rad": (
+            alpha_rad < min_alpha_rad
+        )
+        | (alpha_rad > max_alpha_rad),
     }
 
 
@@ -423,8 +427,8 @@ def _verdict_document(
         k for k in alarm_rows.tolist() if replayed_flight.verdicts[k].isolated == last_verdict.isolated
     ]
     held_column_notes = [
-        f"{name} is held, {age:.2g} s old on average: errors declared have to cover it"
-        for name, age in mean_age_s_by_held_column.items()
+        f"{name} is held, {mean_age_s:.2g} s old on average: errors declared have to cover it"
+        for name, mean_age_s in mean_age_s_by_held_column.items()
     ]
     return {
         "flight": samples.name,

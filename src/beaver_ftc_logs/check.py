@@ -128,31 +128,42 @@ def _log_size_text(samples: Samples) -> str:
 
 def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, attitude = recording.columns, vehicle.attitude
-    if attitude is None or attitude.roll.column not in columns:
+    columns, attitude_quantities = recording.columns, vehicle.attitude
+    if attitude_quantities is None or attitude_quantities.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     rate_columns = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch = attitude.pitch
-    pitch_in_si = _column_in_si(columns, pitch) if pitch is not None and pitch.column in columns else None
+    pitch_quantity = attitude_quantities.pitch
+    pitch_in_si = (
+        _column_in_si(columns, pitch_quantity)
+        if pitch_quantity is not None and pitch_quantity.column in columns
+        else None
+    )
     roll_fit = physics.fit_roll_angle_to_rates(
-        rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si
+        rate_columns, _column_in_si(columns, attitude_quantities.roll), pitch_in_si
     )
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    comparison_texts = [_angle_rate_fit_text(roll_fit, attitude.roll.column, vehicle.rates.p.column)]
-    if pitch is not None and pitch_in_si is not None:
+    comparison_texts = [
+        _angle_rate_fit_text(roll_fit, attitude_quantities.roll.column, vehicle.rates.p.column)
+    ]
+    if pitch_quantity is not None and pitch_in_si is not None:
         pitch_fit = physics.fit_pitch_angle_to_rates(
-            rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si
+            rate_columns, _column_in_si(columns, attitude_quantities.roll), pitch_in_si
         )
         comparison_texts += (
-            [_angle_rate_fit_text(pitch_fit, pitch.column, vehicle.rates.q.column)] if pitch_fit else []
+            [_angle_rate_fit_text(pitch_fit, pitch_quantity.column, vehicle.rates.q.column)]
+            if pitch_fit
+            else []
         )
-    if (yaw := attitude.yaw) is not None and yaw.column in columns:
+    if (yaw_quantity := attitude_quantities.yaw) is not None and yaw_quantity.column in columns:
         yaw_fit = physics.fit_yaw_angle_to_rates(
-            rate_columns, _column_in_si(columns, attitude.roll), pitch_in_si, _column_in_si(columns, yaw)
+            rate_columns,
+            _column_in_si(columns, attitude_quantities.roll),
+            pitch_in_si,
+            _column_in_si(columns, yaw_quantity),
         )
         comparison_texts += (
-            [_angle_rate_fit_text(yaw_fit, yaw.column, vehicle.rates.r.column)] if yaw_fit else []
+            [_angle_rate_fit_text(yaw_fit, yaw_quantity.column, vehicle.rates.r.column)] if yaw_fit else []
         )
     return comparison_texts
 
@@ -213,14 +224,16 @@ def _propose_vehicle(
     commands: list[str],
 ) -> Document:
     columns = recording.columns
-    roll = columns[column_of_quantity["roll"]] if column_of_quantity["roll"] else None
+    roll_column = columns[column_of_quantity["roll"]] if column_of_quantity["roll"] else None
     angle_unit = (
-        _guess_angle_unit(str(column_of_quantity["roll"]), roll, reader_name) if roll is not None else "rad"
+        _guess_angle_unit(str(column_of_quantity["roll"]), roll_column, reader_name)
+        if roll_column is not None
+        else "rad"
     )
     rate_unit = _guess_rate_unit(
         recording,
         [str(column_of_quantity[axis]) for axis in "pqr"],
-        roll,
+        roll_column,
         KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
     vehicle: Document = {"name": _as_vehicle_name(name), "reader": reader_name}
@@ -232,7 +245,7 @@ def _propose_vehicle(
     vehicle["commands"] = [_vehicle_file_command_entry(name, columns[name].values) for name in commands]
     vehicle["surfaces"] = {_as_vehicle_name(name): {name: 1.0} for name in commands}
     angle_columns = {axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]}
-    if roll is not None:
+    if roll_column is not None:
         vehicle["attitude"] = {
             axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
             for axis, name in angle_columns.items()
@@ -326,29 +339,29 @@ def _is_log_rate_plausible(rate_hz: float) -> bool:
     return _PLAUSIBLE_LOG_RATES_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATES_HZ[1]
 
 
-def _guess_angle_unit(column_name: str, roll: Column, reader_name: str) -> str:
+def _guess_angle_unit(column_name: str, roll_column: Column, reader_name: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
     if (
         reader_name == "ardupilot"
         or "deg" in column_name.lower()
-        or _largest_magnitude(roll.values) > 2.0 * np.pi
+        or _largest_magnitude(roll_column.values) > 2.0 * np.pi
     ):
         return "deg"
     return "rad"
 
 
 def _guess_rate_unit(
-    recording: RecordedFlight, rate_columns: list[str], roll: Column | None, rad_per_roll_unit: float
+    recording: RecordedFlight, rate_columns: list[str], roll_column: Column | None, rad_per_roll_unit: float
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
     logged_rates = [recording.columns[name] for name in rate_columns]
-    if roll is not None:
-        fit = physics.fit_roll_angle_to_rates(
-            logged_rates, replace(roll, values=roll.values * rad_per_roll_unit), None
+    if roll_column is not None:
+        roll_fit = physics.fit_roll_angle_to_rates(
+            logged_rates, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
         )
-        if fit is not None and abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
-            return nearest_unit(RATE, abs(fit.slope), 1.5) or "rad/s"
+        if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
+            return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
         (unit for text, unit in _RATE_UNIT_BY_NAME_PART.items() if text in rate_columns[0].lower()), None
     )

@@ -39,16 +39,21 @@ def logs_with_one_mistake_corrected(
     surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
     commands."""
     surfaces, rate_columns = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    for a, b in combinations(
+    for first_index, second_index in combinations(
         [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
     ):
         surface_order = list(range(len(surfaces)))
-        surface_order[a], surface_order[b] = b, a
+        surface_order[first_index], surface_order[second_index] = second_index, first_index
         exchanged_samples = replace(samples, commands=samples.commands[:, surface_order])
-        yield CorrectedLog(f"the commands of {surfaces[a]} and {surfaces[b]} exchanged", exchanged_samples)
-    for one, other in combinations(rate_columns, 2):
-        exchanged_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {one: other, other: one}, {})
-        yield CorrectedLog(f"{one} and {other} exchanged", exchanged_samples)
+        yield CorrectedLog(
+            f"the commands of {surfaces[first_index]} and {surfaces[second_index]} exchanged",
+            exchanged_samples,
+        )
+    for first_rate, second_rate in combinations(rate_columns, 2):
+        exchanged_samples = _with_exchanged_or_scaled_columns(
+            samples, vehicle, {first_rate: second_rate, second_rate: first_rate}, {}
+        )
+        yield CorrectedLog(f"{first_rate} and {second_rate} exchanged", exchanged_samples)
     for name in [*rate_columns, *vehicle.signal_columns]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
@@ -71,5 +76,5 @@ def _with_exchanged_or_scaled_columns(
         new_columns.append(
             factor_of_column.get(stem, 1.0) * columns[source_of_column.get(stem, stem) + suffix]
         )
-    signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
-    return replace(samples, rates=np.column_stack(new_columns[:3]), signals=signals)
+    new_signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
+    return replace(samples, rates=np.column_stack(new_columns[:3]), signals=new_signals)

@@ -76,7 +76,7 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
 
 def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(samples, model)
+    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
     residual_covariance = model.coefficient_arrays()[3]
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance))
     trim_regressors = np.broadcast_to(
@@ -84,11 +84,11 @@ def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, F
     )
     regressors = np.where(
         is_predictable[:, None, None],
-        np.concatenate([trim_regressors, responses.transpose(0, 2, 1)], axis=2),
+        np.concatenate([trim_regressors, group_responses.transpose(0, 2, 1)], axis=2),
         0.0,
     )
     return np.einsum("ab,nbi->nai", whitening_matrix, regressors), standardized_healthy_residual(
-        model, is_predictable, unexplained_rates, responses
+        model, is_predictable, unexplained_rates, group_responses
     )
 
 
@@ -111,11 +111,11 @@ def _least_squares_rows(
     below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
     standard deviations."""
     bank = build_hypothesis_bank(model)
-    low, high = (
+    unclipped_low, unclipped_high = (
         np.clip(effectiveness + sign * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
         for sign in (-1.0, 1.0)
     )
-    estimate, has_loss = (
+    estimated_effectiveness, has_loss = (
         np.clip(effectiveness, 0.0, 1.0),
         effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
     )
@@ -127,12 +127,19 @@ def _least_squares_rows(
                 if labelled_levels
                 else np.unique(bank.effectiveness[:, group_index])
             )
-            estimate[:, group_index] = levels[np.abs(estimate[:, group_index, None] - levels).argmin(axis=1)]
-        has_loss = estimate < 1.0
-    bounds_by_group = {"low": np.minimum(low, estimate), "high": np.maximum(high, estimate)}
+            estimated_effectiveness[:, group_index] = levels[
+                np.abs(estimated_effectiveness[:, group_index, None] - levels).argmin(axis=1)
+            ]
+        has_loss = estimated_effectiveness < 1.0
+    bounds_by_group = {
+        "low": np.minimum(unclipped_low, estimated_effectiveness),
+        "high": np.maximum(unclipped_high, estimated_effectiveness),
+    }
     bounds = {name: group_values_by_surface(bound, model) for name, bound in bounds_by_group.items()}
-    names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
-    return _rows_with_default_bounds(samples, names, group_values_by_surface(estimate, model), **bounds)
+    isolated_names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
+    return _rows_with_default_bounds(
+        samples, isolated_names, group_values_by_surface(estimated_effectiveness, model), **bounds
+    )
 
 
 def _rows_with_default_bounds(
@@ -202,19 +209,19 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
             f"{model.vehicle.name}: {len(surface_groups)} groups of surfaces, allowed for a detector of the "
             f"loop: at most {len(LOOP_SURFACES_FOR_GROUPS)}"
         )
-    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(samples, model)
+    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
     intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     previous_rates = np.vstack([rates[:1], rates[:-1]])
     predicted_rates = rates - np.where(
-        is_predictable[:, None], unexplained_rates - intercept - responses.sum(axis=1), 0.0
+        is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
     )
     acceleration = (predicted_rates - previous_rates) / dt_s
     contribution, command = (
         np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP)),
         np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
     )
-    known_responses = np.where(is_predictable[:, None, None], responses, 0.0)
+    known_responses = np.where(is_predictable[:, None, None], group_responses, 0.0)
     for group_index, surface_indices in enumerate(surface_groups):
         contribution[:, :, group_index] = known_responses[:, group_index] / dt_s
         command[:, group_index] = np.nan_to_num(samples.commands[:, surface_indices].sum(axis=1))
@@ -269,19 +276,22 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     n_samples, surface_groups = len(verdicts), surface_indices_by_group(model)
     faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
     effectiveness, effectiveness_low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
-    names = np.full(n_samples, "", dtype=object)
+    isolated_names = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
         if verdicts[k].isolated not in LOOP_SURFACES_FOR_GROUPS[: len(surface_groups)]:
-            names[k], effectiveness_low[k] = UNKNOWN_SURFACE, 0.0
+            isolated_names[k], effectiveness_low[k] = UNKNOWN_SURFACE, 0.0
             continue
         group_index = LOOP_SURFACES_FOR_GROUPS.index(str(verdicts[k].isolated))
-        names[k], effectiveness_low[k, surface_groups[group_index]] = "+".join(model.groups[group_index]), 0.0
+        isolated_names[k], effectiveness_low[k, surface_groups[group_index]] = (
+            "+".join(model.groups[group_index]),
+            0.0,
+        )
         effectiveness[k, surface_groups[group_index]] = _remaining_effectiveness(verdicts[k], group_index)
     probability = np.array([min(max(verdict.statistic, 0.0), 1.0) for verdict in verdicts])
     probability = np.where(np.isfinite(probability), probability, faulty)
     return _rows_with_default_bounds(
         samples,
-        names,
+        isolated_names,
         effectiveness,
         low=effectiveness_low,
         high=np.ones_like(effectiveness_low),

@@ -181,7 +181,7 @@ def _withdraw_isolation_after_engine_failure(
     if unpowered_energy_height_rate_mps is None or samples.energy_height_rate_mps is None:
         return rows
     energy_height_rate_mps = samples.energy_height_rate_mps
-    names = energy.withdraw_surfaces_after_engine_failure(
+    isolated_names = energy.withdraw_surfaces_after_engine_failure(
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces,
@@ -189,7 +189,9 @@ def _withdraw_isolation_after_engine_failure(
         unpowered_energy_height_rate_mps,
         rows.evidence_start_time_s,
     )
-    return replace(rows.without_estimate(names != rows.isolated_surfaces), isolated_surfaces=names)
+    return replace(
+        rows.without_estimate(isolated_names != rows.isolated_surfaces), isolated_surfaces=isolated_names
+    )
 
 
 def _withdraw_contradicted_isolation(
@@ -233,12 +235,14 @@ def _withdraw_contradicted_isolation(
 
 
 def standardized_healthy_residual(
-    model: Model, is_predictable: NDArray[np.bool_], unexplained_rates: Floats, responses: Floats
+    model: Model, is_predictable: NDArray[np.bool_], unexplained_rates: Floats, group_responses: Floats
 ) -> Floats:
     """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
     intercept, _, _, residual_covariance = model.coefficient_arrays()
-    residual = np.where(is_predictable[:, None], unexplained_rates - intercept - responses.sum(axis=1), 0.0)
+    residual = np.where(
+        is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
+    )
     return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(residual_covariance)).T)
 
 
@@ -316,23 +320,23 @@ def rows_of_posterior(
 
 
 def _group_effectiveness_and_bounds(
-    bank: HypothesisBank, posterior: Floats, group: int, model: Model
+    bank: HypothesisBank, posterior: Floats, group_index: int, model: Model
 ) -> tuple[Floats, ...]:
     """A group's effectiveness and its bounds, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
-    levels, level_probability = _group_level_distribution(bank, posterior, group)
+    levels, level_probability = _group_level_distribution(bank, posterior, group_index)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
         level_probability = (
             level_probability
-            / _group_level_distribution(bank, bank.prior_probability[None, : bank.no_response_index], group)[
-                1
-            ]
+            / _group_level_distribution(
+                bank, bank.prior_probability[None, : bank.no_response_index], group_index
+            )[1]
         )
         level_probability /= level_probability.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, level_probability, model.settings.credible_mass)
-    if len(model.groups[group]) > 1:
+    if len(model.groups[group_index]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     return _median_level(levels, level_probability), low, high
 
@@ -356,10 +360,12 @@ def _latch_until_healthy(
     return np.asarray((last_raised_row >= 0) & (last_raised_row > last_healthy_row))
 
 
-def _group_level_distribution(bank: HypothesisBank, posterior: Floats, group: int) -> tuple[Floats, Floats]:
+def _group_level_distribution(
+    bank: HypothesisBank, posterior: Floats, group_index: int
+) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
     levels, level_index_of_hypothesis = np.unique(
-        bank.effectiveness[: bank.no_response_index, group], return_inverse=True
+        bank.effectiveness[: bank.no_response_index, group_index], return_inverse=True
     )
     level_probability = np.zeros((len(posterior), len(levels)))
     for hypothesis, level_index in enumerate(level_index_of_hypothesis):
@@ -400,8 +406,8 @@ def _surfaces_at_fault(
     """
     fault_probability = np.maximum(posterior[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     group_shares = [
-        posterior[:, bank.is_fault_of_group(g)].sum(axis=1) / fault_probability
-        for g in range(len(model.groups))
+        posterior[:, bank.is_fault_of_group(group_index)].sum(axis=1) / fault_probability
+        for group_index in range(len(model.groups))
     ]
     group_share_of_fault = np.column_stack(group_shares)
     is_group_likely = (group_share_of_fault > _MIN_GROUP_SHARE_FOR_NAME) & has_isolation_evidence[:, None]
@@ -409,8 +415,8 @@ def _surfaces_at_fault(
         is_single_loss = bank.hypothesis_kind == GROUP_LOSS
         single_loss_probability = np.column_stack(
             [
-                posterior[:, bank.is_fault_of_group(g) & is_single_loss].sum(axis=1)
-                for g in range(len(model.groups))
+                posterior[:, bank.is_fault_of_group(group_index) & is_single_loss].sum(axis=1)
+                for group_index in range(len(model.groups))
             ]
         )
         is_group_likely = (
@@ -422,13 +428,13 @@ def _surfaces_at_fault(
             is_group_likely[:, is_candidate_group].all(axis=1) & (is_candidate_group.sum() > 1)
         )[:, None]
     likely_names = join_flagged_names(is_group_likely, ["+".join(group) for group in model.groups])
-    names = np.full(len(posterior), "", dtype=object)
+    isolated_names = np.full(len(posterior), "", dtype=object)
     is_unknown_offset_likelier = (
         posterior[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > fault_probability
     )
     hold_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
-        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, names[k - 1] if k else ""
+        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, isolated_names[k - 1] if k else ""
         unchanged_samples = (
             unchanged_samples + 1 if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE) else 0
         )
@@ -443,8 +449,8 @@ def _surfaces_at_fault(
                 )
             )
         )
-        names[k] = last_name if keeps_name else new_name
-    return names
+        isolated_names[k] = last_name if keeps_name else new_name
+    return isolated_names
 
 
 def _would_restore_excluded_surfaces(new_name: str, last_name: str, model: Model) -> bool:

@@ -48,7 +48,7 @@ def withdraw_surfaces_after_engine_failure(
     row in which the energy height falls as without power until it rises. A row uses nothing later than its
     time.
     """
-    names = isolated_surfaces.copy()
+    isolated_names = isolated_surfaces.copy()
     alarm_edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
     for begin, end in zip(alarm_edges[::2].tolist(), alarm_edges[1::2].tolist(), strict=True):
         evidence_begin_row = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
@@ -71,7 +71,7 @@ def withdraw_surfaces_after_engine_failure(
             np.logical_or.accumulate(is_engine_named) & may_engine_have_failed, ENGINE, UNKNOWN_SURFACE
         )
         is_within_evidence_window = t_s[begin:end] - t_s[evidence_begin_row] < _ENERGY_HEIGHT_WINDOW_S
-        names[begin:end] = np.where(
+        isolated_names[begin:end] = np.where(
             may_engine_have_failed | is_within_evidence_window, engine_names, isolated_surfaces[begin:end]
         )
-    return names
+    return isolated_names

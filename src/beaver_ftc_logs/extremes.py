@@ -63,26 +63,31 @@ class ExpectedFalseAlarmsPerHour:
 
 def peaks_between_zeros(statistic: Floats) -> Floats:
     """The highest value of each stretch above zero, (k,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], statistic > 0.0, [0]]).astype(np.int8)))
-    return np.array([statistic[begin:end].max() for begin, end in zip(edges[::2], edges[1::2], strict=True)])
+    stretch_edges = np.flatnonzero(np.diff(np.concatenate([[0], statistic > 0.0, [0]]).astype(np.int8)))
+    return np.array(
+        [
+            statistic[begin:end].max()
+            for begin, end in zip(stretch_edges[::2], stretch_edges[1::2], strict=True)
+        ]
+    )
 
 
 def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail | None:
     """The tail of the peaks of all held-out flights; None if there are at most ten peaks."""
-    peaks = np.sort(
+    sorted_peaks = np.sort(
         np.concatenate([peaks_of_flight for peaks_of_flight, _ in held_out_peaks_and_hours])
         if held_out_peaks_and_hours
         else []
     )[::-1]
-    if len(peaks) <= _MIN_PEAKS:
+    if len(sorted_peaks) <= _MIN_PEAKS:
         return None
     n_peaks_over_level = min(
-        max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(peaks)))), len(peaks) - 1
+        max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(sorted_peaks)))), len(sorted_peaks) - 1
     )
-    tail_start_level = float(peaks[n_peaks_over_level])
+    tail_start_level = float(sorted_peaks[n_peaks_over_level])
     return PeakTail(
         level=tail_start_level,
-        excess=(peaks[:n_peaks_over_level] - tail_start_level).tolist(),
+        excess=(sorted_peaks[:n_peaks_over_level] - tail_start_level).tolist(),
         minutes=60.0 * sum(hours for _, hours in held_out_peaks_and_hours),
         dispersion=_excess_overdispersion(
             [
@@ -112,9 +117,9 @@ def _excess_overdispersion(held_out_peaks_and_hours: Sequence[PeaksAndHours]) ->
 
 def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarmsPerHour:
     """False alarms an hour at a threshold not below the tail's level."""
-    shape, scale, grid_probability = _pareto_posterior(tail)
+    pareto_shape, pareto_scale, grid_probability = _pareto_posterior(tail)
     false_alarm_rates = (
-        _exceedance_probability(threshold - tail.tail_start_level, shape, scale)[:, None]
+        _exceedance_probability(threshold - tail.tail_start_level, pareto_shape, pareto_scale)[:, None]
         * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
     order_by_rate, rate_probability = (
@@ -133,12 +138,13 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """The threshold at which this rate of false alarms is expected; the level of the tail if the rate there
     is lower."""
-    shape, scale, grid_probability = _pareto_posterior(tail)
+    pareto_shape, pareto_scale, grid_probability = _pareto_posterior(tail)
     mean_peaks_per_hour = float(_peaks_per_hour_quantiles(tail).mean())
 
     def has_too_many_alarms(excess: float) -> bool:
         return (
-            mean_peaks_per_hour * float(_exceedance_probability(excess, shape, scale) @ grid_probability)
+            mean_peaks_per_hour
+            * float(_exceedance_probability(excess, pareto_shape, pareto_scale) @ grid_probability)
             > false_alarms_per_hour
         )
 
@@ -189,15 +195,19 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
 
     excess = np.array(tail.excess_over_level)
     scale_grid = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
-    shape, scale = (grid.ravel() for grid in np.meshgrid(_SHAPE_GRID, scale_grid, indexing="ij"))
-    log_posterior = genpareto.logpdf(excess[:, None], shape, scale=scale).sum(axis=0) / tail.overdispersion
-    log_posterior -= 0.5 * (shape / _SHAPE_PRIOR_SD) ** 2
+    pareto_shape, pareto_scale = (
+        grid.ravel() for grid in np.meshgrid(_SHAPE_GRID, scale_grid, indexing="ij")
+    )
+    log_posterior = (
+        genpareto.logpdf(excess[:, None], pareto_shape, scale=pareto_scale).sum(axis=0) / tail.overdispersion
+    )
+    log_posterior -= 0.5 * (pareto_shape / _SHAPE_PRIOR_SD) ** 2
     grid_probability = np.exp(log_posterior - log_posterior.max())
-    return shape, scale, grid_probability / grid_probability.sum()
+    return pareto_shape, pareto_scale, grid_probability / grid_probability.sum()
 
 
-def _exceedance_probability(excess: float, shape: Floats, scale: Floats) -> Floats:
+def _exceedance_probability(excess: float, pareto_shape: Floats, pareto_scale: Floats) -> Floats:
     """Probability that a peak over the level exceeds it by more than `excess`."""
     from scipy.stats import genpareto
 
-    return np.asarray(genpareto.sf(excess, shape, scale=scale))
+    return np.asarray(genpareto.sf(excess, pareto_shape, scale=pareto_scale))

@@ -123,20 +123,22 @@ def _average_bank_runs(
 def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
     """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
     the covariance of the fit, without its inflation. The filter multiplied the samples by C(1)."""
-    is_predictable, unexplained, responses = whitened_rates_and_responses(flight, model)
+    is_predictable, unexplained_rates, group_responses = whitened_rates_and_responses(flight, model)
     residual = np.nan_to_num(
-        unexplained - responses.sum(axis=1) - model.whitened_intercept(noise_model.ma_coefficients)
+        unexplained_rates
+        - group_responses.sum(axis=1)
+        - model.whitened_intercept(noise_model.ma_coefficients)
     )
     squared_residual = np.einsum(
         "na,ab,nb->n", residual, np.linalg.inv(noise_model.residual_covariance), residual
     )
-    dof, log_determinant = (
+    t_degrees_of_freedom, log_determinant = (
         model.settings.t_degrees_of_freedom,
         np.linalg.slogdet(noise_model.residual_covariance)[1],
     )
-    log_likelihood = -0.5 * ((dof + 3.0) * np.log1p(squared_residual / dof) + log_determinant) + 3.0 * np.log(
-        sum(noise_model.ma_coefficients)
-    )
+    log_likelihood = -0.5 * (
+        (t_degrees_of_freedom + 3.0) * np.log1p(squared_residual / t_degrees_of_freedom) + log_determinant
+    ) + 3.0 * np.log(sum(noise_model.ma_coefficients))
     return np.where(is_predictable, model.settings.effective_sample_share * log_likelihood, 0.0)
 
 
@@ -272,7 +274,7 @@ def run_bank(
     be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
     min_noise_variance_scales (n,): lower bound of the scale of the noise.
     """
-    n, n_hypotheses, n_states = (
+    n_samples, n_hypotheses, n_states = (
         len(unexplained_rates),
         len(bank.transition_share),
         len(state_model.initial_mean),
@@ -283,12 +285,12 @@ def run_bank(
     state_covariances = np.zeros((n_hypotheses, n_states, n_states))
     state_means[:] = state_model.initial_mean
     state_covariances[:] = state_model.initial_covariance
-    posterior = np.zeros((n, n_hypotheses))
-    mean_states = np.zeros((n, n_states))
-    noise_variance_scales = np.zeros(n)
-    sample_log_likelihoods = np.zeros(n)
+    posterior = np.zeros((n_samples, n_hypotheses))
+    mean_states = np.zeros((n_samples, n_states))
+    noise_variance_scales = np.zeros(n_samples)
+    sample_log_likelihoods = np.zeros(n_samples)
     noise_variance_scale = 1.0
-    for k in range(n):
+    for k in range(n_samples):
         prior_probabilities = _mix_hypotheses(
             hypothesis_probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
         )
@@ -436,7 +438,10 @@ def _correct_hypotheses(
     log_likelihood = np.empty(n_hypotheses)
     squared_residuals = np.empty(n_hypotheses)
     zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
-    noise_covariance, dof = noise.covariance * noise_variance_scale, noise.t_degrees_of_freedom
+    noise_covariance, t_degrees_of_freedom = (
+        noise.covariance * noise_variance_scale,
+        noise.t_degrees_of_freedom,
+    )
     for h in range(n_hypotheses):
         sensitivity = _state_sensitivity(
             bank.effectiveness[h],
@@ -455,7 +460,10 @@ def _correct_hypotheses(
             )
         limited_squared_residual = min(squared_residuals[h], noise.max_squared_residual)
         log_likelihood[h] = noise.effective_sample_share * (
-            -0.5 * (dof + 3.0) * np.log(1.0 + limited_squared_residual / dof) - 0.5 * log_determinant
+            -0.5
+            * (t_degrees_of_freedom + 3.0)
+            * np.log(1.0 + limited_squared_residual / t_degrees_of_freedom)
+            - 0.5 * log_determinant
         )
     max_log_likelihood = log_likelihood.max()
     probabilities = np.maximum(
@@ -502,7 +510,7 @@ def _update_gaussian(
     Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
     The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
     """
-    n_states, dof = len(state_mean), noise.t_degrees_of_freedom
+    n_states, t_degrees_of_freedom = len(state_mean), noise.t_degrees_of_freedom
     cross_covariance = np.zeros((n_states, 3))
     residual_covariance = noise_covariance.copy()
     residual = unexplained_rates.copy()
@@ -524,7 +532,7 @@ def _update_gaussian(
             for i in range(n_states):
                 kalman_gain[i, j] += cross_covariance[i, k] * inverse_residual_covariance[k, j]
     kalman_gain *= (
-        min(1.0, (dof + 3.0) / (dof + squared_residual))
+        min(1.0, (t_degrees_of_freedom + 3.0) / (t_degrees_of_freedom + squared_residual))
         if squared_residual < noise.max_squared_residual
         else 0.0
     )
@@ -544,9 +552,12 @@ def _invert_symmetric(matrix):
     adjugate = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            d, e = (j + 1) % 3, (j + 2) % 3
-            adjugate[j, i] = matrix[a, d] * matrix[b, e] - matrix[a, e] * matrix[b, d]
+            next_row, last_row = (i + 1) % 3, (i + 2) % 3
+            next_column, last_column = (j + 1) % 3, (j + 2) % 3
+            adjugate[j, i] = (
+                matrix[next_row, next_column] * matrix[last_row, last_column]
+                - matrix[next_row, last_column] * matrix[last_row, next_column]
+            )
     determinant = (
         matrix[0, 0] * adjugate[0, 0] + matrix[0, 1] * adjugate[1, 0] + matrix[0, 2] * adjugate[2, 0]
     )

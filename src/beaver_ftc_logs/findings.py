@@ -61,8 +61,10 @@ def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     """
     _, name_index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     verdict_columns = np.column_stack([name_index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
-    runs = _join_brief_events(rows, constant_stretches(verdict_columns))
-    return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
+    verdict_runs = _join_brief_events(rows, constant_stretches(verdict_columns))
+    return [
+        _fault_event_entry(rows, begin, end, surfaces) for begin, end in verdict_runs if rows.faulty[begin]
+    ]
 
 
 def _join_brief_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -152,10 +154,10 @@ def as_text(verdict: Document) -> str:
 
 def _no_event_text(verdict: Document) -> str:
     """No event: because no fault shows, or because nothing can be said."""
-    share = verdict["credible"]["share"]
-    if share < _MIN_CREDIBLE_ROW_SHARE:
+    credible_share = verdict["credible"]["share"]
+    if credible_share < _MIN_CREDIBLE_ROW_SHARE:
         return "no verdict"
-    return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
+    return "no fault shows" if credible_share >= 1.0 else "no fault shows where the model is credible,"
 
 
 def credibility_text_lines(verdict: Document) -> list[str]:
@@ -172,9 +174,9 @@ def credibility_text_lines(verdict: Document) -> list[str]:
 
 def duration_in_words(verdict: Document) -> str:
     """How much flight was diagnosed, in words: a gap in the log is no flight."""
-    if not (gaps := verdict["gaps"]):
+    if not (n_gaps := verdict["gaps"]):
         return f"{verdict['duration_s']:.0f} s"
-    return f"{verdict['recorded_s']:.0f} s, {gaps} gap{'s' if gaps > 1 else ''} in the log left out"
+    return f"{verdict['recorded_s']:.0f} s, {n_gaps} gap{'s' if n_gaps > 1 else ''} in the log left out"
 
 
 def _event_text(event: Document) -> str:
@@ -208,7 +210,9 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
             for group_index, group in enumerate(model.groups)
         ],
         "alike": _group_pair_cosine_entries(group_responses, model),
-        "columns_held_s": {name: round(age, 4) for name, age in samples.mean_age_s_by_held_column.items()},
+        "columns_held_s": {
+            name: round(mean_age_s, 4) for name, mean_age_s in samples.mean_age_s_by_held_column.items()
+        },
     }
 
 
@@ -228,17 +232,17 @@ def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
 
 
 def _group_isolability_entry(
-    group_responses: Floats, group: int, model: Model, bank: HypothesisBank, dt_s: float
+    group_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
-    required_log_odds = _log_odds_needed_for_alarm(model, bank, group, dt_s)
+    required_log_odds = _log_odds_needed_for_alarm(model, bank, group_index, dt_s)
     if not len(group_responses):
         return {
             "information_per_s": 0.0,
             "smallest_loss": _smallest_detectable_losses(0.0, required_log_odds),
         }
-    information_per_s = float((group_responses[:, group] ** 2).sum(axis=1).mean()) / dt_s
-    conditional_information_per_s = _conditional_fisher_information(group_responses, group) / dt_s
+    information_per_s = float((group_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
+    conditional_information_per_s = _conditional_fisher_information(group_responses, group_index) / dt_s
     return {
         "information_per_s": information_per_s,
         "information_per_s_of_its_motion": conditional_information_per_s,
@@ -249,24 +253,24 @@ def _group_isolability_entry(
     }
 
 
-def _conditional_fisher_information(group_responses: Floats, group: int) -> float:
+def _conditional_fisher_information(group_responses: Floats, group_index: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
     n_samples, n_groups, n_axes = group_responses.shape
     trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
     other_responses = [
         group_responses[:, other_group].reshape(-1, 1)
         for other_group in range(n_groups)
-        if other_group != group
+        if other_group != group_index
     ]
     nuisance = np.column_stack([trim_regressors, *other_responses])
-    target = group_responses[:, group].reshape(-1)
+    target = group_responses[:, group_index].reshape(-1)
     unexplained_target = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
     return float(unexplained_target @ unexplained_target) / n_samples
 
 
-def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group: int, dt_s: float) -> float:
+def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: int, dt_s: float) -> float:
     """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
-    settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group)]
+    settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group_index)]
     if not len(transition_shares):
         return float("inf")
     change_probability = (
@@ -286,10 +290,10 @@ def _smallest_detectable_losses(
         f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S
     }
     losses = {
-        key: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
-        for key, information in information_by_horizon.items()
+        horizon: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
+        for horizon, information in information_by_horizon.items()
     }
-    return {key: float(loss) if loss <= 1.0 else None for key, loss in losses.items()}
+    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in losses.items()}
 
 
 def _group_pair_cosine_entries(group_responses: Floats, model: Model) -> list[dict[str, Any]]:

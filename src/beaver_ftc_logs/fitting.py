@@ -263,8 +263,8 @@ def _regressor_columns_of_order(vehicle: Vehicle, n_rate_lags: int, n_command_la
         max(RATE_LAG_COUNT_CANDIDATES)
     )
     group_first_columns = [
-        first_command_column + group * max(COMMAND_LAG_COUNT_CANDIDATES)
-        for group in range(len(regression.group_surfaces_by_commands(vehicle)))
+        first_command_column + group_index * max(COMMAND_LAG_COUNT_CANDIDATES)
+        for group_index in range(len(regression.group_surfaces_by_commands(vehicle)))
     ]
     command_columns = [
         first_column + lag for first_column in group_first_columns for lag in range(n_command_lags)
@@ -428,7 +428,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
         / 3600.0
     )
-    n_changes, n_repairs, levels = 0, 0, {}
+    n_changes, n_repairs, levels_by_group = 0, 0, {}
     surface_names = list(model.vehicle.surfaces)
     for group in model.groups:
         surface_index = surface_names.index(group[0])
@@ -437,14 +437,14 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
             if len(group) == 1
             else []
         )
-        levels["+".join(group)] = sorted(
+        levels_by_group["+".join(group)] = sorted(
             {level for level_sequence in level_sequences for level in level_sequence if level < 1.0}
         )
         n_changes += sum(max(len(level_sequence) - 1, 0) for level_sequence in level_sequences)
         n_repairs += sum(
             int(level == 1.0) for level_sequence in level_sequences for level in level_sequence[1:]
         )
-    levels = {group_name: group_levels for group_name, group_levels in levels.items() if group_levels}
+    levels_by_group = {group_name: levels for group_name, levels in levels_by_group.items() if levels}
     may_air_move = model.vehicle.moving_air
     delays_s = [
         delay_samples / model.rate_hz
@@ -455,7 +455,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         if model.vehicle.other_laws
         else {}
     )
-    if not levels:
+    if not levels_by_group:
         trim_random_walk_sd = _estimate_trim_random_walk_sd(usable_flights, model)
         model_with_trim_drift = model.model_copy(
             update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **law_settings)}
@@ -477,7 +477,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
             delays_s=delays_s,
         )
     return FilterSettings(
-        levels=levels,
+        levels=levels_by_group,
         changes_per_hour=float(
             np.sqrt((n_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour)
         ),
@@ -508,10 +508,10 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     ):
         has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
-            responses, residual = _standardized_responses_and_residual(fold_model, held_out)
-            responses = responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
+            group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
+            group_responses = group_responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
             squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
-                responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
+                group_responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
             )
             squared_error_sum, n_gains = squared_error_sum + squared_error, n_gains + n_determined_gains
     return squared_error_sum / n_gains
@@ -533,12 +533,12 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
             np.kron(_prior_gain_covariance(fold_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
         for one in held_out_flights:
-            responses, residual = _standardized_responses_and_residual(fold_model, one)
-            responses = responses[:, :, has_known_effect].reshape(*residual.shape, -1)
+            group_responses, residual = _standardized_responses_and_residual(fold_model, one)
+            group_responses = group_responses[:, :, has_known_effect].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * one.samples.dt_s / _GAIN_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses, window_residual = (
-                    _without_mean(responses[window_rows]),
+                    _without_mean(group_responses[window_rows]),
                     _without_mean(residual[window_rows]),
                 )
                 squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
@@ -578,18 +578,19 @@ def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) ->
 
 
 def _normalized_squared_gain_error_and_rank(
-    responses: Floats, residual: Floats, gain_covariance: Floats
+    gain_responses: Floats, residual: Floats, gain_covariance: Floats
 ) -> tuple[float, int]:
-    """Squares of the gains of a residual (m,) on responses (m, G), in their covariance and what lies between
-    flights, and how many gains there are."""
-    information, score = responses.T @ responses, responses.T @ residual
-    gain_errors = np.linalg.lstsq(information, score, rcond=_RANK_TOLERANCE)[0]
+    """Squares of the gains of a residual (m,) on gain_responses (m, G), in their covariance and what
+    lies between flights, and how many gains there are."""
+    information, score_vector = gain_responses.T @ gain_responses, gain_responses.T @ residual
+    gain_errors = np.linalg.lstsq(information, score_vector, rcond=_RANK_TOLERANCE)[0]
     identity_plus_prior_information = (
         np.eye(len(gain_errors)) + gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
     squared_error = max(
         float(
-            score @ np.linalg.lstsq(identity_plus_prior_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
+            score_vector
+            @ np.linalg.lstsq(identity_plus_prior_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
         ),
         0.0,
     )
@@ -607,11 +608,11 @@ def _standardized_responses_and_residual(
             np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
         )
     ).T
-    responses, standardized_residual = (
+    standardized_responses, standardized_residual = (
         np.einsum("nga,ab->nbga", rate_responses, whitening_matrix),
         residual @ whitening_matrix,
     )
-    return _without_mean(responses), _without_mean(standardized_residual)
+    return _without_mean(standardized_responses), _without_mean(standardized_residual)
 
 
 def _without_mean(values: Floats) -> Floats:
@@ -828,13 +829,13 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
 def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
-    responses, residual = _standardized_responses_and_residual(model, held_out)
-    responses = responses.sum(axis=3).reshape(residual.size, -1)
-    squared_deviation = np.full(responses.shape[1], np.nan)
-    has_known_effect = np.array(trust.is_group_effect_known(model)) & (responses.any(axis=0))
-    information = responses[:, has_known_effect].T @ responses[:, has_known_effect]
+    group_responses, residual = _standardized_responses_and_residual(model, held_out)
+    group_responses = group_responses.sum(axis=3).reshape(residual.size, -1)
+    squared_deviation = np.full(group_responses.shape[1], np.nan)
+    has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
+    information = group_responses[:, has_known_effect].T @ group_responses[:, has_known_effect]
     gain_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
-    gain_errors = gain_covariance @ (responses[:, has_known_effect].T @ residual.ravel())
+    gain_errors = gain_covariance @ (group_responses[:, has_known_effect].T @ residual.ravel())
     if has_known_effect.any():  # a part without a residual shows the effect of no group
         squared_deviation[has_known_effect] = np.maximum(
             gain_errors**2 - np.diag(gain_covariance) * max(float((residual**2).mean()), 1.0), 0.0
@@ -1057,11 +1058,14 @@ def score_folds_and_choose_credible_mass(
     coverage_by_mass: list[list[float]] = []
     for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
-        entry: Document = {"left_out": held_out_name, **one_step_prediction_quality(fold_model, held_out)}
+        fold_entry: Document = {
+            "left_out": held_out_name,
+            **one_step_prediction_quality(fold_model, held_out),
+        }
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
             diagnosis_rows_by_mass = _diagnosis_rows_by_credible_mass(fold_model, held_out)
-            entry["score"] = score_against_labels(
+            fold_entry["score"] = score_against_labels(
                 diagnosis_rows_by_mass[model.settings.credible_mass], labels
             )
             coverage_by_mass.append(
@@ -1070,7 +1074,7 @@ def score_folds_and_choose_credible_mass(
                     for mass in _CREDIBLE_MASS_CANDIDATES
                 ]
             )
-        fold_entries.append(entry)
+        fold_entries.append(fold_entry)
     if not coverage_by_mass:
         return fold_entries, model.settings.credible_mass
     return fold_entries, _CREDIBLE_MASS_CANDIDATES[
@@ -1114,18 +1118,18 @@ def whitened_residual_and_responses(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
-    is_predictable, unexplained_rates, responses = regression.whitened_rates_and_responses(
+    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
     intercept = model.whitened_intercept(usable_flight.samples.noise_ma_coefficients)
-    return rows, (unexplained_rates - responses.sum(axis=1) - intercept)[rows], responses[rows]
+    return rows, (unexplained_rates - group_responses.sum(axis=1) - intercept)[rows], group_responses[rows]
 
 
 def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    is_predictable, unexplained_rates, responses = regression.unexplained_rates_and_responses(
+    is_predictable, unexplained_rates, group_responses = regression.unexplained_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
-    return rows, (unexplained_rates - responses.sum(axis=1) - np.array(model.intercept))[rows]
+    return rows, (unexplained_rates - group_responses.sum(axis=1) - np.array(model.intercept))[rows]

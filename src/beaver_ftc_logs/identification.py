@@ -335,9 +335,11 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
         _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE,
         list(vehicle.surfaces),
     )
-    for group in regression.group_surfaces_by_commands(vehicle):
-        for power in _AIRSPEED_POWER_CANDIDATES:
-            candidate_powers = vehicle.airspeed_powers | {surface_names[i]: power for i in group}
+    for surface_indices in regression.group_surfaces_by_commands(vehicle):
+        for airspeed_power in _AIRSPEED_POWER_CANDIDATES:
+            candidate_powers = vehicle.airspeed_powers | {
+                surface_names[i]: airspeed_power for i in surface_indices
+            }
             candidate_vehicle = vehicle.model_copy(update={"airspeed_powers": candidate_powers})
             if (
                 bic := _min_bic(scale_and_whiten_flights(candidate_vehicle), candidate_vehicle)
@@ -498,10 +500,10 @@ def identification_text(model: Model) -> str:
         f"{len(results['flights'])}; "
         f"past samples of the rates: {model.n_rate_lags}, of the commands: {model.n_command_lags}",
         *(f"  {line}" for line in results.get("assumed", [])),
-        *(f"  together, not distinguishable: {', '.join(g)}" for g in model.groups if len(g) > 1),
+        *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
-            f"  noise of the colour {', '.join(f'{c:.3g}' for c in one.ma_coefficients)}: "
+            f"  noise of the colour {_ma_coefficients_text(one)}: "
             f"{one.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
             "differ, and other laws may"
             for one in model.noise_models
@@ -529,6 +531,10 @@ def identification_text(model: Model) -> str:
             f"({_variance_inflation_text(worst_entry['inflation'])})"
         )
     return "\n".join(lines)
+
+
+def _ma_coefficients_text(noise_model: NoiseModel) -> str:
+    return ", ".join(f"{coefficient:.3g}" for coefficient in noise_model.ma_coefficients)
 
 
 def _another_day_sentences(expected: Document, n_flights: int) -> list[str]:
@@ -610,23 +616,25 @@ def fit_output_error(
     from scipy.optimize import least_squares
 
     dt_s = float(np.median([usable_flight.samples.dt_s for usable_flight in usable_flights]))
-    commands, rates = _cut_free_run_windows(
+    window_commands, window_rates = _cut_free_run_windows(
         usable_flights,
         surface_groups,
         round(FREE_RUN_WINDOW_S / dt_s),
         round(_MAX_COMMAND_DELAY_S / dt_s) + 1,
     )
-    if len(rates) < 20 or not np.ptp(rates, axis=(0, 1)).all():
-        return {"windows": len(rates), "says": "too few gap-free windows in which every rate moves"}
+    if len(window_rates) < 20 or not np.ptp(window_rates, axis=(0, 1)).all():
+        return {"windows": len(window_rates), "says": "too few gap-free windows in which every rate moves"}
     fitted_windows, held_out_windows = slice(0, None, 2), slice(1, None, 2)
-    rate_sd = rates.std(axis=(0, 1))
+    rate_sd = window_rates.std(axis=(0, 1))
     initial_parameters, min_parameters, max_parameters = _initial_output_error_parameters(
         len(surface_groups), dt_s
     )
 
     def standardized_simulation_error(parameters: Floats, window_slice: slice) -> Floats:
-        simulated = _simulate_free_runs(parameters, commands[window_slice], rates[window_slice], dt_s)
-        return ((simulated - rates[window_slice]) / rate_sd).ravel()
+        simulated = _simulate_free_runs(
+            parameters, window_commands[window_slice], window_rates[window_slice], dt_s
+        )
+        return ((simulated - window_rates[window_slice]) / rate_sd).ravel()
 
     optimum = least_squares(
         standardized_simulation_error,
@@ -641,9 +649,11 @@ def fit_output_error(
         np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
     )
     held_out_error = standardized_simulation_error(optimum.x, held_out_windows).reshape(-1, 3) * rate_sd
-    explained_variance = 1.0 - held_out_error.var(axis=0) / rates[held_out_windows].reshape(-1, 3).var(axis=0)
+    explained_variance = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_windows].reshape(-1, 3).var(
+        axis=0
+    )
     return {
-        "windows": len(rates),
+        "windows": len(window_rates),
         "servo_lag_s": float(optimum.x[0]),
         "servo_lag_sd_s": float(standard_errors[0]),
         "delay_s": float(optimum.x[1]),
@@ -661,7 +671,7 @@ def _cut_free_run_windows(
 ) -> tuple[Floats, Floats]:
     """Commands (W, n_past_samples + window_samples, G) with their past, scaled by labels, and rates (W,
     window_samples, 3)."""
-    commands, rates = [], []
+    window_commands, window_rates = [], []
     for usable_flight in usable_flights:
         samples = usable_flight.samples
         effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
@@ -677,17 +687,17 @@ def _cut_free_run_windows(
             & np.isfinite(samples.rates).all(axis=1)
         )
         for window_end in range(n_past_samples + window_samples, len(is_usable), window_samples):
-            window = slice(window_end - n_past_samples - window_samples, window_end)
+            window_rows = slice(window_end - n_past_samples - window_samples, window_end)
             if (
-                is_usable[window].all()
-                and samples.stretch_number[window.start] == samples.stretch_number[window_end - 1]
+                is_usable[window_rows].all()
+                and samples.stretch_number[window_rows.start] == samples.stretch_number[window_end - 1]
             ):
-                commands.append(group_commands[window])
-                rates.append(samples.rates[window_end - window_samples : window_end])
-    window_stride = max(len(rates) // _MAX_FREE_RUN_WINDOWS, 1)
+                window_commands.append(group_commands[window_rows])
+                window_rates.append(samples.rates[window_end - window_samples : window_end])
+    window_stride = max(len(window_rates) // _MAX_FREE_RUN_WINDOWS, 1)
     commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
-    return np.reshape(commands[::window_stride], commands_shape), np.reshape(
-        rates[::window_stride], (-1, window_samples, 3)
+    return np.reshape(window_commands[::window_stride], commands_shape), np.reshape(
+        window_rates[::window_stride], (-1, window_samples, 3)
     )
 
 
@@ -702,28 +712,30 @@ def _initial_output_error_parameters(n_groups: int, dt_s: float) -> tuple[Floats
     return np.array(initial_parameters), np.array(min_parameters), np.array(max_parameters)
 
 
-def _simulate_free_runs(parameters: Floats, commands: Floats, rates: Floats, dt_s: float) -> Floats:
+def _simulate_free_runs(
+    parameters: Floats, window_commands: Floats, measured_rates: Floats, dt_s: float
+) -> Floats:
     """Free runs of all windows at once, (W, window_samples, 3)."""
-    n_groups = commands.shape[2]
+    n_groups = window_commands.shape[2]
     lag_s, delay_s = parameters[:2]
     rate_transition = parameters[2:11].reshape(3, 3)
     command_effect = parameters[11 : 11 + 3 * n_groups].reshape(n_groups, 3)
     constant_rate = parameters[11 + 3 * n_groups :]
-    window_samples = rates.shape[1]
-    n_past_samples = commands.shape[1] - window_samples
+    window_samples = measured_rates.shape[1]
+    n_past_samples = window_commands.shape[1] - window_samples
     whole_delay_samples, delay_fraction = divmod(delay_s / dt_s, 1.0)
     servo_retention = np.exp(-dt_s / lag_s)
-    predicted_rates, servo_positions = rates[:, 0].copy(), commands[:, 0].copy()
-    simulated_rates = np.empty_like(rates)
-    for k in range(commands.shape[1]):
+    predicted_rates, servo_positions = measured_rates[:, 0].copy(), window_commands[:, 0].copy()
+    simulated_rates = np.empty_like(measured_rates)
+    for k in range(window_commands.shape[1]):
         if k >= n_past_samples:
             simulated_rates[:, k - n_past_samples] = predicted_rates
             predicted_rates = (
                 predicted_rates @ rate_transition.T + servo_positions @ command_effect + constant_rate
             )
         delayed_rows = max(k - int(whole_delay_samples), 0), max(k - int(whole_delay_samples) - 1, 0)
-        delayed_command = (1.0 - delay_fraction) * commands[:, delayed_rows[0]] + delay_fraction * commands[
-            :, delayed_rows[1]
-        ]
+        delayed_command = (1.0 - delay_fraction) * window_commands[
+            :, delayed_rows[0]
+        ] + delay_fraction * window_commands[:, delayed_rows[1]]
         servo_positions = servo_retention * servo_positions + (1.0 - servo_retention) * delayed_command
     return simulated_rates

@@ -22,9 +22,9 @@ _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEFFICIENT, le=_MAX_COEFFICIENT)]
-Row = list[Coefficient]
-Matrix = list[Row]
-Share = Annotated[Number, Field(ge=0, lt=1)]
+CoefficientRow = list[Coefficient]
+CoefficientMatrix = list[CoefficientRow]
+ShareBelowOne = Annotated[Number, Field(ge=0, lt=1)]
 
 
 class FilterSettings(Section):
@@ -38,10 +38,12 @@ class FilterSettings(Section):
         alias="changes_per_hour",
     )
     repair_share: Number = Field(0.1, ge=0, lt=1, description="share of the changes that restore health")
-    likely_effectiveness_levels_by_group: dict[str, Annotated[list[Share], Field(max_length=100)]] = Field(
-        default={},
-        description="likelier levels of effectiveness, by group",
-        alias="levels",
+    likely_effectiveness_levels_by_group: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = (
+        Field(
+            default={},
+            description="likelier levels of effectiveness, by group",
+            alias="levels",
+        )
     )
     share_of_faults_at_likely_levels: Number = Field(
         0.9, ge=0, le=1, description="share of faults at the likelier levels", alias="level_share"
@@ -95,7 +97,7 @@ class FilterSettings(Section):
         description="farthest the gain is adapted, in its spread",
         alias="gain_bound",
     )
-    command_delay_candidates_s: Row = Field(
+    command_delay_candidates_s: CoefficientRow = Field(
         [0.0],
         min_length=1,
         max_length=9,
@@ -177,25 +179,27 @@ class FittedRanges(Section):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible."""
 
-    command_ranges: Matrix = Field(
+    command_ranges: CoefficientMatrix = Field(
         description="least and largest command of each surface, share of travel", alias="commands"
     )
-    rate_ranges_rad_s: Matrix = Field(description="least and largest p, q and r, rad/s", alias="rates")
-    airspeed_range_mps: Row | None = Field(
+    rate_ranges_rad_s: CoefficientMatrix = Field(
+        description="least and largest p, q and r, rad/s", alias="rates"
+    )
+    airspeed_range_mps: CoefficientRow | None = Field(
         default=None, description="least and largest airspeed, m/s", alias="airspeed"
     )
-    rate_sd_rad_s: Row = Field(
+    rate_sd_rad_s: CoefficientRow = Field(
         default=[], description="standard deviation of p, q and r, rad/s", alias="spread"
     )
-    group_command_correlation: Matrix = Field(
+    group_command_correlation: CoefficientMatrix = Field(
         default=[], description="correlation of the groups' commands", alias="correlation"
     )
-    effect_share_explained_by_others: Row = Field(
+    effect_share_explained_by_others: CoefficientRow = Field(
         default=[],
         description="share of each group's effect that past, signals and other groups make up",
         alias="tied",
     )
-    group_gain_standard_error: Row = Field(
+    group_gain_standard_error: CoefficientRow = Field(
         default=[], description="standard error of each group's gain", alias="gain_sd"
     )
     gain_standard_error_by_column: dict[str, Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
@@ -235,16 +239,16 @@ class FittedRanges(Section):
 class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained."""
 
-    ma_coefficients: Row = Field(
+    ma_coefficients: CoefficientRow = Field(
         min_length=1,
         max_length=1000,
         description="1, c1, ...: its moving average, newest first",
         alias="average",
     )
-    residual_covariance: Matrix = Field(
+    residual_covariance: CoefficientMatrix = Field(
         description="covariance of the residual whitened by that, (3, 3), (rad/s)2", alias="noise"
     )
-    ar_coefficients: Matrix = Field(
+    ar_coefficients: CoefficientMatrix = Field(
         default=[],
         description="AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)",
         alias="before",
@@ -268,17 +272,17 @@ class Model(Section):
     )
     n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
     n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
-    intercept: Row = Field(min_length=3, max_length=3)
-    past_coefficients: Matrix = Field(
+    intercept: CoefficientRow = Field(min_length=3, max_length=3)
+    past_coefficients: CoefficientMatrix = Field(
         description="(3 history + signal_regressor_names x signal lags, 3)", alias="past"
     )
-    command_response: list[Matrix] = Field(
+    command_response: list[CoefficientMatrix] = Field(
         description="(groups, lags, 3), a share of command to rad/s a sample", alias="response"
     )
-    command_response_standard_error: list[Matrix] = Field(
+    command_response_standard_error: list[CoefficientMatrix] = Field(
         description="standard errors of `response`, colour included", alias="response_sd"
     )
-    residual_covariance: Matrix = Field(
+    residual_covariance: CoefficientMatrix = Field(
         description="covariance of the residual, (3, 3), (rad/s)2", alias="noise"
     )
     noise_models: list[NoiseModel] = Field(
@@ -367,7 +371,7 @@ class Model(Section):
 
     def _invalid_covariances_or_errors(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, Matrix]] = [(("noise",), self.residual_covariance)]
+        covariances: list[tuple[Location, CoefficientMatrix]] = [(("noise",), self.residual_covariance)]
         covariances += [
             (("colours", i, "noise"), noise_model.residual_covariance)
             for i, noise_model in enumerate(self.noise_models)

@@ -84,8 +84,8 @@ def _log_notes(samples: Samples) -> list[str]:
     gap_count_text = "1 gap" if n_gaps == 1 else f"{n_gaps} gaps"
     notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gap_count_text} in the log."]
     notes += [
-        f"{name} has its own stamps: its last value is held, {age:.2f} s old on average."
-        for name, age in samples.mean_age_s_by_held_column.items()
+        f"{name} has its own stamps: its last value is held, {mean_age_s:.2f} s old on average."
+        for name, mean_age_s in samples.mean_age_s_by_held_column.items()
     ]
     return [*notes, *samples.notes]
 

@@ -42,54 +42,58 @@ class AngleRateFit:
         return self.n_windows >= _MIN_MANY_WINDOWS
 
 
-def fit_roll_angle_to_rates(rates: list[Column], roll: Column, pitch: Column | None) -> AngleRateFit | None:
+def fit_roll_angle_to_rates(
+    rate_columns: list[Column], roll_column: Column, pitch_column: Column | None
+) -> AngleRateFit | None:
     """How the roll angle follows the rates; None where too little moves. All of them as the log says, in SI.
 
-    rates: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
+    rate_columns: p, q, r. Not where the nose is so steep that roll and yaw are hard to distinguish.
     """
-    t_s = rates[0].t_s
-    p, q, r = (_interpolate_column(column, t_s) for column in rates)
-    roll_angle, full_circle = _interpolate_column(roll, t_s), _full_circle(roll.values)
+    t_s = rate_columns[0].t_s
+    p, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
+    roll_angle, full_circle = _interpolate_column(roll_column, t_s), _full_circle(roll_column.values)
     roll_rad = roll_angle * 2.0 * np.pi / full_circle  # the circle is known whatever the unit
     rate_terms, pitch_rad = [p], None
-    if pitch is not None:
-        pitch_rad = _pitch_rad_at(roll, pitch, t_s)
+    if pitch_column is not None:
+        pitch_rad = _pitch_rad_at(roll_column, pitch_column, t_s)
         rate_terms += [np.tan(pitch_rad) * q * np.sin(roll_rad), np.tan(pitch_rad) * r * np.cos(roll_rad)]
     return _fit_angle_to_rate(t_s, roll_angle, rate_terms, full_circle, pitch_rad)
 
 
-def fit_pitch_angle_to_rates(rates: list[Column], roll: Column, pitch: Column) -> AngleRateFit | None:
+def fit_pitch_angle_to_rates(
+    rate_columns: list[Column], roll_column: Column, pitch_column: Column
+) -> AngleRateFit | None:
     """How the pitch angle follows the rates, as `fit_roll_angle_to_rates`."""
-    t_s = rates[0].t_s
-    _, q, r = (_interpolate_column(column, t_s) for column in rates)
-    roll_rad = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
+    t_s = rate_columns[0].t_s
+    _, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
+    roll_rad = _interpolate_column(roll_column, t_s) * 2.0 * np.pi / _full_circle(roll_column.values)
     return _fit_angle_to_rate(
-        t_s, _interpolate_column(pitch, t_s), [q * np.cos(roll_rad), -r * np.sin(roll_rad)]
+        t_s, _interpolate_column(pitch_column, t_s), [q * np.cos(roll_rad), -r * np.sin(roll_rad)]
     )
 
 
 def fit_yaw_angle_to_rates(
-    rates: list[Column], roll: Column, pitch: Column | None, yaw: Column
+    rate_columns: list[Column], roll_column: Column, pitch_column: Column | None, yaw_column: Column
 ) -> AngleRateFit | None:
     """How the yaw angle follows the rates, as `fit_roll_angle_to_rates`; r and q are in one unit, since a
     turn changes both alike."""
-    t_s = rates[0].t_s
-    _, q, r = (_interpolate_column(column, t_s) for column in rates)
-    roll_rad = _interpolate_column(roll, t_s) * 2.0 * np.pi / _full_circle(roll.values)
-    pitch_rad = np.zeros(len(t_s)) if pitch is None else _pitch_rad_at(roll, pitch, t_s)
+    t_s = rate_columns[0].t_s
+    _, q, r = (_interpolate_column(column, t_s) for column in rate_columns)
+    roll_rad = _interpolate_column(roll_column, t_s) * 2.0 * np.pi / _full_circle(roll_column.values)
+    pitch_rad = np.zeros(len(t_s)) if pitch_column is None else _pitch_rad_at(roll_column, pitch_column, t_s)
     yaw_rate_term = (q * np.sin(roll_rad) + r * np.cos(roll_rad)) / np.cos(pitch_rad)
     return _fit_angle_to_rate(
-        t_s, _interpolate_column(yaw, t_s), [yaw_rate_term], _full_circle(yaw.values), pitch_rad
+        t_s, _interpolate_column(yaw_column, t_s), [yaw_rate_term], _full_circle(yaw_column.values), pitch_rad
     )
 
 
-def _pitch_rad_at(roll: Column, pitch: Column, t_s: Floats) -> Floats:
+def _pitch_rad_at(roll_column: Column, pitch_column: Column, t_s: Floats) -> Floats:
     """The pitch angle at given times, rad, of two angles in one unit."""
     return (
-        _interpolate_column(pitch, t_s)
+        _interpolate_column(pitch_column, t_s)
         * 2.0
         * np.pi
-        / _full_circle(np.append(4.0 * pitch.values, roll.values))
+        / _full_circle(np.append(4.0 * pitch_column.values, roll_column.values))
     )
 
 
@@ -170,26 +174,28 @@ _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
 def find_attitude_mistake(
-    rates: Mapping[str, Column], angles: Sequence[NamedColumn | None], other_columns: Mapping[str, Column]
+    rate_column_by_name: Mapping[str, Column],
+    named_angles: Sequence[NamedColumn | None],
+    other_columns: Mapping[str, Column],
 ) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. other_columns: what may have taken the place
     of a rate."""
-    rate_columns = list(rates.values())
-    for axis, (rate_name, named_angle) in enumerate(zip(rates, angles, strict=True)):
+    rate_columns = list(rate_column_by_name.values())
+    for axis, (rate_name, named_angle) in enumerate(zip(rate_column_by_name, named_angles, strict=True)):
         if named_angle is None:
             continue
         if axis == 1 and (remark := pitch_angle_unit_remark(named_angle[1], named_angle[0])):
             return remark
-        fit = _fit_angle_of_axis(rate_columns, angles, axis)
+        fit = _fit_angle_of_axis(rate_columns, named_angles, axis)
         if fit is None:
             continue
-        for other_name, other_column in {**rates, **other_columns}.items():
+        for other_name, other_column in {**rate_column_by_name, **other_columns}.items():
             other_fit = _fit_angle_of_axis(
-                [*rate_columns[:axis], other_column, *rate_columns[axis + 1 :]], angles, axis
+                [*rate_columns[:axis], other_column, *rate_columns[axis + 1 :]], named_angles, axis
             )
             if other_fit is not None and abs(other_fit.correlation) > _min_correlation_of_other_column(
-                fit, other_name in rates
+                fit, other_name in rate_column_by_name
             ):
                 return _exchanged_column_text(
                     named_angle[0], (rate_name, fit), (other_name, other_fit), _RATE_TITLES[axis]
@@ -216,16 +222,18 @@ def _min_correlation_of_other_column(fit: AngleRateFit, is_rate: bool) -> float:
 
 
 def _fit_angle_of_axis(
-    rates: list[Column], angles: Sequence[NamedColumn | None], axis: int
+    rate_columns: list[Column], named_angles: Sequence[NamedColumn | None], axis: int
 ) -> AngleRateFit | None:
     """How the angle of a place follows the rates; None where too little moves, or it is not known."""
-    (roll, pitch, yaw) = (None if one is None else one[1] for one in angles)
-    if roll is None or (angle := (roll, pitch, yaw)[axis]) is None:
+    (roll_column, pitch_column, yaw_column) = (None if one is None else one[1] for one in named_angles)
+    if roll_column is None or (angle_column := (roll_column, pitch_column, yaw_column)[axis]) is None:
         return None
     if axis == 2:
-        return fit_yaw_angle_to_rates(rates, roll, pitch, angle)
+        return fit_yaw_angle_to_rates(rate_columns, roll_column, pitch_column, angle_column)
     return (
-        fit_pitch_angle_to_rates(rates, roll, angle) if axis else fit_roll_angle_to_rates(rates, roll, pitch)
+        fit_pitch_angle_to_rates(rate_columns, roll_column, angle_column)
+        if axis
+        else fit_roll_angle_to_rates(rate_columns, roll_column, pitch_column)
     )
 
 
@@ -276,10 +284,10 @@ def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) ->
     )
 
 
-def pitch_angle_unit_remark(pitch: Column, column_name: str) -> str | None:
+def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
-    max_pitch = float(np.nanmax(np.abs(pitch.values), initial=0.0))
+    max_pitch = float(np.nanmax(np.abs(pitch_column.values), initial=0.0))
     if max_pitch <= _MAX_PITCH_RAD:
         return None
     unit = next(
@@ -300,8 +308,8 @@ def pitch_angle_unit_remark(pitch: Column, column_name: str) -> str | None:
 def gravity_remark(acceleration: Column, column_name: str) -> str | None:
     """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
     is."""
-    values = acceleration.values[np.isfinite(acceleration.values)]
-    median_mps2 = float(np.median(np.abs(values))) if values.size else 0.0
+    finite_accelerations = acceleration.values[np.isfinite(acceleration.values)]
+    median_mps2 = float(np.median(np.abs(finite_accelerations))) if finite_accelerations.size else 0.0
     if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
         return None
     unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None

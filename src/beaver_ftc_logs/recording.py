@@ -100,12 +100,12 @@ def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tu
         name: rows_with_increasing_time(name, _as_floats(fields[stamp_field]))
         for name, fields in topics.items()
     }
-    first_stamps = [
+    first_stamps_us = [
         float(topics[name][stamp_field][kept_rows[0]])
         for name, (kept_rows, _) in rows_of_topic.items()
         if len(kept_rows)
     ]
-    origin_us = min(first_stamps, default=0.0)
+    origin_us = min(first_stamps_us, default=0.0)
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
         kept_rows, note = rows_of_topic[name]
@@ -155,10 +155,10 @@ def _longest_increasing_rows(t_s: Floats) -> NDArray[np.int64]:
     end_rows: list[int] = []
     next_row = np.full(len(t_s), -1)
     for k in range(len(t_s) - 1, -1, -1):
-        length = bisect_left(negated_ends, -t_s[k])
-        next_row[k] = end_rows[length - 1] if length else -1
-        negated_ends[length : length + 1] = [-t_s[k]]
-        end_rows[length : length + 1] = [k]
+        longest_before = bisect_left(negated_ends, -t_s[k])
+        next_row[k] = end_rows[longest_before - 1] if longest_before else -1
+        negated_ends[longest_before : longest_before + 1] = [-t_s[k]]
+        end_rows[longest_before : longest_before + 1] = [k]
     kept_rows = end_rows[-1:]
     while kept_rows and next_row[kept_rows[-1]] >= 0:
         kept_rows.append(int(next_row[kept_rows[-1]]))

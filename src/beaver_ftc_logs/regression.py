@@ -59,7 +59,9 @@ def build_regressors(
     surface_commands = samples.commands
     if scales_by_labels:
         surface_commands = surface_commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    group_commands = np.column_stack([surface_commands[:, group].sum(axis=1) for group in surface_groups])
+    group_commands = np.column_stack(
+        [surface_commands[:, surface_indices].sum(axis=1) for surface_indices in surface_groups]
+    )
     lagged_rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, n_rate_lags + 1)]
     past_regressors = np.column_stack(
         [*lagged_rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, n_signal_lags + 1))]
@@ -86,14 +88,14 @@ def _delay_rows(values: np.ndarray, lag: int, fill_value: float) -> np.ndarray:
 def surface_indices_by_group(model: Model) -> list[list[int]]:
     """The model's groups as positions of their surfaces."""
     surface_names = list(model.vehicle.surfaces)
-    return [[surface_names.index(name) for name in group] for group in model.groups]
+    return [[surface_names.index(name) for name in group_surfaces] for group_surfaces in model.groups]
 
 
 def group_values_by_surface(group_values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     group_of_surface = np.full(len(model.vehicle.surfaces), -1)
-    for group, surface_indices in enumerate(surface_indices_by_group(model)):
-        group_of_surface[surface_indices] = group
+    for group_index, surface_indices in enumerate(surface_indices_by_group(model)):
+        group_of_surface[surface_indices] = group_index
     return np.asarray(
         np.take(np.column_stack([group_values, np.ones(len(group_values))]), group_of_surface, axis=1)
     )
@@ -130,7 +132,7 @@ def whitened_rates_and_responses(
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
     """As `unexplained_rates_and_responses`, less the prediction of each residual from those before it by the
     flight's noise model: a healthy flight leaves a white residual."""
-    is_predictable, unexplained_rates, responses = unexplained_rates_and_responses(
+    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(
         samples, model, scales_by_labels
     )
     ar_coefficients, is_predictable_whitened = (
@@ -142,7 +144,7 @@ def whitened_rates_and_responses(
     return (
         is_predictable_whitened,
         subtract_noise_prediction(unexplained_rates, ar_coefficients),
-        subtract_noise_prediction(responses, ar_coefficients),
+        subtract_noise_prediction(group_responses, ar_coefficients),
     )
 
 
@@ -151,14 +153,16 @@ def subtract_noise_prediction(values: Floats, ar_coefficients: Floats) -> Floats
     remainder = values.copy()
     if not len(ar_coefficients) or not values.size:
         return remainder
-    series, remaining_series = (
+    source_series_by_axis, target_series_by_axis = (
         np.moveaxis(array.reshape(len(values), -1, 3), 0, -1) for array in (values, remainder)
     )
     for (source_axis, target_axis), taps in zip(
         np.ndindex(3, 3), ar_coefficients.reshape(-1, 9).T, strict=True
     ):
         for source_series, target_series in zip(
-            np.ascontiguousarray(series[:, source_axis]), remaining_series[:, target_axis], strict=True
+            np.ascontiguousarray(source_series_by_axis[:, source_axis]),
+            target_series_by_axis[:, target_axis],
+            strict=True,
         ):
             target_series[1:] -= np.convolve(source_series, taps)[: len(source_series) - 1]
     return remainder

@@ -180,22 +180,24 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     )
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
     effect_power, unexplained_power = np.zeros(len(surface_groups)), np.zeros(len(surface_groups))
-    for g in range(len(surface_groups)):
+    for group_index in range(len(surface_groups)):
         other_lagged_commands = [
-            lagged_commands[:, other_group] for other_group in range(len(surface_groups)) if other_group != g
+            lagged_commands[:, other_group]
+            for other_group in range(len(surface_groups))
+            if other_group != group_index
         ]
         other_regressors = np.column_stack(
             [np.ones(len(past_regressors)), past_regressors, *other_lagged_commands]
         )
-        whitened_effect = lagged_commands[:, g] @ command_response[g] @ whitening_matrix
+        whitened_effect = lagged_commands[:, group_index] @ command_response[group_index] @ whitening_matrix
         whitened_effect = whitened_effect - whitened_effect.mean(axis=0)
-        effect_power[g] = float((whitened_effect**2).sum()) / len(whitened_effect)
-        if effect_power[g] > _MIN_EFFECT_NOISE_POWER_RATIO:
+        effect_power[group_index] = float((whitened_effect**2).sum()) / len(whitened_effect)
+        if effect_power[group_index] > _MIN_EFFECT_NOISE_POWER_RATIO:
             unexplained_effect = (
                 whitened_effect
                 - other_regressors @ np.linalg.lstsq(other_regressors, whitened_effect, rcond=None)[0]
             )
-            unexplained_power[g] = float((unexplained_effect**2).sum()) / len(whitened_effect)
+            unexplained_power[group_index] = float((unexplained_effect**2).sum()) / len(whitened_effect)
     return effect_power, unexplained_power
 
 
@@ -499,7 +501,9 @@ def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floa
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
     whitening_matrix, effective_sample_share, log_noise_sd_product = _flight_noise_whitening(samples, model)
-    is_predictable, unexplained_rates, responses = regression.whitened_rates_and_responses(samples, model)
+    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
+        samples, model
+    )
     rows = np.flatnonzero(is_predictable)
     if (
         rows_by_part := regression.split_into_flight_parts(
@@ -508,7 +512,7 @@ def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floa
     ) is None:
         return None
     regressors_and_targets = [
-        _trim_and_gain_regression_data(part_rows, unexplained_rates, responses, whitening_matrix)
+        _trim_and_gain_regression_data(part_rows, unexplained_rates, group_responses, whitening_matrix)
         for part_rows in rows_by_part
     ]
     noise_variance_scales = [
@@ -558,7 +562,9 @@ def _noise_variance_scale(squared_residuals: Floats) -> float:
 
 def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:
     """None where a part is too short."""
-    is_predictable, unexplained_rates, responses = regression.whitened_rates_and_responses(samples, model)
+    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
+        samples, model
+    )
     if (rows_by_part := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
         return None
     column_contributions, column_names = _column_contributions_to_rates(samples, model)
@@ -576,7 +582,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     )
     noise_variance_scales, responses_and_contributions = (
         [],
-        np.concatenate([responses, column_contributions], axis=1),
+        np.concatenate([group_responses, column_contributions], axis=1),
     )
     for part_rows in rows_by_part:
         regressors, whitened_targets = _trim_and_gain_regression_data(

@@ -30,10 +30,12 @@ def units_of_kind(kind: str) -> list[str]:
     return [name for name, (unit_kind, _) in KIND_AND_SI_FACTOR_OF_UNIT.items() if unit_kind == kind]
 
 
-def nearest_unit(kind: str, factor: float, max_ratio: float) -> str | None:
+def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
     ratio_of_unit = {
-        name: max(factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / factor)
+        name: max(
+            si_factor / KIND_AND_SI_FACTOR_OF_UNIT[name][1], KIND_AND_SI_FACTOR_OF_UNIT[name][1] / si_factor
+        )
         for name in units_of_kind(kind)
     }
     nearest = min(ratio_of_unit, key=lambda name: ratio_of_unit[name])

@@ -91,8 +91,8 @@ class QuantityColumn(Section):
         return values * self.si_factor + self.offset * self.si_factor / self.scale
 
 
-def _expand_column_name(given: Any) -> Any:
-    return {"column": given} if isinstance(given, str) else given
+def _expand_column_name(name_or_section: Any) -> Any:
+    return {"column": name_or_section} if isinstance(name_or_section, str) else name_or_section
 
 
 QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
@@ -291,8 +291,8 @@ class Vehicle(Section):
             "full_deflection_rad": self.full_deflection_rad,
             "airspeed_powers": self.airspeed_powers,
         }
-        for key, table in tables_by_surface.items():
-            mistakes += _unknown_name_mistakes((key,), table, "surface", self.surfaces)
+        for key, value_by_surface in tables_by_surface.items():
+            mistakes += _unknown_name_mistakes((key,), value_by_surface, "surface", self.surfaces)
         for location, kind, quantity in self.quantities_of_known_kind():
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
@@ -326,23 +326,26 @@ class Vehicle(Section):
     def _columns_read_in_two_ways(self) -> list[Conflict]:
         """One column read in two ways."""
         first_quantity_of_column: dict[str, QuantityColumn] = {}
-        for location, one in [
+        for location, quantity in [
             *self.model_quantities(),
-            *((location, one) for location, _, one in self.quantities_of_known_kind()),
+            *((location, quantity) for location, _, quantity in self.quantities_of_known_kind()),
         ]:
-            if first_quantity_of_column.setdefault(one.column, one) != one:
+            if first_quantity_of_column.setdefault(quantity.column, quantity) != quantity:
                 return [
-                    (location, f"{one.column!r} is read in two ways, allowed: one unit, scale and offset")
+                    (
+                        location,
+                        f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset",
+                    )
                 ]
         return []
 
     def model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
         """Rates, commands and signals as they stand in the file."""
         quantities: list[tuple[Location, QuantityColumn]] = [
-            (("rates", x), getattr(self.rates, x)) for x in "pqr"
+            (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
         ]
-        quantities += [(("commands", i), one) for i, one in enumerate(self.commands)]
-        return quantities + [(("signals", i), one) for i, one in enumerate(self.signals)]
+        quantities += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
+        return quantities + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
 
     @property
     def command_columns(self) -> list[str]:

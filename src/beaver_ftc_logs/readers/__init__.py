@@ -24,26 +24,29 @@ _TIME_COLUMNS = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilo
 def read_flight(
     path: Path,
     reader: str | None = None,
-    time: tuple[str, str] | None = None,
+    time_column_and_unit: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
-    reader: one of READERS; by the path's own form where None. time: column and unit of a table's time.
-    columns: those that a log is read for, all where None. Raises BadInput with one line: why the log cannot
-    be used.
+    reader: one of READERS; by the path's own form where None. time_column_and_unit: of a table. columns:
+    those that a log is read for, all where None. Raises BadInput with one line: why the log cannot be used.
     """
-    return next(_read_with_reader(path, reader, time, {"columns": columns, "rows_per_part": None}))
+    return next(
+        _read_with_reader(path, reader, time_column_and_unit, {"columns": columns, "rows_per_part": None})
+    )
 
 
 def read_parts(
     path: Path,
     reader: str | None = None,
-    time: tuple[str, str] | None = None,
+    time_column_and_unit: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return _read_with_reader(path, reader, time, {"columns": columns, "rows_per_part": ROWS_PER_PART})
+    return _read_with_reader(
+        path, reader, time_column_and_unit, {"columns": columns, "rows_per_part": ROWS_PER_PART}
+    )
 
 
 def _read_with_reader(

@@ -34,26 +34,29 @@ TablePart = tuple[TableCells, list[tuple[str, str]], bool]
 
 
 def read(
-    path: Path, time: str | None = None, unit: str = "s", columns: Collection[str] | None = None
+    path: Path,
+    given_time_column: str | None = None,
+    time_unit: str = "s",
+    columns: Collection[str] | None = None,
 ) -> RecordedFlight:
     """The flight in a table. Columns and cells that hold no number are nan.
 
-    time, unit: the column of the time and its unit, `t_s` in s where None. columns: what is read, all where
-    None; the others are nan.
+    given_time_column, time_unit: the column of the time and its unit, `t_s` in s where None. columns: what is
+    read, all where None; the others are nan.
     """
-    return next(read_parts(path, time, unit, columns))
+    return next(read_parts(path, given_time_column, time_unit, columns))
 
 
 def read_parts(
     path: Path,
-    time: str | None = None,
-    unit: str = "s",
+    given_time_column: str | None = None,
+    time_unit: str = "s",
     columns: Collection[str] | None = None,
     rows_per_part: int | None = None,
 ) -> Iterator[RecordedFlight]:
     """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
     numbered, each of which begins with the end of the one before: memory does not grow with the file."""
-    time_column = time or TIME_COLUMN
+    time_column = given_time_column or TIME_COLUMN
     all_columns, parts = _table_parts(
         path, None if columns is None else {time_column, *columns}, rows_per_part
     )
@@ -63,21 +66,24 @@ def read_parts(
             f"{path}: no column {time_column}, allowed: {reason}; it has "
             f"{nearest_names(time_column, all_columns)}"
         )
-    for part_number, (cells, remarks, has_more) in enumerate(parts, 1):
+    for part_number, (cells, column_remarks, has_more) in enumerate(parts, 1):
         table = _with_unread_columns_as_nan(all_columns, cells)
-        notes: dict[str, str] = {}
-        for column, remark in remarks:
-            notes[column] = f"{notes[column]}\n{remark}" if column in notes else remark
-        t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[unit]
+        note_of_column: dict[str, str] = {}
+        for column, remark in column_remarks:
+            note_of_column[column] = (
+                f"{note_of_column[column]}\n{remark}" if column in note_of_column else remark
+            )
+        t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[time_unit]
         kept_rows, lost_lines = _rows_with_time(path, time_column, t_s)
         row_selection = slice(None) if kept_rows is None else kept_rows
         t_s = t_s[row_selection]
         check_time(path, t_s, time_column, cells.n_rows_before)
         flight_columns = {
-            key: Column(t_s, values[row_selection], notes.get(key, "")) for key, values in table.items()
+            column_name: Column(t_s, values[row_selection], note_of_column.get(column_name, ""))
+            for column_name, values in table.items()
         }
         is_whole = part_number == 1 and not has_more
-        all_notes = (*filter(None, notes.get("", "").split("\n")), *lost_lines)
+        all_notes = (*filter(None, note_of_column.get("", "").split("\n")), *lost_lines)
         yield RecordedFlight(
             path.stem if is_whole else f"{path.stem}-part-{part_number}", flight_columns, notes=all_notes
         )

@@ -61,8 +61,8 @@ def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     for one in blocks:
         joined_cells.broken_lines += one.broken_lines
         for name, (n_cells, row, cell) in one.text_cell_summaries.items():
-            earlier = joined_cells.text_cell_summaries.get(name, (0, row, cell))
-            joined_cells.text_cell_summaries[name] = (earlier[0] + n_cells, *earlier[1:])
+            earlier_summary = joined_cells.text_cell_summaries.get(name, (0, row, cell))
+            joined_cells.text_cell_summaries[name] = (earlier_summary[0] + n_cells, *earlier_summary[1:])
     return joined_cells
 
 
@@ -87,20 +87,28 @@ def _unreadable_error(path: Path, reason: str) -> BadInput:
 
 def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout | None:
     """The table that lines hold if this is what is between cells; None if they hold none."""
-    rows = [_split_cells(line, delimiter) for line in lines]
-    for line_index, names in enumerate(rows):
-        rows_below = [row for row in rows[line_index + 1 :] if row][:4]
-        if not rows_below and line_index == 0 and len(names) > 1:
-            return TableLayout(line_index, tuple(names), delimiter, ".")  # a table of no rows
-        has_as_many_cells = [len(row) == len(names) for row in rows_below]
-        if len(names) < 2 or any(_is_number_cell(name) for name in names) or not any(has_as_many_cells):
+    lines_of_cells = [_split_cells(line, delimiter) for line in lines]
+    for line_index, header_cells in enumerate(lines_of_cells):
+        rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
+        if not rows_below and line_index == 0 and len(header_cells) > 1:
+            return TableLayout(line_index, tuple(header_cells), delimiter, ".")  # a table of no rows
+        has_as_many_cells = [len(row) == len(header_cells) for row in rows_below]
+        if (
+            len(header_cells) < 2
+            or any(_is_number_cell(name) for name in header_cells)
+            or not any(has_as_many_cells)
+        ):
             continue
         number_cells = [
-            cell for row in rows_below if len(row) == len(names) for cell in row if _is_number_cell(cell)
+            cell
+            for row in rows_below
+            if len(row) == len(header_cells)
+            for cell in row
+            if _is_number_cell(cell)
         ]
         if number_cells:
             has_decimal_comma = delimiter != "," and any("," in cell for cell in number_cells)
-            column_names = tuple(name.strip() for name in (names[0].lstrip("# "), *names[1:]))
+            column_names = tuple(name.strip() for name in (header_cells[0].lstrip("# "), *header_cells[1:]))
             return TableLayout(line_index, column_names, delimiter, "," if has_decimal_comma else ".")
     return None
 
@@ -221,10 +229,13 @@ def _record_text_cells(column_name: str, cells: Any, is_number: Any, table_cells
 def text_cell_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
-    for name, (n_cells, row, first_cell) in table_cells.text_cell_summaries.items():
+    for name, (n_cells, first_text_row, first_cell) in table_cells.text_cell_summaries.items():
         if np.isfinite(table_cells.numbers[name]).any():
             cells_text = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
-            yield name, f"{name}: {cells_text} no number, the first in row {row}: {first_cell[:30]!r}"
+            yield (
+                name,
+                f"{name}: {cells_text} no number, the first in row {first_text_row}: {first_cell[:30]!r}",
+            )
     if layout.header_line:
         yield "", f"names are in line {layout.header_line + 1}, what is above is left out"
     if layout.delimiter != ",":

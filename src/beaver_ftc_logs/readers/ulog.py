@@ -58,8 +58,10 @@ def _read_topics(path: Path, wanted_columns: Collection[str] | None) -> list[Any
                 _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES
             ):  # pyulog writes every field of one out
                 raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
-        topic_names = {re.sub(r"_\d+$", "", one.partition(".")[0]) for one in wanted_columns or ()}
-        topic_names = (topic_names | {one.partition(".")[0] for one in wanted_columns or ()}) & set(formats)
+        topic_names = {re.sub(r"_\d+$", "", column.partition(".")[0]) for column in wanted_columns or ()}
+        topic_names = (topic_names | {column.partition(".")[0] for column in wanted_columns or ()}) & set(
+            formats
+        )
         topics = list(ULog(str(path), sorted(topic_names) if topic_names else None).data_list)
     return topics
 

@@ -183,23 +183,23 @@ def labels_in_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
     they count in the score. NaN elsewhere."""
     usable_rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
     if usable_rows.size:
-        span = slice(usable_rows[0], usable_rows[-1] + 1)
-        labels[span] = held_out.samples.labels[span]
+        row_span = slice(usable_rows[0], usable_rows[-1] + 1)
+        labels[row_span] = held_out.samples.labels[row_span]
     return labels
 
 
-def summarize_failures(scores: Sequence[Document]) -> Document:
+def summarize_failures(flight_scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
-    failed_flights = [one for one in scores if one["failure"]]
+    failed_flights = [one for one in flight_scores if one["failure"]]
     engine_failures = [one for one in failed_flights if ENGINE in one["failure"]]
     surface_failures = [one for one in failed_flights if ENGINE not in one["failure"]]
     detected_failures = [one for one in surface_failures if one["detected"]]
-    false_alarm_flights = [one for one in scores if one["false_alarms"]]
-    healthy_flights = [one for one in scores if one["failure"] is None]
+    false_alarm_flights = [one for one in flight_scores if one["false_alarms"]]
+    healthy_flights = [one for one in flight_scores if one["failure"] is None]
     quiet_flights = [one for one in healthy_flights if not one["false_alarms"]]
-    hours = sum(one["healthy_s"] for one in scores) / 3600.0
-    false_alarm_rate = poisson(sum(one["false_alarms"] for one in scores), hours)
+    healthy_hours = sum(one["healthy_s"] for one in flight_scores) / 3600.0
+    false_alarm_rate = poisson(sum(one["false_alarms"] for one in flight_scores), healthy_hours)
     n_right = len(detected_failures) + len(quiet_flights)
     return {
         "surface_failures": len(surface_failures),
@@ -214,20 +214,26 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
             "low": false_alarm_rate.low,
             "high": false_alarm_rate.high,
         },
-        "healthy_hours": hours,
+        "healthy_hours": healthy_hours,
         "wrong_group": sum(one["right_group"] is False for one in detected_failures),
-        "delay_s": {kind: _summarize_delays(surface_failures, kind) for kind in SURFACE_KINDS},
+        "delay_s": {
+            surface_kind: _summarize_delays(surface_failures, surface_kind) for surface_kind in SURFACE_KINDS
+        },
         "engine_failures_with_an_alarm": sum(one["detected"] for one in engine_failures),
     }
 
 
-def _summarize_delays(surface_failures: Sequence[Document], kind: str) -> Document:
+def _summarize_delays(surface_failures: Sequence[Document], surface_kind: str) -> Document:
     """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
     counts: an aileron before a rudder."""
     failures_of_kind = [
         one
         for one in surface_failures
-        if min(_KIND_OF_SURFACE.get(s, s) for s in one["failure"].split("+")) == kind
+        if min(
+            _KIND_OF_SURFACE.get(failed_surface, failed_surface)
+            for failed_surface in one["failure"].split("+")
+        )
+        == surface_kind
     ]
     delays_s = [one["delay_s"] for one in failures_of_kind if one["detected"]]
     return {
@@ -238,14 +244,16 @@ def _summarize_delays(surface_failures: Sequence[Document], kind: str) -> Docume
     }
 
 
-def summarize_labels(scores: Sequence[Document]) -> Document:
+def summarize_labels(part_scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
-    scores = [one for one in scores if one["rows"]]
-    if not scores:
+    part_scores = [one for one in part_scores if one["rows"]]
+    if not part_scores:
         return {**dict.fromkeys(SCORE_TITLES), "rows": 0}
-    weights = np.array([one["rows"] for one in scores], dtype=float)
-    means = {key: float(np.average([one[key] for one in scores], weights=weights)) for key in SCORE_TITLES}
-    return means | {"rows": int(weights.sum())}
+    row_counts = np.array([one["rows"] for one in part_scores], dtype=float)
+    means = {
+        key: float(np.average([one[key] for one in part_scores], weights=row_counts)) for key in SCORE_TITLES
+    }
+    return means | {"rows": int(row_counts.sum())}
 
 
 def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
@@ -301,12 +309,12 @@ def _label_score_cells(row: Document) -> list[str]:
 
 def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
-    delay_summaries = [row["delay_s"].get(kind, {}) for kind in SURFACE_KINDS]
+    delay_summaries = [row["delay_s"].get(surface_kind, {}) for surface_kind in SURFACE_KINDS]
     cells = [row["method"], *_share_texts(row, FAILURE_TABLE_HEADER[1:4]), *map(_delay_text, delay_summaries)]
     if "false_alarms_per_hour" not in row:
         return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
     n_within_5_s, n_failures = (
-        sum(delay[key] for delay in delay_summaries[:2]) for key in ("within_5_s", "failures")
+        sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
     )
     false_alarm_rate = row["false_alarms_per_hour"]
     return [

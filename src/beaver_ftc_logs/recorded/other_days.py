@@ -62,11 +62,11 @@ def unchanged_day(n_surfaces: int) -> DayChanges:
     return DayChanges("as it was", np.zeros(n_surfaces), np.zeros(n_surfaces), np.ones(n_surfaces))
 
 
-def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
-    """One thing changed at a time. mixer (S, C)."""
-    unchanged = unchanged_day(len(mixer))
+def one_change_days(mixer_shares: Floats, command_names: list[str]) -> list[DayChanges]:
+    """One thing changed at a time. mixer_shares (S, C): share of each command in each surface."""
+    unchanged = unchanged_day(len(mixer_shares))
     days = [unchanged]
-    for command, surface_shares in zip(commands, mixer.T, strict=True):
+    for command, surface_shares in zip(command_names, mixer_shares.T, strict=True):
         for shift in (-0.04, 0.04):
             days.append(
                 replace(
@@ -92,7 +92,7 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
         replace(unchanged, name="noise 1.5", noise_ratio=1.5),
         replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01),
     ]
-    for i, unit_row in enumerate(np.eye(len(mixer))):
+    for i, unit_row in enumerate(np.eye(len(mixer_shares))):
         for gain in (0.94, 1.06):
             surface_gains = np.where(unit_row, gain, 1.0)
             days.append(
@@ -252,12 +252,13 @@ def _score_days(
 
 def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
-    mean = {key: float(np.mean(figure_values)) for key, figure_values in values.items()}
+    values_of_figure = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
+    mean = {key: float(np.mean(figure_values)) for key, figure_values in values_of_figure.items()}
     return {
         "kind": kind,
         "mean": mean,
         "worst": {
-            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(figure_values) for k, figure_values in values.items()
+            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(figure_values)
+            for k, figure_values in values_of_figure.items()
         },
     }

@@ -22,7 +22,12 @@ from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_age_at
-from beaver_ftc_logs.stepped import ReplayedVerdicts, declared_errors, replay_samples, rows_of_replay
+from beaver_ftc_logs.stepped import (
+    ReplayedVerdicts,
+    declared_errors,
+    diagnosis_rows_from_replay,
+    replay_samples,
+)
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
 if TYPE_CHECKING:
@@ -160,7 +165,7 @@ def diagnose_inputs(
     replayed_flight = _join_stretch_diagnoses(
         len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), gap_free_stretches, replayed_by_stretch
     )
-    rows = rows_of_replay(
+    rows = diagnosis_rows_from_replay(
         samples.t_s, replayed_flight, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
     )
     rows_by_reason = _undiagnosable_rows_by_reason(

@@ -64,7 +64,7 @@ _RATE_UNIT_BY_NAME_PART = {
 _PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
 _MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
 _MIN_ANGLE_RATE_CORRELATION = 0.7
-_MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
+_MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _PLAUSIBLE_LOG_RATES_HZ = (4.0, 2000.0)
 
 
@@ -304,7 +304,7 @@ def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | N
     columns_of_other_quantities = set(column_of_quantity.values())
     return [
         name for name in names if _may_be_command_column(name) and name not in columns_of_other_quantities
-    ][:_MAX_COMMANDS]
+    ][:_MAX_PROPOSED_COMMANDS]
 
 
 def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:

@@ -30,9 +30,9 @@ from beaver_ftc_logs.bank import build_hypothesis_bank
 from beaver_ftc_logs.diagnose import (
     UNKNOWN_SURFACE,
     DiagnosisRows,
-    blank_rows_not_credible,
     check_log_fits_model,
     diagnose,
+    finalize_rows_at_log_stamps,
     join_flagged_names,
     standardized_healthy_residual,
 )
@@ -71,7 +71,9 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
     estimate_covariance = np.linalg.inv(information + prior_information)
     trim_and_effectiveness_change = np.einsum("nij,nj->ni", estimate_covariance, score_vector)
     standard_error = np.sqrt(np.maximum(np.diagonal(estimate_covariance, axis1=1, axis2=2)[:, 3:], 0.0))
-    return _least_squares_rows(samples, model, 1.0 + trim_and_effectiveness_change[:, 3:], standard_error)
+    return _diagnosis_rows_from_least_squares(
+        samples, model, 1.0 + trim_and_effectiveness_change[:, 3:], standard_error
+    )
 
 
 def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
@@ -104,7 +106,7 @@ def _sums_over_memory(values: Floats, dt_s: float, forgets_exponentially: bool) 
     return sums
 
 
-def _least_squares_rows(
+def _diagnosis_rows_from_least_squares(
     samples: Samples, model: Model, effectiveness: Floats, standard_error: Floats
 ) -> DiagnosisRows:
     """Rows of a least-squares estimate. With labelled levels, the effectiveness is the nearest of them, and
@@ -251,8 +253,8 @@ def _model_error_sd_rad_s2(model: Model) -> Floats:
 def loop_detector_context(model: Model) -> Context:
     """Return the context that a detector is given before the flight."""
     dt_s = 1.0 / model.rate_hz
-    noise_sd = np.zeros(7)
-    noise_sd[:3] = _DECLARED_GYRO_NOISE_RAD_S
+    declared_noise_sd = np.zeros(7)
+    declared_noise_sd[:3] = _DECLARED_GYRO_NOISE_RAD_S
     design_model: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design_model, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
@@ -260,7 +262,7 @@ def loop_detector_context(model: Model) -> Context:
         travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES_WITH_FLAP)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
         surfaces=(*LOOP_SURFACES_FOR_GROUPS, "flap"),
-        declared=Declared(noise=noise_sd, model_rad_s2=_model_error_sd_rad_s2(model)),
+        declared=Declared(noise=declared_noise_sd, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
 
@@ -268,10 +270,10 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Dia
     """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
     detector_inputs = loop_detector_inputs(samples, model)
     detector.reset(loop_detector_context(model))
-    return rows_of_verdicts([detector.step(*frame) for frame in detector_inputs], samples, model)
+    return diagnosis_rows_from_verdicts([detector.step(*frame) for frame in detector_inputs], samples, model)
 
 
-def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
+def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> DiagnosisRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n_samples, surface_groups = len(verdicts), surface_indices_by_group(model)
     faulty = np.array([_raises_alarm(verdict) for verdict in verdicts], dtype=np.int64)
@@ -337,10 +339,10 @@ def diagnose_with_detector(detector_name: str, samples: Samples, model: Model) -
         return diagnose(samples, model)
     samples_without_frozen_rates = with_rates_unknown_where_frozen_or_clipped(samples, model)
     if detector_name in _FLIGHT_DETECTORS:
-        return blank_rows_not_credible(
+        return finalize_rows_at_log_stamps(
             samples, model, _FLIGHT_DETECTORS[detector_name](samples_without_frozen_rates, model)
         )
     detector: Detector = made(DETECTORS, detector_name)
-    return blank_rows_not_credible(
+    return finalize_rows_at_log_stamps(
         samples, model, run_loop_detector(detector, samples_without_frozen_rates, model)
     )

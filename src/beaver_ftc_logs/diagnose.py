@@ -96,15 +96,15 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     samples_without_frozen_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
     posterior, _, _ = hypothesis_posterior(samples_without_frozen_rates, model, bank)
     has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
-    rows = rows_of_posterior(samples, model, bank, posterior)
+    rows = diagnosis_rows_from_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
         rows = _withdraw_contradicted_isolation(
             samples_without_frozen_rates, model, rows, model.settings.alarm_threshold
         )
-    return blank_rows_not_credible(samples, model, rows, has_no_response)
+    return finalize_rows_at_log_stamps(samples, model, rows, has_no_response)
 
 
-def blank_rows_not_credible(
+def finalize_rows_at_log_stamps(
     samples: Samples,
     model: Model,
     rows: DiagnosisRows,
@@ -263,7 +263,7 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
     trust.check_columns_as_identified(samples, model)
 
 
-def rows_of_posterior(
+def diagnosis_rows_from_posterior(
     samples: Samples, model: Model, bank: HypothesisBank, posterior: Floats
 ) -> DiagnosisRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H)."""

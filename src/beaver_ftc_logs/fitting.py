@@ -18,7 +18,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, regression, trust
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_trim_and_gain_state_model
-from beaver_ftc_logs.diagnose import DiagnosisRows, rows_of_posterior
+from beaver_ftc_logs.diagnose import DiagnosisRows, diagnosis_rows_from_posterior
 from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
@@ -1092,7 +1092,7 @@ def _diagnosis_rows_by_credible_mass(
         for mass in {*_CREDIBLE_MASS_CANDIDATES, model.settings.credible_mass}
     ]
     return {
-        settings.credible_mass: rows_of_posterior(
+        settings.credible_mass: diagnosis_rows_from_posterior(
             held_out.samples, model.model_copy(update={"settings": settings}), bank, posterior
         )
         for settings in settings_per_mass

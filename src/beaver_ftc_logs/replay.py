@@ -39,7 +39,7 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
     input_arrays = [np.column_stack([log_columns[name] for name in names]) for names in input_column_names]
     replayed = stepped.replay_samples(diagnosis, input_arrays, scenario.rate_hz)
-    rows = stepped.rows_of_replay(log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi)
+    rows = stepped.diagnosis_rows_from_replay(log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi)
     return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(
         path, scenario, log_columns, replayed.verdicts
     )

@@ -142,7 +142,7 @@ def _sliding_maximum(values: Floats, window_samples: int) -> Floats:
     return np.asarray(filtered_maximum[window_samples - 1 :])
 
 
-def rows_of_replay(
+def diagnosis_rows_from_replay(
     t_s: Floats, replayed: ReplayedVerdicts, surfaces: Sequence[str], fdi_config: Any
 ) -> DiagnosisRows:
     """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""

@@ -25,7 +25,7 @@ TIME_COLUMN = "t_s"
 _BYTES_PER_NUMBER = 8
 _MAX_ROWS, _MAX_NUMBER_BYTES = 10_000_000, 2_000_000_000
 """Largest part of a file that is read at once: 2.8 h at 1000 Hz."""
-_MAX_LAST_PART_FACTOR, _OVERLAP_SHARE, _BATCH_ROWS = 1.2, 0.1, 50_000
+_MAX_LAST_PART_FACTOR, _PART_OVERLAP_SHARE, _BATCH_ROWS = 1.2, 0.1, 50_000
 """So many times the rows of a part has the last at most; their share with which the next begins once more."""
 
 NumberTable = dict[str, Floats]
@@ -82,10 +82,12 @@ def read_parts(
             column_name: Column(t_s, values[row_selection], note_of_column.get(column_name, ""))
             for column_name, values in table.items()
         }
-        is_whole = part_number == 1 and not has_more
+        is_whole_table = part_number == 1 and not has_more
         all_notes = (*filter(None, note_of_column.get("", "").split("\n")), *lost_lines)
         yield RecordedFlight(
-            path.stem if is_whole else f"{path.stem}-part-{part_number}", flight_columns, notes=all_notes
+            path.stem if is_whole_table else f"{path.stem}-part-{part_number}",
+            flight_columns,
+            notes=all_notes,
         )
 
 
@@ -195,7 +197,7 @@ def _join_blocks_into_parts(
                 joined_cells = join_blocks(held_blocks)
                 part_cells, remaining_cells = (
                     joined_cells.select_rows(0, rows_per_part),
-                    joined_cells.select_rows(rows_per_part - round(_OVERLAP_SHARE * rows_per_part)),
+                    joined_cells.select_rows(rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)),
                 )
                 part_cells.text_cell_summaries, part_cells.broken_lines = (
                     joined_cells.text_cell_summaries,

@@ -97,10 +97,10 @@ def test_bounds_lean_on_no_prior_where_laws_differ():
     model = small.model(small.WING | {"other_laws": True})
     bank, samples = build_hypothesis_bank(model), small.flight(model, 50)
     nothing = np.tile(bank.prior_probability, (50, 1))
-    rows = diagnose.rows_of_posterior(samples, model, bank, nothing)
+    rows = diagnose.diagnosis_rows_from_posterior(samples, model, bank, nothing)
     assert (rows.effectiveness_high - rows.effectiveness_low >= 0.9).all()
     plain = small.model()
-    rows = diagnose.rows_of_posterior(
+    rows = diagnose.diagnosis_rows_from_posterior(
         samples,
         plain,
         build_hypothesis_bank(plain),

@@ -136,7 +136,7 @@ def test_rows_of_probabilities(changed, name):
     bank = build_hypothesis_bank(WING)
     shares = posterior(bank, *SHARES[name])
     samples = small.flight(WING, len(shares))
-    found = diagnose.rows_of_posterior(samples, WING, bank, shares)
+    found = diagnose.diagnosis_rows_from_posterior(samples, WING, bank, shares)
     assert not changed(held(found))
     assert found.t_s is samples.t_s
 
@@ -144,13 +144,17 @@ def test_rows_of_probabilities(changed, name):
 def test_rows_of_surfaces_together_that_may_be_stuck(changed):
     bank = build_hypothesis_bank(TAIL)
     shares = posterior(bank, *STUCK)
-    assert not changed(held(diagnose.rows_of_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares)))
+    assert not changed(
+        held(diagnose.diagnosis_rows_from_posterior(small.flight(TAIL, len(shares)), TAIL, bank, shares))
+    )
 
 
 def test_names_by_hand():
     """An offset of no known cause keeps the name that stood; none is named where the fault is split."""
     bank = build_hypothesis_bank(TAIL)
-    found = diagnose.rows_of_posterior(small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK))
+    found = diagnose.diagnosis_rows_from_posterior(
+        small.flight(TAIL, len(STUCK)), TAIL, bank, posterior(bank, *STUCK)
+    )
     assert found.faulty.tolist() == [1, 1, 1, 1, 0, 1, 1, 0]
     aileron = "left_aileron+right_aileron"
     assert found.isolated_surfaces.tolist() == ["elevator"] * 3 + ["elevator", "", aileron, aileron, ""]
@@ -185,7 +189,9 @@ def test_names_under_other_laws(monkeypatch):
     bank = build_hypothesis_bank(model)
 
     def named_by(of):
-        found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
+        found = diagnose.diagnosis_rows_from_posterior(
+            small.flight(of, len(shares)), of, bank, posterior(bank, *shares)
+        )
         assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
         return found.isolated_surfaces.tolist()
 

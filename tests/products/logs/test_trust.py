@@ -10,7 +10,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting, identification, trust
 from beaver_ftc_logs.bank import build_trim_and_gain_state_model
 from beaver_ftc_logs.column_mistakes import CorrectedLog
-from beaver_ftc_logs.diagnose import blank_rows_not_credible, diagnose
+from beaver_ftc_logs.diagnose import diagnose, finalize_rows_at_log_stamps
 from beaver_ftc_logs.findings import as_text, isolability_document, verdict_document
 from beaver_ftc_logs.model import FittedRanges
 from products.logs import small
@@ -264,7 +264,7 @@ def test_a_model_that_was_fitted_on_little_says_little(model):
 def test_commands_that_nothing_follows_are_not_credible(model):
     flown = small.flight(model, n=600, seed=4)
     still = np.arange(600) >= 400
-    rows = blank_rows_not_credible(flown, model, diagnose(flown, model), has_no_response=still)
+    rows = finalize_rows_at_log_stamps(flown, model, diagnose(flown, model), has_no_response=still)
     assert (rows.credible == 0).tolist() == still.tolist()
     assert silent(rows)[still].all()
     assert [reason.split(":")[0] for reason in rows.not_credible_rows_by_reason] == [

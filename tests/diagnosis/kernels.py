@@ -114,7 +114,8 @@ def of_stages(fdi, kernel):
     later = "deflection" in kernel.__name__
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
-        "pair": types["pair"], "conclusion": fdi["verdict"], "layout": fdi["layout"],
+        **dict.fromkeys(("pair", "pair_record"), types["pair"]),
+        "conclusion": fdi["verdict"], "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
         **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(

@@ -102,23 +102,23 @@ def withdraw_conclusion_for_sensor_fault(conclusion):
 
 
 @kernel
-def update_isolation_interval(conclusion, surface, is_isolated, t):
+def update_isolation_interval(conclusion, surface_index, is_isolated, t):
     """Record at t s whether a surface is isolated, and store an isolation that is withdrawn. If the store is
     full, the latest one replaces the last."""
-    isolated_from_s = conclusion.isolated_from_s[surface]
+    isolated_from_s = conclusion.isolated_from_s[surface_index]
     if is_isolated and isolated_from_s < 0.0:
-        conclusion.isolated_from_s[surface] = t
+        conclusion.isolated_from_s[surface_index] = t
     elif isolated_from_s >= 0.0 and not is_isolated:
         withdrawn_isolation = conclusion.withdrawn_isolations[
             min(conclusion.n_withdrawn_isolations, MAX_WITHDRAWN_ISOLATIONS - 1)
         ]
         withdrawn_isolation.surface, withdrawn_isolation.from_s, withdrawn_isolation.to_s = (
-            surface,
+            surface_index,
             isolated_from_s,
             t,
         )
         conclusion.n_withdrawn_isolations += 1
-        conclusion.isolated_from_s[surface] = -1.0
+        conclusion.isolated_from_s[surface_index] = -1.0
 
 
 @kernel
@@ -195,27 +195,30 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
                 and statistical.estimate_loss(statistical_detector.block, s)[1]
                 > MIN_LOSS_INFORMATION_TO_APPLY_IMMEDIATELY
             )
-            theta = estimated_theta_of_isolated_loss(
+            estimated_theta = estimated_theta_of_isolated_loss(
                 config, conclusion, layout, estimators, statistical_detector, s
             )
-            assessment.effectiveness[s], assessment.apply_immediately[s] = 1.0 + theta, is_loss_precise
+            assessment.effectiveness[s], assessment.apply_immediately[s] = (
+                1.0 + estimated_theta,
+                is_loss_precise,
+            )
 
 
 @kernel
 def assess_surface_at_fault(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     surface = types.surface[s]
-    is_at_fault, mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
-    if mode == SCALE_COMMAND:
+    is_at_fault, accommodation_mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
+    if accommodation_mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
-    elif mode == GIVE_UP:
+    elif accommodation_mode == GIVE_UP:
         assessment.effectiveness[s], assessment.apply_immediately[s] = 0.0, 1
         assessment.deflection_offset[s] = (
             surface.last_observation.healthy_position + verdict.deflection_error(surface, is_at_fault)
         )
-    elif mode == SUBTRACT_OFFSET:
+    elif accommodation_mode == SUBTRACT_OFFSET:
         assessment.deflection_offset[s] = verdict.deflection_error(surface, is_at_fault)
-    elif mode == WAIT_FOR_SURFACE:
+    elif accommodation_mode == WAIT_FOR_SURFACE:
         assessment.deflection_lag[s] = observed_deflection_error(surface)
         assessment.any_surface_lags = 1
 

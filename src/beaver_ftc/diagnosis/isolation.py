@@ -64,7 +64,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 from beaver_ftc.scenario.schema import Scenario
 
-EMPTY_SET = (1.0, -1.0)
+EMPTY_THETA_INTERVAL = (1.0, -1.0)
 N_DEFLECTION_BOUND_ITERATIONS = (
     4  # each round reduces the remaining travel to the share of it that the tolerance is
 )
@@ -74,10 +74,10 @@ N_DEFLECTION_BOUND_ITERATIONS = (
 def uncertainty_explains_innovation(innovation, innovation_bound):
     """True if the declared uncertainty alone explains an innovation (3,): |nu| <= innovation_bound (3,),
     rad/s2."""
-    is_within = True
+    is_within_bound = True
     for i in range(3):
-        is_within = is_within and abs(innovation[i]) <= innovation_bound[i]
-    return is_within
+        is_within_bound = is_within_bound and abs(innovation[i]) <= innovation_bound[i]
+    return is_within_bound
 
 
 @kernel
@@ -85,7 +85,7 @@ def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min
     """The theta of [theta_min, theta_max] with |measured_effect - theta regressor| <= error_bound, as (low,
     high); low > high if none."""
     if regressor == 0.0:
-        return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_SET
+        return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_THETA_INTERVAL
     end_at_lower_effect, end_at_upper_effect = (
         (measured_effect - error_bound) / regressor,
         (measured_effect + error_bound) / regressor,
@@ -96,20 +96,20 @@ def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min
 
 
 @kernel
-def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, effect, axis):
+def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, fault_effect, axis):
     """The interval of theta that is consistent with an innovation (3,) rad/s2 on axis i.
 
     It is the whole known set if the axis is ignored. innovation_bound (3,) rad/s2: without a fault;
-    effect: acceleration by the fault, of dtype FAULT_EFFECT_RECORD.
+    fault_effect: acceleration by the fault, of dtype FAULT_EFFECT_RECORD.
     """
     if fie.ignored_axes[axis]:
         return fie.theta_min, fie.theta_max
     measured_effect, error_bound = (
-        innovation[axis] - effect.acceleration_at_zero_theta[axis],
-        innovation_bound[axis] + effect.error_bound[axis],
+        innovation[axis] - fault_effect.acceleration_at_zero_theta[axis],
+        innovation_bound[axis] + fault_effect.error_bound[axis],
     )
     return consistent_theta_interval(
-        measured_effect, error_bound, effect.regressor[axis], fie.theta_min, fie.theta_max
+        measured_effect, error_bound, fault_effect.regressor[axis], fie.theta_min, fie.theta_max
     )
 
 
@@ -132,19 +132,19 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
     round gives a valid bound. If a frame has several substeps, the surface may still be where it was a frame
     before at the first of them. The same holds for a map of the model's error, which is for healthy surfaces.
     """
-    s, effect = fie.surface, fie.frame_mean_effect
-    axis = axis_of_largest_effect(effect.regressor)
+    s, fault_effect = fie.surface, fie.frame_mean_effect
+    axis = axis_of_largest_effect(fault_effect.regressor)
     previous_max_abs_deflection, max_abs_deflection = (
         fie.max_abs_deflection_in_last_frame,
         max(abs(fie.theta_min), abs(fie.theta_max)),
     )
     effect_error_bound, error_map, position_range = (
-        effect.error_bound[axis],
+        fault_effect.error_bound[axis],
         bound_record.model_error_map,
         (fie.theta_min, fie.theta_max),
     )
     map_level_index = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
-    measured_effect = innovation[axis] - effect.acceleration_at_zero_theta[axis]
+    measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
     first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         extra_error_bound = max(
@@ -156,7 +156,7 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
         position_low, position_high = consistent_theta_interval(
             measured_effect,
             bound_record.frame_innovation_bound[axis] + effect_error_bound + extra_error_bound,
-            effect.regressor[axis],
+            fault_effect.regressor[axis],
             fie.theta_min,
             fie.theta_max,
         )
@@ -173,12 +173,12 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
             error_map, s, position_range, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
-        effect.error_bound[i] += max(
+        fault_effect.error_bound[i] += max(
             bound_record.surface_error_per_rad[i, s] * (max_abs_deflection + first_substep_allowance_rad)
             - bound_record.surface_error_at_command[i, s],
             0.0,
         )
-        effect.error_bound[i] += bound_record.additional_error_by_travel_level[map_level_index, i]
+        fault_effect.error_bound[i] += bound_record.additional_error_by_travel_level[map_level_index, i]
 
 
 @kernel
@@ -221,13 +221,13 @@ def reset_feasible_theta_sets(fie, projection_disabled):
 
 
 @kernel
-def intersect_feasible_theta_sets(fie, axis, interval, shared_by_axes):
-    """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `interval`."""
-    theta_low, theta_high = interval
-    for j in range(3):
-        if shared_by_axes or j == axis:
-            fie.feasible_theta_min[j] = max(fie.feasible_theta_min[j], theta_low)
-            fie.feasible_theta_max[j] = min(fie.feasible_theta_max[j], theta_high)
+def intersect_feasible_theta_sets(fie, axis, theta_interval, shared_by_axes):
+    """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `theta_interval`."""
+    theta_low, theta_high = theta_interval
+    for other_axis in range(3):
+        if shared_by_axes or other_axis == axis:
+            fie.feasible_theta_min[other_axis] = max(fie.feasible_theta_min[other_axis], theta_low)
+            fie.feasible_theta_max[other_axis] = min(fie.feasible_theta_max[other_axis], theta_high)
 
 
 @kernel
@@ -261,10 +261,10 @@ def narrow_feasible_theta_sets(fie, innovation, innovation_bound, shared_by_axes
 
 
 @kernel
-def set_effect_error_bound(effect, effect_error_bound, surface):
+def set_effect_error_bound(fault_effect, effect_error_bound, surface_index):
     """Set the error bound of a fault's effect to that of its surface; effect_error_bound (3, n) rad/s2."""
     for i in range(3):
-        effect.error_bound[i] = effect_error_bound[i, surface]
+        fault_effect.error_bound[i] = effect_error_bound[i, surface_index]
 
 
 @kernel
@@ -278,14 +278,14 @@ def clear_mean_effect(mean_effect):
 
 
 @kernel
-def add_to_mean_effect(mean_effect, effect, block_share_of_frame):
+def add_to_mean_effect(mean_effect, fault_effect, block_share_of_frame):
     """Add the effect of a frame, a `block_share_of_frame` of the block, to the mean over the block."""
     for i in range(3):
         mean_effect.acceleration_at_zero_theta[i] += (
-            block_share_of_frame * effect.acceleration_at_zero_theta[i]
+            block_share_of_frame * fault_effect.acceleration_at_zero_theta[i]
         )
-        mean_effect.regressor[i] += block_share_of_frame * effect.regressor[i]
-        mean_effect.error_bound[i] += block_share_of_frame * effect.error_bound[i]
+        mean_effect.regressor[i] += block_share_of_frame * fault_effect.regressor[i]
+        mean_effect.error_bound[i] += block_share_of_frame * fault_effect.error_bound[i]
 
 
 # Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
@@ -311,7 +311,7 @@ ISOLATION_ESTIMATOR_RECORD = record(
 
 
 @sized
-def isolation_dtype(surfaces: int) -> np.dtype:
+def isolation_dtype(n_surfaces: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
     them is sharpened. adapts_by_gradient: else by least squares; projection_disabled: their estimates may
     leave the known set. isolation_hold_off_s: for so long the one left is not isolated yet."""
@@ -319,9 +319,9 @@ def isolation_dtype(surfaces: int) -> np.dtype:
         n_estimators=int, threshold_kind=int, forgetting_factor=float, filter_decay=3, uses_reach_test=int,
         shares_theta_across_axes=int, narrows_theta_sets=int,
         adapts_by_gradient=int, gradient_gain=float, projection_disabled=int, isolation_hold_off_s=float,
-        can_be_lost_by_damage=(int, surfaces),
+        can_be_lost_by_damage=(int, n_surfaces),
     )  # fmt: skip
-    return record(config=config, estimator=(ISOLATION_ESTIMATOR_RECORD, 2 * surfaces))
+    return record(config=config, estimator=(ISOLATION_ESTIMATOR_RECORD, 2 * n_surfaces))
 
 
 ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S = (
@@ -381,10 +381,12 @@ def configure_isolation(
     travel_including_neutral = np.array(
         [np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)]
     )  # a share of it can be left
-    for fie, (_, kind, surface_index) in zip(isolation["estimator"], estimator_entries, strict=False):
-        fie["hypothesis_kind"], fie["surface"] = kind, surface_index
+    for fie, (_, hypothesis_kind, surface_index) in zip(
+        isolation["estimator"], estimator_entries, strict=False
+    ):
+        fie["hypothesis_kind"], fie["surface"] = hypothesis_kind, surface_index
         fie["theta_min"], fie["theta_max"] = (
-            LOSS_THETA_RANGE if kind == LOSS else travel_including_neutral[:, surface_index]
+            LOSS_THETA_RANGE if hypothesis_kind == LOSS else travel_including_neutral[:, surface_index]
         )
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
             fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface_index] == PITCH else (0, 1, 0)
@@ -404,16 +406,16 @@ def configure_isolation(
 
 
 @kernel
-def fill_effect_of_hypothesis(hypothesis_kind, surface, G, Gu, acceleration_at_zero_theta, regressor):
+def fill_effect_of_hypothesis(hypothesis_kind, surface_index, G, Gu, acceleration_at_zero_theta, regressor):
     """Fill acceleration_at_zero_theta (3,) rad/s2 and regressor (3,) rad/s2 per unit of theta, for one fault.
 
     G (3, n) rad/s2 per rad; Gu (3, n) rad/s2, the acceleration each commanded surface would give if healthy.
     """
     for i in range(3):
         if hypothesis_kind == POSITION:
-            acceleration_at_zero_theta[i], regressor[i] = -Gu[i, surface], G[i, surface]
+            acceleration_at_zero_theta[i], regressor[i] = -Gu[i, surface_index], G[i, surface_index]
         else:
-            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu[i, surface]
+            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu[i, surface_index]
 
 
 @kernel
@@ -425,11 +427,16 @@ def update_fault_effect_and_reach(
     G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame.
     effect_error_bound (3, n) rad/s2: error of the mean if a fault changes within the frame.
     """
-    effect = fie.frame_mean_effect
+    fault_effect = fie.frame_mean_effect
     fill_effect_of_hypothesis(
-        fie.hypothesis_kind, fie.surface, G, Gu, effect.acceleration_at_zero_theta, effect.regressor
+        fie.hypothesis_kind,
+        fie.surface,
+        G,
+        Gu,
+        fault_effect.acceleration_at_zero_theta,
+        fault_effect.regressor,
     )
-    set_effect_error_bound(effect, effect_error_bound, fie.surface)
+    set_effect_error_bound(fault_effect, effect_error_bound, fie.surface)
     if (
         bound_record.has_declared_surface_errors or bound_record.model_error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
@@ -465,7 +472,7 @@ def start_estimators(isolation, gyro_error_change_bound, x):
 @kernel
 def update_residual_and_thresholds(fie, threshold_kind, x):
     """Compute the residual and its thresholds; true if it is within them on every axis not ignored."""
-    is_within = True
+    is_within_thresholds = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
         theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound = (
@@ -492,10 +499,10 @@ def update_residual_and_thresholds(fie, threshold_kind, x):
                 theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound
             )
         fie.lower_threshold[i], fie.upper_threshold[i] = threshold_interval
-        is_within = is_within and (
+        is_within_thresholds = is_within_thresholds and (
             fie.lower_threshold[i] <= fie.residual[i] <= fie.upper_threshold[i] or fie.ignored_axes[i]
         )
-    return is_within
+    return is_within_thresholds
 
 
 @kernel

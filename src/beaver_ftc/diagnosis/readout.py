@@ -269,19 +269,20 @@ class DiagnosisReadout:
     @cached_property
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
-        bound = self._fdi["bound"]
-        declared_errors = bound["declared_errors"]
+        bound_record = self._fdi["bound"]
+        declared_errors = bound_record["declared_errors"]
         has_declared_errors = bool(declared_errors["has_declared_errors"])
         gyro_error_offset, gyro_constant_error, gyro_error_per_rate = (
             declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
             for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
         )
         return DeclaredBounds(
-            eta_bar_rad_s2=bound["eta_bar"].copy(),
-            gyro_error_change_bound_rad_s=bound["gyro_error_change_bound"].copy(),
-            inertia_coupling_share=bound["inertia_coupling"].copy(),
-            constant_error_bound_rad_s2=bound["constant_error_bound"].copy(),
-            earth_rate_rad_s=float(bound["earth_rate_rad_s"]), gyro_error_offset_rad_s=gyro_error_offset,
+            eta_bar_rad_s2=bound_record["eta_bar"].copy(),
+            gyro_error_change_bound_rad_s=bound_record["gyro_error_change_bound"].copy(),
+            inertia_coupling_share=bound_record["inertia_coupling"].copy(),
+            constant_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
+            earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
+            gyro_error_offset_rad_s=gyro_error_offset,
             gyro_constant_error_rad_s=gyro_constant_error, gyro_error_per_rate=gyro_error_per_rate,
         )  # fmt: skip
 
@@ -352,20 +353,23 @@ def certificate_arrays_of_every_frame(
     hypothesis' fault. excluded, types: what is excluded. Of faults of every type: least and greatest order to
     each surface, and position of a healthy one, rad.
     """
-    estimators, surfaces = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
+    estimators, surface_records = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     array_by_name = {
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
         "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
         "slope": estimators["frame_mean_effect"]["regressor"],
         "spread": estimators["frame_mean_effect"]["error_bound"], "excluded": estimators["excluded"],
-        "types": surfaces["feasible_sets"]["excluded"],
+        "types": surface_records["feasible_sets"]["excluded"],
     }  # fmt: skip
     if diagnoses_all_types:
-        commands = surfaces["commands"]
-        array_by_name |= {"command_low": commands["min_command"], "command_high": commands["max_command"]}
+        command_records = surface_records["commands"]
         array_by_name |= {
-            "least": commands["min_healthy_position"],
-            "greatest": commands["max_healthy_position"],
+            "command_low": command_records["min_command"],
+            "command_high": command_records["max_command"],
+        }
+        array_by_name |= {
+            "least": command_records["min_healthy_position"],
+            "greatest": command_records["max_healthy_position"],
         }
     return array_by_name
 
@@ -394,16 +398,16 @@ def certificate_arrays_until_alarm(
         "reach_high": estimators["reachable_bank_residual_high"],
     }
     if has_statistical_detector:
-        detector = fdi["statistical"]
-        blocks, gust = detector["block"], detector["gust"]["output"]
-        array_by_name |= {name: blocks[name] for name in RECORDED_BLOCK_FIELDS}
+        statistical_detector = fdi["statistical"]
+        block_records, gust_output = statistical_detector["block"], statistical_detector["gust"]["output"]
+        array_by_name |= {name: block_records[name] for name in RECORDED_BLOCK_FIELDS}
         array_by_name |= {
-            "signature": blocks["hypothesis"]["signature"],
-            "bounded": detector["noise"]["uncertainty_bound"],
+            "signature": block_records["hypothesis"]["signature"],
+            "bounded": statistical_detector["noise"]["uncertainty_bound"],
         }
         array_by_name |= {
-            "air": gust["mean_gust_acceleration"],
-            "leap": gust["acceleration_variance_by_axes_turn"],
+            "air": gust_output["mean_gust_acceleration"],
+            "leap": gust_output["acceleration_variance_by_axes_turn"],
         }
     return array_by_name
 
@@ -463,11 +467,12 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     output, redundancy = monitor["output"], monitor["redundancy"]
     config, memory = redundancy["config"], redundancy["memory"]
     worst_test_index = int(output["worst_test_index"])
-    test = redundancy["test"][worst_test_index]
+    worst_test_record = redundancy["test"][worst_test_index]
     worst_sensor_test = SensorTest(
-        float(test["residual"]), float(test["bound_per_s"]), float(test["bound_per_sample"]),
-        float(test["residual_per_gust_speed"]), test["filtered_residual"].copy(),
-        test["filtered_bound"].copy(),
+        float(worst_test_record["residual"]), float(worst_test_record["bound_per_s"]),
+        float(worst_test_record["bound_per_sample"]),
+        float(worst_test_record["residual_per_gust_speed"]), worst_test_record["filtered_residual"].copy(),
+        worst_test_record["filtered_bound"].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,

@@ -125,27 +125,27 @@ def angle_of_chord(chord):
 
 
 @kernel
-def chord_of_angle(angle):
+def chord_of_angle(angle_rad):
     """2 sin(|angle| / 2) of an angle, rad; of more than half a turn as of half a turn."""
-    return 2.0 * np.sin(0.5 * min(abs(angle), np.pi))
+    return 2.0 * np.sin(0.5 * min(abs(angle_rad), np.pi))
 
 
 @kernel
-def standard_air_density(altitude):
-    """Return the density of the standard troposphere, kg/m3; altitude m."""
-    temperature_ratio = max(1.0 - 2.25577e-5 * altitude, MIN_TEMPERATURE_OVER_SEA_LEVEL)
+def standard_air_density(altitude_m):
+    """Return the density of the standard troposphere, kg/m3, at altitude_m."""
+    temperature_ratio = max(1.0 - 2.25577e-5 * altitude_m, MIN_TEMPERATURE_OVER_SEA_LEVEL)
     return 1.225 * temperature_ratio**4.2559
 
 
 @kernel
-def set_error_bounds_at_start(initial_errors, signal):
+def set_error_bounds_at_start(initial_errors, readings):
     """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
     bound_at_start = initial_errors.error_bound_at_start
-    bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(signal[ALPHA]) + MAX_FLOW_ANGLE_RAD)
-    bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(signal[BETA]) + MAX_FLOW_ANGLE_RAD)
-    V = max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
+    bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
+    bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
+    V = max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
     standard_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
-        2.0 * max(signal[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(signal[ALTITUDE])
+        2.0 * max(readings[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(readings[ALTITUDE])
     )
     (
         max_reading_over_truth,
@@ -192,15 +192,19 @@ def update_error_change_bounds(redundancy, initial_errors):
 
 
 @kernel
-def fill_effects_per_unit_error(redundancy, initial_errors, signal):
+def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     """Fill `max_effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
     `coupling_effect_per_unit_error` (N_COUPLINGS,).
 
-    Both are taken at the sample before, from which this sample, signal (N_SENSORS,), is predicted.
+    Both are taken at the sample before, from which this sample, readings (N_SENSORS,), is predicted.
     """
-    reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
-    p, q, r = reading[0], reading[1], reading[2]
-    V, phi, theta = max(reading[AIRSPEED], MIN_AIRSPEED_MPS), reading[PHI], reading[THETA]
+    previous_reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
+    p, q, r = previous_reading[0], previous_reading[1], previous_reading[2]
+    V, phi, theta = (
+        max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS),
+        previous_reading[PHI],
+        previous_reading[THETA],
+    )
     max_effect, coupling_effect = (
         initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
@@ -244,7 +248,7 @@ def fill_effects_per_unit_error(redundancy, initial_errors, signal):
     fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
-    log_airspeed_change = np.log(max(signal[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    log_airspeed_change = np.log(max(readings[AIRSPEED], MIN_AIRSPEED_MPS) / V)
     max_effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
     coupling_effect[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_airspeed_change
 
@@ -258,28 +262,37 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     for the second order in h. x: the error of the row's hypothesis.
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
-    reading, a = memory.previous_reading, memory.body_acceleration
+    previous_reading, body_acceleration = memory.previous_reading, memory.body_acceleration
     max_effect, coupling_effect = (
         initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
     )
-    sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
-    sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
-    sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
-    sin_theta, cos_theta = np.sin(reading[THETA]), np.cos(reading[THETA])
+    sin_alpha, cos_alpha = np.sin(previous_reading[ALPHA]), np.cos(previous_reading[ALPHA])
+    sin_beta, cos_beta = np.sin(previous_reading[BETA]), np.cos(previous_reading[BETA])
+    sin_phi, cos_phi = np.sin(previous_reading[PHI]), np.cos(previous_reading[PHI])
+    sin_theta, cos_theta = np.sin(previous_reading[THETA]), np.cos(previous_reading[THETA])
     # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    sideslip_magnitude = abs(reading[BETA])
-    max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
+    sideslip_magnitude = abs(previous_reading[BETA])
+    max_sideslip = abs(previous_reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
     beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
     max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
-    normal_acceleration = a[2] * cos_alpha - a[0] * sin_alpha
-    side_acceleration = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
-    max_acceleration = max(memory.acceleration_magnitude, np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2))
+    normal_acceleration = body_acceleration[2] * cos_alpha - body_acceleration[0] * sin_alpha
+    side_acceleration = (
+        body_acceleration[1] * cos_beta
+        - (body_acceleration[0] * cos_alpha + body_acceleration[2] * sin_alpha) * sin_beta
+    )
+    max_acceleration = max(
+        memory.acceleration_magnitude,
+        np.sqrt(body_acceleration[0] ** 2 + body_acceleration[1] ** 2 + body_acceleration[2] ** 2),
+    )
     # rad/s: rates about the flow's projection on the plane of symmetry, and across it
     flow_roll_rate, flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
     widened_step_s = h * (1.0 + h * (max_acceleration / V + abs(p) + abs(q) + abs(r)))
-    roll_yaw_rate, predicted_climb_m = np.hypot(p, r), memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
+    roll_yaw_rate, predicted_climb_m = (
+        np.hypot(p, r),
+        memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE],
+    )
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
     max_effect[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect[BETA_HYPOTHESIS, SPEED_TEST] = (
         widened_step_s * max_acceleration
@@ -337,7 +350,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     coupling_effect[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
-    pitch_magnitude = abs(reading[THETA])
+    pitch_magnitude = abs(previous_reading[THETA])
     coupling_effect[THETA_GRAVITY_COUPLING] = (
         h
         * g
@@ -350,7 +363,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     )
     # alpha: altitude' = V cos(beta) vertical_projection_length sin(gamma - alpha) + ..., where tan(gamma) =
     # tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma - alpha)
-    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
+    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
     coupling_effect[ALPHA_CLIMB_COUPLING] = (
@@ -380,19 +393,19 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
 @kernel
 def filter_effects_per_unit_error(redundancy, initial_errors):
     """Pass effects per unit error and couplings through the filters of the tests."""
-    decay = redundancy.config.filter_decay
+    filter_decay = redundancy.config.filter_decay
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         for test_index in range(RPM_TEST):
-            for m in range(decay.size):
+            for m in range(filter_decay.size):
                 initial_errors.filtered_max_effect_per_unit_error[i, test_index, m] = (
-                    decay[m] * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
+                    filter_decay[m] * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
                     + initial_errors.max_effect_per_unit_error[i, test_index]
                 )
-    for j in range(initial_errors.coupling_effect_per_unit_error.size):
-        for m in range(decay.size):
-            initial_errors.filtered_coupling_effect_per_unit_error[j, m] = (
-                decay[m] * initial_errors.filtered_coupling_effect_per_unit_error[j, m]
-                + initial_errors.coupling_effect_per_unit_error[j]
+    for coupling_index in range(initial_errors.coupling_effect_per_unit_error.size):
+        for m in range(filter_decay.size):
+            initial_errors.filtered_coupling_effect_per_unit_error[coupling_index, m] = (
+                filter_decay[m] * initial_errors.filtered_coupling_effect_per_unit_error[coupling_index, m]
+                + initial_errors.coupling_effect_per_unit_error[coupling_index]
             )
 
 
@@ -570,13 +583,13 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
 
 
 @kernel
-def update_initial_error_bounds(redundancy, initial_errors, signal):
+def update_initial_error_bounds(redundancy, initial_errors, readings):
     """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
-    if max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD:  # the tests of the attitude restart
+    if max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD:  # the tests of the attitude restart
         initial_errors.filtered_coupling_effect_per_unit_error[:] = 0.0
         return
     update_error_change_bounds(redundancy, initial_errors)
-    fill_effects_per_unit_error(redundancy, initial_errors, signal)
+    fill_effects_per_unit_error(redundancy, initial_errors, readings)
     filter_effects_per_unit_error(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)
 

@@ -301,7 +301,7 @@ def min_frozen_samples(noise_std: float, resolution: float) -> int:
 
 
 def gust_speed_and_change_bounds(
-    air: Dryden, airspeed_mps: float, sample_time_s: float
+    turbulence: Dryden, airspeed_mps: float, sample_time_s: float
 ) -> tuple[float, np.ndarray]:
     """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
 
@@ -309,8 +309,8 @@ def gust_speed_and_change_bounds(
     keeps 1 / 2 lam of its intensity.
     """
     sigma_mps, velocity_walk_intensity = (
-        air.sigma_mps,
-        air.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
+        turbulence.sigma_mps,
+        turbulence.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
     )
     variance_per_intensity_s = [
         sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S
@@ -421,48 +421,48 @@ def rotate_to_turned_axes(rates, duration_s, vector, out):
     """Fill out (3,): the components of a constant vector (3,) in body axes that have turned at rates (3,)
     rad/s for duration_s."""
     total_rate = np.sqrt(rates[0] ** 2 + rates[1] ** 2 + rates[2] ** 2)
-    angle = 2.0 * np.arctan(0.5 * duration_s * total_rate)
-    sine_per_rate = np.sin(angle) / total_rate if total_rate > 0.0 else 0.0
-    versine_per_rate_squared = (1.0 - np.cos(angle)) / total_rate**2 if total_rate > 0.0 else 0.0
-    dot = rates[0] * vector[0] + rates[1] * vector[1] + rates[2] * vector[2]
+    turn_angle = 2.0 * np.arctan(0.5 * duration_s * total_rate)
+    sine_per_rate = np.sin(turn_angle) / total_rate if total_rate > 0.0 else 0.0
+    versine_per_rate_squared = (1.0 - np.cos(turn_angle)) / total_rate**2 if total_rate > 0.0 else 0.0
+    rates_dot_vector = rates[0] * vector[0] + rates[1] * vector[1] + rates[2] * vector[2]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        cross = rates[j] * vector[k] - rates[k] * vector[j]
+        rates_cross_vector = rates[j] * vector[k] - rates[k] * vector[j]
         out[i] = (
             vector[i]
-            - sine_per_rate * cross
-            + versine_per_rate_squared * (rates[i] * dot - total_rate**2 * vector[i])
+            - sine_per_rate * rates_cross_vector
+            + versine_per_rate_squared * (rates[i] * rates_dot_vector - total_rate**2 * vector[i])
         )
 
 
 @kernel
-def fill_reading_error_bounds(redundancy, signal):
-    """Fill the bounds on the error of each reading in signal (N_SENSORS,), and on the part that changes."""
+def fill_reading_error_bounds(redundancy, readings):
+    """Fill the bounds on the error of each of the readings (N_SENSORS,), and on the part that changes."""
     config, memory = redundancy.config, redundancy.memory
     for i in range(N_SENSORS):
-        reading_magnitude = abs(wrapped(signal[i])) if i == PSI else abs(signal[i])
+        reading_magnitude = abs(wrapped(readings[i])) if i == PSI else abs(readings[i])
         total_error_bound = (config.error_offset[i] + config.error_slope[i] * reading_magnitude) / (
             1.0 - config.error_slope[i]
         )
         memory.reading_error_bound[i] = total_error_bound
         memory.reading_error_change_bound[i] = (
-            total_error_bound - config.constant_error[i] + READING_ROUNDING_SHARE * abs(signal[i])
+            total_error_bound - config.constant_error[i] + READING_ROUNDING_SHARE * abs(readings[i])
         )
     for i in range(PHI, PHI + 3):
         memory.reading_error_bound[i] += memory.attitude_drift_bound_rad
 
 
 @kernel
-def store_sample(redundancy, signal, specific_force):
-    """Store this sample for the next one; signal (N_SENSORS,) SI, specific_force (3,) m/s2."""
+def store_sample(redundancy, readings, specific_force):
+    """Store this sample for the next one; readings (N_SENSORS,) SI, specific_force (3,) m/s2."""
     memory, gravity = redundancy.memory, redundancy.config.gravity_m_s2
-    memory.previous_reading[:], memory.error_bound_two_samples_ago[:] = signal, memory.previous_error_bound
+    memory.previous_reading[:], memory.error_bound_two_samples_ago[:] = readings, memory.previous_error_bound
     memory.previous_error_bound[:] = memory.reading_error_bound
-    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], memory.previous_quaternion)
-    alpha, beta, V = signal[ALPHA], signal[BETA], signal[AIRSPEED]
+    fill_quaternion(readings[PHI], readings[THETA], readings[PSI], memory.previous_quaternion)
+    alpha, beta, V = readings[ALPHA], readings[BETA], readings[AIRSPEED]
     memory.body_velocity[0] = V * np.cos(alpha) * np.cos(beta)
     memory.body_velocity[1], memory.body_velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    theta, phi = signal[THETA], signal[PHI]
+    theta, phi = readings[THETA], readings[PHI]
     memory.body_acceleration[0] = specific_force[0] - gravity * np.sin(theta)
     memory.body_acceleration[1] = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
     memory.body_acceleration[2] = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
@@ -497,9 +497,15 @@ def predict_readings(redundancy):
     predicted_reading[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     predicted_reading[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
     predicted_reading[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    theta, phi, v = memory.previous_reading[THETA], memory.previous_reading[PHI], memory.body_velocity
+    theta, phi, body_velocity = (
+        memory.previous_reading[THETA],
+        memory.previous_reading[PHI],
+        memory.body_velocity,
+    )
     climb_rate = (
-        v[0] * np.sin(theta) - v[1] * np.sin(phi) * np.cos(theta) - v[2] * np.cos(phi) * np.cos(theta)
+        body_velocity[0] * np.sin(theta)
+        - body_velocity[1] * np.sin(phi) * np.cos(theta)
+        - body_velocity[2] * np.cos(phi) * np.cos(theta)
     )
     predicted_reading[ALTITUDE] = memory.previous_reading[ALTITUDE] + h * climb_rate
     memory.earlier_acceleration_magnitudes[1], memory.earlier_acceleration_magnitudes[0] = (
@@ -514,45 +520,45 @@ def predict_readings(redundancy):
         )
     memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
-        scratch_vector[i] = v[i] + h * scratch_vector[i]
-    rotate_to_turned_axes(rates, h, scratch_vector, v)
+        scratch_vector[i] = body_velocity[i] + h * scratch_vector[i]
+    rotate_to_turned_axes(rates, h, scratch_vector, body_velocity)
     rotate_to_turned_axes(rates, h, memory.body_acceleration, memory.previous_body_acceleration)
-    speed = vector_length(v)
-    predicted_reading[AIRSPEED] = speed
-    predicted_reading[ALPHA] = np.arctan2(v[2], v[0])
-    predicted_reading[BETA] = np.arcsin(v[1] / max(speed, MIN_PREDICTED_SPEED_MPS))
+    predicted_speed = vector_length(body_velocity)
+    predicted_reading[AIRSPEED] = predicted_speed
+    predicted_reading[ALPHA] = np.arctan2(body_velocity[2], body_velocity[0])
+    predicted_reading[BETA] = np.arcsin(body_velocity[1] / max(predicted_speed, MIN_PREDICTED_SPEED_MPS))
 
 
 @kernel
-def fill_residuals(redundancy, signal):
+def fill_residuals(redundancy, readings):
     """Fill the residual of each test: readings (N_SENSORS,) minus their prediction."""
-    test, memory, predicted_reading = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
-    fill_quaternion(signal[PHI], signal[THETA], signal[PSI], memory.scratch)
+    tests, memory, predicted_reading = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
+    fill_quaternion(readings[PHI], readings[THETA], readings[PSI], memory.scratch)
     for i in range(3):
-        test[TURN_TEST + i].residual = small_rotation_angle(
+        tests[TURN_TEST + i].residual = small_rotation_angle(
             memory.predicted_quaternion, memory.scratch, i + 1
         )
-        test[ANGLE_TEST + i].residual = wrapped(signal[PHI + i] - predicted_reading[PHI + i])
-    test[SPEED_TEST].residual = signal[AIRSPEED] - predicted_reading[AIRSPEED]
-    test[ALPHA_FLOW_TEST].residual = signal[ALPHA] - predicted_reading[ALPHA]
-    test[BETA_FLOW_TEST].residual = signal[BETA] - predicted_reading[BETA]
+        tests[ANGLE_TEST + i].residual = wrapped(readings[PHI + i] - predicted_reading[PHI + i])
+    tests[SPEED_TEST].residual = readings[AIRSPEED] - predicted_reading[AIRSPEED]
+    tests[ALPHA_FLOW_TEST].residual = readings[ALPHA] - predicted_reading[ALPHA]
+    tests[BETA_FLOW_TEST].residual = readings[BETA] - predicted_reading[BETA]
     half_density, previous_half_density = (
-        signal[QDYN] / signal[AIRSPEED] ** 2,
+        readings[QDYN] / readings[AIRSPEED] ** 2,
         memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2,
     )
-    test[DENSITY_TEST].residual = np.log(
+    tests[DENSITY_TEST].residual = np.log(
         max(half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
         / max(previous_half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
     )
-    test[CLIMB_TEST].residual = signal[ALTITUDE] - predicted_reading[ALTITUDE]
+    tests[CLIMB_TEST].residual = readings[ALTITUDE] - predicted_reading[ALTITUDE]
 
 
 @kernel
-def max_pitch_angle(redundancy, signal):
+def max_pitch_angle(redundancy, readings):
     """Bound |theta| in this sample and the one before, rad, by readings and their errors."""
     memory = redundancy.memory
     return max(
-        abs(signal[THETA]) + memory.reading_error_bound[THETA],
+        abs(readings[THETA]) + memory.reading_error_bound[THETA],
         abs(memory.previous_reading[THETA]) + memory.previous_error_bound[THETA],
     )
 
@@ -598,19 +604,19 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
 
 
 @kernel
-def bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
+def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
-    test, config, memory = redundancy.test, redundancy.config, redundancy.memory
+    tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
     previous_error_bound, error_change_bound = memory.previous_error_bound, memory.reading_error_change_bound
-    max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, signal), MAX_PITCH_RAD))
+    max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, readings), MAX_PITCH_RAD))
     attitude_error_bound = previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
     max_turn = config.sample_time_s * max_turn_rate
-    tilt_reading_change = abs(signal[PHI] - memory.previous_reading[PHI]) + abs(
-        signal[THETA] - memory.previous_reading[THETA]
+    tilt_reading_change = abs(readings[PHI] - memory.previous_reading[PHI]) + abs(
+        readings[THETA] - memory.previous_reading[THETA]
     )
     momentary_error_bound = (
         previous_error_bound[THETA]
@@ -625,7 +631,7 @@ def bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum
             max_turn_rate * (attitude_error_bound + max_pitch_secant * previous_error_bound[THETA])
             + tilt_reading_change * momentary_error_bound / config.sample_time_s
         )
-        test[TURN_TEST + i].bound_per_s = (
+        tests[TURN_TEST + i].bound_per_s = (
             EARTH_RATE_BOUND_RAD_S
             + 2.0 * config.attitude_drift_rad_s
             + previous_error_bound[P + i]
@@ -640,44 +646,44 @@ def bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum
             + (1.0 + max_pitch_secant * max_turn) * gyro_error_bound_sum
             + rate_error_by_attitude
         )
-        test[ANGLE_TEST + i].bound_per_s, test[ANGLE_TEST + i].bound_per_sample = (
+        tests[ANGLE_TEST + i].bound_per_s, tests[ANGLE_TEST + i].bound_per_sample = (
             max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
             error_change_bound[PHI + i],
         )
-    max_sin_theta = abs(np.sin(signal[THETA])) + error_change_bound[THETA]
-    max_sin_phi = abs(np.sin(signal[PHI])) + error_change_bound[PHI]
-    test[TURN_TEST].bound_per_sample = error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
-    test[TURN_TEST + 1].bound_per_sample = error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
-    test[TURN_TEST + 2].bound_per_sample = error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
+    max_sin_theta = abs(np.sin(readings[THETA])) + error_change_bound[THETA]
+    max_sin_phi = abs(np.sin(readings[PHI])) + error_change_bound[PHI]
+    tests[TURN_TEST].bound_per_sample = error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
+    tests[TURN_TEST + 1].bound_per_sample = error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
+    tests[TURN_TEST + 2].bound_per_sample = error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
 
 
 @kernel
-def min_height_of_two_samples(redundancy, signal):
+def min_height_of_two_samples(redundancy, readings):
     """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
     memory = redundancy.memory
     min_height, previous_min_height = (
-        signal[ALTITUDE] - memory.reading_error_bound[ALTITUDE],
+        readings[ALTITUDE] - memory.reading_error_bound[ALTITUDE],
         memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE],
     )
     return max(min(min_height, previous_min_height), LEAST_HEIGHT_M)
 
 
 @kernel
-def bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
+def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
     kinematics with respect to each reading, times the bound on the reading's error."""
-    test, config, memory = redundancy.test, redundancy.config, redundancy.memory
+    tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
     error_bound, previous_error_bound = memory.reading_error_bound, memory.previous_error_bound
     error_change_bound, previous_reading = memory.reading_error_change_bound, memory.previous_reading
     min_airspeed = max(
         min(
-            signal[AIRSPEED] - error_bound[AIRSPEED],
+            readings[AIRSPEED] - error_bound[AIRSPEED],
             previous_reading[AIRSPEED] - previous_error_bound[AIRSPEED],
         ),
         MIN_AIRSPEED_MPS,
     )
     max_sideslip = max(
-        abs(signal[BETA]) + error_bound[BETA], abs(previous_reading[BETA]) + previous_error_bound[BETA]
+        abs(readings[BETA]) + error_bound[BETA], abs(previous_reading[BETA]) + previous_error_bound[BETA]
     )
     max_sideslip_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     vane_error_bound = previous_error_bound[ALPHA] + previous_error_bound[BETA]
@@ -687,8 +693,8 @@ def bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
         2.0 * memory.acceleration_magnitude / min_airspeed + max_turn_rate
     )
     gust_change_factor = np.sqrt(
-        max(signal[AIRSPEED] / config.max_airspeed_mps, 1.0)
-        * max(config.low_altitude_limit_m / min_height_of_two_samples(redundancy, signal), 1.0)
+        max(readings[AIRSPEED] / config.max_airspeed_mps, 1.0)
+        * max(config.low_altitude_limit_m / min_height_of_two_samples(redundancy, readings), 1.0)
     )
     flow_rate_error_bound = (
         max_sideslip_secant**2
@@ -702,23 +708,23 @@ def bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
         )
         + max_sideslip_secant * gyro_error_bound_sum
     )
-    test[SPEED_TEST].residual_per_gust_speed, test[SPEED_TEST].bound_per_sample = (
+    tests[SPEED_TEST].residual_per_gust_speed, tests[SPEED_TEST].bound_per_sample = (
         gust_change_factor,
         error_change_bound[AIRSPEED],
     )
-    test[SPEED_TEST].bound_per_s = (
+    tests[SPEED_TEST].bound_per_s = (
         max_acceleration_error
         + second_order_factor * max_acceleration * vane_error_bound
         + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error_bound[AIRSPEED]
     )
-    for test_index, vane in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
+    for test_index, vane_index in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
         (
-            test[test_index].residual_per_gust_speed,
-            test[test_index].bound_per_sample,
-            test[test_index].bound_per_s,
+            tests[test_index].residual_per_gust_speed,
+            tests[test_index].bound_per_sample,
+            tests[test_index].bound_per_s,
         ) = (
             gust_change_factor * max_sideslip_secant / min_airspeed,
-            error_change_bound[vane],
+            error_change_bound[vane_index],
             second_order_factor * flow_rate_error_bound,
         )
     tilt_error_bound, max_recent_acceleration = (
@@ -732,32 +738,32 @@ def bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum):
     climb_rate_error_bound = (previous_reading[AIRSPEED] + previous_error_bound[AIRSPEED]) * (
         tilt_error_bound + vane_error_bound
     ) + previous_error_bound[AIRSPEED]
-    test[CLIMB_TEST].bound_per_s = (
+    tests[CLIMB_TEST].bound_per_s = (
         config.max_vertical_wind_mps
         + config.max_gust_speed_mps
         + climb_rate_error_bound
         + POSITION_INTEGRATION_ERROR_FACTOR * config.sample_time_s * max_recent_acceleration
     )
-    test[CLIMB_TEST].bound_per_sample = error_change_bound[ALTITUDE]
+    tests[CLIMB_TEST].bound_per_sample = error_change_bound[ALTITUDE]
 
 
 @kernel
-def log_change_error_bound(redundancy, signal, sensor):
+def log_change_error_bound(redundancy, readings, sensor):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
     constant_error, previous_reading = (
         redundancy.config.constant_error[sensor],
         redundancy.memory.previous_reading[sensor],
     )
-    smaller_reading = max(min(signal[sensor], previous_reading), 1.0)
+    smaller_reading = max(min(readings[sensor], previous_reading), 1.0)
     first_order_bound = constant_error * abs(
-        1.0 / max(signal[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
+        1.0 / max(readings[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
     )
     return first_order_bound / max(1.0 - constant_error / smaller_reading, MIN_READING_SHARE_IN_LOGARITHM)
 
 
 @kernel
-def bound_density_test(redundancy, signal):
+def bound_density_test(redundancy, readings):
     """Fill the bounds of `bound_residuals` for the logarithm of the density."""
     test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
     error_bound, error_change_bound = memory.reading_error_bound, memory.reading_error_change_bound
@@ -768,25 +774,25 @@ def bound_density_test(redundancy, signal):
         + config.max_gust_speed_mps
     )
     apparent_log_change_bound = log_change_error_bound(
-        redundancy, signal, QDYN
-    ) + 2.0 * log_change_error_bound(redundancy, signal, AIRSPEED)
+        redundancy, readings, QDYN
+    ) + 2.0 * log_change_error_bound(redundancy, readings, AIRSPEED)
     test.bound_per_s = (
         max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_log_change_bound / config.sample_time_s
     )
     test.bound_per_sample = error_change_bound[QDYN] / max(
-        signal[QDYN] - error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
+        readings[QDYN] - error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
     )
     test.bound_per_sample += (
-        2.0 * error_change_bound[AIRSPEED] / max(signal[AIRSPEED] - error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
+        2.0 * error_change_bound[AIRSPEED] / max(readings[AIRSPEED] - error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
     )
 
 
 @kernel
-def bound_residuals(redundancy, signal):
+def bound_residuals(redundancy, readings):
     """Fill bound_per_s and bound_per_sample of each test: the largest effect of sound sensors with the
     declared errors.
 
-    The errors of the previous sample act through the prediction, those of this sample, signal (N_SENSORS,),
+    The errors of the previous sample act through the prediction, those of this sample, readings (N_SENSORS,),
     through the reading that is compared with it. gyro_error_bound_sum: sum of the bounds of the three gyros;
     max_turn_rate: bound on |p| + |q| + |r|; rad/s.
     """
@@ -795,9 +801,9 @@ def bound_residuals(redundancy, signal):
     max_turn_rate = (
         abs(previous_reading[P]) + abs(previous_reading[Q]) + abs(previous_reading[R]) + gyro_error_bound_sum
     )
-    bound_attitude_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum)
-    bound_flow_tests(redundancy, signal, max_turn_rate, gyro_error_bound_sum)
-    bound_density_test(redundancy, signal)
+    bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum)
+    bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum)
+    bound_density_test(redundancy, readings)
 
 
 @kernel
@@ -835,11 +841,11 @@ def restart_test(test):
 
 
 @kernel
-def compare_engine_sensors(redundancy, signal):
+def compare_engine_sensors(redundancy, readings):
     """Compare the engine's readings with the command. There is no filter: each sample is judged alone."""
     memory = redundancy.memory
-    redundancy.test[RPM_TEST].residual = signal[ENGINE_SPEED] - memory.commanded_engine_readings[0]
-    redundancy.test[RPM_TEST + 1].residual = signal[MANIFOLD] - memory.commanded_engine_readings[1]
+    redundancy.test[RPM_TEST].residual = readings[ENGINE_SPEED] - memory.commanded_engine_readings[0]
+    redundancy.test[RPM_TEST + 1].residual = readings[MANIFOLD] - memory.commanded_engine_readings[1]
     for i in range(2):
         residual_bound = memory.reading_error_bound[ENGINE_SPEED + i] + COMPARISON_ROUNDING
         redundancy.test[RPM_TEST + i].residual_bound_ratio = (
@@ -848,21 +854,24 @@ def compare_engine_sensors(redundancy, signal):
 
 
 @kernel
-def compare_duplicate_sensors(redundancy, signal, is_fresh):
+def compare_duplicate_sensors(redundancy, readings, is_fresh):
     """Compare each sensor that should equal another reading with that reading, in the samples in which it is
     `is_fresh` (sampled sensors,). If they differ by more than the errors of both and the tolerance of the two
     quantities, one of the two is broken."""
     memory = redundancy.memory
-    for k in range(DUPLICATE_SENSOR_INDEX.size):
-        sensor_index, reading_index = DUPLICATE_SENSOR_INDEX[k], DUPLICATED_READING_INDEX[k]
-        test = redundancy.test[N_COMPUTED_TESTS + k]
+    for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
+        sensor_index, reading_index = (
+            DUPLICATE_SENSOR_INDEX[duplicate_index],
+            DUPLICATED_READING_INDEX[duplicate_index],
+        )
+        test = redundancy.test[N_COMPUTED_TESTS + duplicate_index]
         test.residual_bound_ratio = 0.0
         if is_fresh[sensor_index - N_IN_EQUATIONS]:
-            test.residual = signal[sensor_index] - signal[reading_index]
+            test.residual = readings[sensor_index] - readings[reading_index]
             if PHI <= reading_index <= PSI:
                 test.residual = wrapped(test.residual)
             test.filtered_bound[0] = (
-                DUPLICATE_TOLERANCE[k]
+                DUPLICATE_TOLERANCE[duplicate_index]
                 + memory.reading_error_bound[sensor_index]
                 + memory.reading_error_bound[reading_index]
                 + COMPARISON_ROUNDING
@@ -871,12 +880,12 @@ def compare_duplicate_sensors(redundancy, signal, is_fresh):
 
 
 @kernel
-def start_redundancy_tests(redundancy, signal, specific_force):
-    """Start with the first sample, before which no reading is known: signal (N_SENSORS,), specific_force (3,)
-    m/s2."""
+def start_redundancy_tests(redundancy, readings, specific_force):
+    """Start with the first sample, before which no reading is known: readings (N_SENSORS,),
+    specific_force (3,) m/s2."""
     memory = redundancy.memory
-    fill_reading_error_bounds(redundancy, signal)
-    store_sample(redundancy, signal, specific_force)
+    fill_reading_error_bounds(redundancy, readings)
+    store_sample(redundancy, readings, specific_force)
     memory.error_bound_two_samples_ago[:], memory.previous_body_acceleration[:] = (
         memory.previous_error_bound,
         memory.body_acceleration,
@@ -885,29 +894,29 @@ def start_redundancy_tests(redundancy, signal, specific_force):
         vector_length(memory.body_acceleration) + MIN_FAULTY_FORCE_JUMP_M_S2
     )
     memory.first_acceleration_error_bound = PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
-    bound_residuals(redundancy, signal)
+    bound_residuals(redundancy, readings)
     for test_index in range(RPM_TEST):
         restart_test(redundancy.test[test_index])
 
 
 @kernel
-def run_redundancy_tests(redundancy, signal, has_engine_sensors):
+def run_redundancy_tests(redundancy, readings, has_engine_sensors):
     """Compare this sample of the readings (N_SENSORS,) with the one before."""
     config, memory = redundancy.config, redundancy.memory
     memory.attitude_drift_bound_rad += config.sample_time_s * config.attitude_drift_rad_s
-    fill_reading_error_bounds(redundancy, signal)
+    fill_reading_error_bounds(redundancy, readings)
     predict_readings(redundancy)
-    fill_residuals(redundancy, signal)
-    bound_residuals(redundancy, signal)
+    fill_residuals(redundancy, readings)
+    bound_residuals(redundancy, readings)
     memory.first_acceleration_error_bound = 0.0
-    too_steep = max_pitch_angle(redundancy, signal) > MAX_PITCH_RAD
+    is_too_steep = max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD
     for test_index in range(RPM_TEST):
-        if too_steep and test_index < SPEED_TEST:
+        if is_too_steep and test_index < SPEED_TEST:
             restart_test(redundancy.test[test_index])
         else:
             filter_residual(redundancy, redundancy.test[test_index])
     if has_engine_sensors:
-        compare_engine_sensors(redundancy, signal)
+        compare_engine_sensors(redundancy, readings)
 
 
 @kernel

@@ -149,7 +149,7 @@ def is_flow_test(test_index):
 
 
 @kernel
-def count_identical_samples_and_find_jump(monitor, signal):
+def count_identical_samples_and_find_jump(monitor, readings):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within ACCELEROMETER_JUMP_MEMORY_S."""
     memory, previous_reading = monitor.memory, monitor.redundancy.memory.previous_reading
@@ -158,11 +158,11 @@ def count_identical_samples_and_find_jump(monitor, signal):
     )
     for i in range(N_SENSORS):
         memory.n_identical_samples[i] = (
-            memory.n_identical_samples[i] + 1 if signal[i] == previous_reading[i] else 0
+            memory.n_identical_samples[i] + 1 if readings[i] == previous_reading[i] else 0
         )
         if AX <= i < N_IN_EQUATIONS:
             memory.fading_max_accelerometer_jump = max(
-                memory.fading_max_accelerometer_jump, abs(signal[i] - previous_reading[i])
+                memory.fading_max_accelerometer_jump, abs(readings[i] - previous_reading[i])
             )
 
 
@@ -173,16 +173,16 @@ def is_frozen(monitor, sensor):
 
 
 @kernel
-def update_cleared_sensors(monitor, signal):
+def update_cleared_sensors(monitor, readings):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
     memory, alarm_test_index = monitor.memory, monitor.output.alarm_test_index
     if not is_flow_test(alarm_test_index):
         return
     since_alarm_s = memory.n_samples_since_alarm * monitor.redundancy.config.sample_time_s
     is_within_jump_window = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
-    if is_within_jump_window and flow_reading_jumped(monitor, signal):
+    if is_within_jump_window and flow_reading_jumped(monitor, readings):
         clear_accelerometers(monitor)
-    sum_flow_residuals(monitor, signal)
+    sum_flow_residuals(monitor, readings)
     flow_sensor = flow_sensor_of_test(alarm_test_index)
     if is_frozen(monitor, flow_sensor) or (
         alarm_test_index == SPEED_TEST and memory.tests_exceeded_since_alarm[DENSITY_TEST]
@@ -194,7 +194,7 @@ def update_cleared_sensors(monitor, signal):
     if (
         accelerometer_is_frozen
         or residual_sum_exceeds_reading_range(monitor)
-        or flow_sensor_error_would_exceed_other_test(monitor, signal)
+        or flow_sensor_error_would_exceed_other_test(monitor, readings)
     ):
         memory.is_cleared[flow_sensor] = 1
 
@@ -206,7 +206,7 @@ def clear_accelerometers(monitor):
 
 
 @kernel
-def flow_reading_jumped(monitor, signal):
+def flow_reading_jumped(monitor, readings):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
     alarm_test_index, redundancy, memory = monitor.output.alarm_test_index, monitor.redundancy, monitor.memory
@@ -221,7 +221,7 @@ def flow_reading_jumped(monitor, signal):
     )
     residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
     reading_second_difference = (
-        signal[flow_sensor]
+        readings[flow_sensor]
         - 2.0 * previous_reading[flow_sensor]
         + memory.reading_two_samples_ago[flow_sensor]
     )
@@ -235,13 +235,13 @@ def flow_reading_jumped(monitor, signal):
 
 
 @kernel
-def sum_flow_residuals(monitor, signal):
+def sum_flow_residuals(monitor, readings):
     """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
     that of an error that a reading has had from the start; and find the range of each reading."""
     redundancy, memory, initial_errors = monitor.redundancy, monitor.memory, monitor.initial_errors
     config = redundancy.config
     for j in range(3):
-        flow_reading, test = signal[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
+        flow_reading, test = readings[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
         if memory.n_samples_since_alarm == 0:
             memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = flow_reading
             memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample
@@ -267,10 +267,10 @@ def sum_flow_residuals(monitor, signal):
     )
     climb_error_in_sample_m = (
         config.sample_time_s
-        * signal[AIRSPEED]
+        * readings[AIRSPEED]
         * unexplained_alpha_error
-        * np.cos(signal[PHI])
-        * np.cos(signal[THETA])
+        * np.cos(readings[PHI])
+        * np.cos(readings[THETA])
     )
     for m in range(config.filter_decay.size):
         memory.filtered_climb_error_m[m] = (
@@ -296,7 +296,7 @@ def residual_sum_exceeds_reading_range(monitor):
 
 
 @kernel
-def flow_sensor_error_would_exceed_other_test(monitor, signal):
+def flow_sensor_error_would_exceed_other_test(monitor, readings):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
     redundancy, initial_errors = monitor.redundancy, monitor.initial_errors
@@ -316,7 +316,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, signal):
             expected_residual = (
                 2.0
                 * (abs(speed_test.filtered_residual[m]) - speed_test.filtered_bound[m])
-                / max(signal[AIRSPEED], MIN_AIRSPEED_MPS)
+                / max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
             )
             expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
         if expected_residual > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
@@ -418,19 +418,19 @@ def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, boun
     filter_bank: detection filters, with the innovation of the elapsed frame, of dt s; bound_record: with the
     bound on that innovation. conclusion: about the surfaces, so far.
     """
-    redundancy, initial_errors, signal = monitor.redundancy, monitor.initial_errors, measured.signal
+    redundancy, initial_errors, readings = monitor.redundancy, monitor.initial_errors, measured.signal
     memory = monitor.memory
     if not memory.start_stage:
         begin_monitor(monitor, measured, t)
         return
     if memory.substep == 0:
         update_gyro_error_estimate(monitor, filter_bank.output.innovation, bound_record.eta_bar, dt)
-    run_redundancy_tests(redundancy, signal, monitor.config.has_engine_sensors)
+    run_redundancy_tests(redundancy, readings, monitor.config.has_engine_sensors)
     if N_TESTS > N_COMPUTED_TESTS:
-        compare_duplicate_sensors(redundancy, signal, measured.fresh)
+        compare_duplicate_sensors(redundancy, readings, measured.fresh)
         record_agreeing_duplicates(monitor, measured.fresh)
-    update_initial_error_bounds(redundancy, initial_errors, signal)
-    count_identical_samples_and_find_jump(monitor, signal)
+    update_initial_error_bounds(redundancy, initial_errors, readings)
+    count_identical_samples_and_find_jump(monitor, readings)
     if memory.substep == 0:
         memory.previous_apparent_gyro_error[:], memory.earlier_substep_gyro_error_peak[:] = (
             memory.apparent_gyro_error,
@@ -454,7 +454,7 @@ def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, boun
     replace_isolated_readings(monitor, prediction, measured)
     mark_accelerometers_unusable(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
-    store_sample(redundancy, signal, measured.force)
+    store_sample(redundancy, readings, measured.force)
     memory.substep = (memory.substep + 1) % monitor.config.substeps
 
 
@@ -738,10 +738,16 @@ def find_suspects(monitor):
 @kernel
 def record_agreeing_duplicates(monitor, is_fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
-    for k in range(DUPLICATE_SENSOR_INDEX.size):
-        agrees = monitor.redundancy.test[N_COMPUTED_TESTS + k].residual_bound_ratio <= 1.0
-        if is_fresh[DUPLICATE_SENSOR_INDEX[k] - N_IN_EQUATIONS] and agrees and not monitor.output.alarmed:
-            monitor.memory.has_duplicate_agreed[k] = 1
+    for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
+        agrees_with_duplicate = (
+            monitor.redundancy.test[N_COMPUTED_TESTS + duplicate_index].residual_bound_ratio <= 1.0
+        )
+        if (
+            is_fresh[DUPLICATE_SENSOR_INDEX[duplicate_index] - N_IN_EQUATIONS]
+            and agrees_with_duplicate
+            and not monitor.output.alarmed
+        ):
+            monitor.memory.has_duplicate_agreed[duplicate_index] = 1
 
 
 @kernel
@@ -758,14 +764,14 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
         DUPLICATED_READING_INDEX[duplicate_index],
         DUPLICATED_READING_TEST_INDEX[duplicate_index],
     )
-    reading_test, duplicate_test = (
+    reading_test_record, duplicate_test_record = (
         redundancy.test[reading_test_index],
         redundancy.test[N_COMPUTED_TESTS + duplicate_index],
     )
     # of the reading, if it is the broken one
-    min_reading_error = abs(duplicate_test.residual) - duplicate_test.filtered_bound[0]
+    min_reading_error = abs(duplicate_test_record.residual) - duplicate_test_record.filtered_bound[0]
     error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_BOUND * max(
-        reading_test.filtered_bound[0], redundancy.memory.reading_error_bound[reading_index]
+        reading_test_record.filtered_bound[0], redundancy.memory.reading_error_bound[reading_index]
     )
     reading_is_frozen = is_frozen(monitor, reading_index)
     monitor.output.is_suspect[
@@ -953,9 +959,9 @@ def angle_error_explains_turn_tests(monitor, angle_index):
 def axis_of_largest_turn_residual(monitor, default_axis):
     """The body axis (0, 1, 2) whose test of turning has the largest ratio of residual to bound; default_axis
     if none is larger than its own."""
-    axis, test = default_axis, monitor.redundancy.test
+    axis, tests = default_axis, monitor.redundancy.test
     for j in range(3):
-        if test[TURN_TEST + j].residual_bound_ratio > test[TURN_TEST + axis].residual_bound_ratio:
+        if tests[TURN_TEST + j].residual_bound_ratio > tests[TURN_TEST + axis].residual_bound_ratio:
             axis = j
     return axis
 
@@ -999,12 +1005,12 @@ def has_alarm(monitor):
 def replace_isolated_readings(monitor, prediction, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: then none of them is used."""
-    signal, any_replaced, slipstream_input_replaced = measured.signal, False, False
+    readings, any_replaced, slipstream_input_replaced = measured.signal, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
             monitor.output.is_replaced[i] = 1
         if monitor.output.is_replaced[i] and i < AX:
-            signal[i] = estimate_reading(monitor, prediction, signal, i)
+            readings[i] = estimate_reading(monitor, prediction, readings, i)
             any_replaced = True
             slipstream_input_replaced = slipstream_input_replaced or i in (
                 AIRSPEED,
@@ -1019,7 +1025,7 @@ def replace_isolated_readings(monitor, prediction, measured):
 
 
 @kernel
-def estimate_reading(monitor, prediction, signal, sensor):
+def estimate_reading(monitor, prediction, readings, sensor):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
     memory = monitor.redundancy.memory
     if sensor < 3:
@@ -1032,9 +1038,9 @@ def estimate_reading(monitor, prediction, signal, sensor):
         )
     previous_density = 2.0 * memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
     if sensor == AIRSPEED:
-        return np.sqrt(max(2.0 * signal[QDYN] / previous_density, MIN_AIRSPEED_MPS**2))
+        return np.sqrt(max(2.0 * readings[QDYN] / previous_density, MIN_AIRSPEED_MPS**2))
     if sensor == QDYN:
-        return 0.5 * previous_density * signal[AIRSPEED] ** 2
+        return 0.5 * previous_density * readings[AIRSPEED] ** 2
     if sensor >= ENGINE_SPEED:
         return memory.commanded_engine_readings[sensor - ENGINE_SPEED]
     return memory.predicted_reading[sensor]
@@ -1053,9 +1059,9 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
         monitor.redundancy.test[TURN_TEST + axis],
     )
     u = prediction.u_before if monitor.memory.substep == 0 else prediction.u
-    acceleration = prediction.f[axis]
+    predicted_acceleration = prediction.f[axis]
     for s in range(u.size):
-        acceleration += prediction.G[axis, s] * u[s]
+        predicted_acceleration += prediction.G[axis, s] * u[s]
     angle_correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
         angle_correction = (
@@ -1065,4 +1071,4 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
         )
     monitor.memory.is_rate_replaced[axis] = 1
     corrected_previous_rate = memory.previous_reading[axis] + angle_correction / config.sample_time_s
-    return corrected_previous_rate + config.sample_time_s * acceleration
+    return corrected_previous_rate + config.sample_time_s * predicted_acceleration

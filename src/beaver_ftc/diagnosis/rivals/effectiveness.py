@@ -192,20 +192,22 @@ class AugmentedUkf(EffectivenessFilter):
         self.P = (point_deviations.T * point_weights) @ point_deviations
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
-    def propagate_points(self, points: np.ndarray, measured: Measured) -> np.ndarray:
+    def propagate_points(self, state_points: np.ndarray, measured: Measured) -> np.ndarray:
         """Each sigma point a frame later; f differs between points by its change from the measured state."""
         dt, f = self.context.dt_s, self.context.model.f
-        propagated_points = points.copy()
-        f_change_from_measured = f(points[:, :3], measured.y) - f(measured.x, measured.y)
+        propagated_points = state_points.copy()
+        f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
         loss_acceleration = np.array(
             [
                 measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES_WITHOUT_GUSTS]
-                for point in points
+                for point in state_points
             ]
         )
         propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_acceleration)
         if self.gust_states.n_states:
-            propagated_points[:, :3] += points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
+            propagated_points[:, :3] += (
+                state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
+            )
             propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
         return propagated_points
 

@@ -76,10 +76,10 @@ def sigma_points(z: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.
     """
     n_states = len(z)
     scaled_root = _matrix_root(point_spread * P).T
-    points = np.concatenate((z[None], z + scaled_root, z - scaled_root))
-    weights = np.full(2 * n_states + 1, 0.5 / point_spread)
-    weights[0] = 1.0 - n_states / point_spread
-    return points, weights
+    state_points = np.concatenate((z[None], z + scaled_root, z - scaled_root))
+    point_weights = np.full(2 * n_states + 1, 0.5 / point_spread)
+    point_weights[0] = 1.0 - n_states / point_spread
+    return state_points, point_weights
 
 
 def _matrix_root(P: np.ndarray) -> np.ndarray:

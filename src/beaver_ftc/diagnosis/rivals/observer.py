@@ -66,17 +66,17 @@ def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     constant_std = (
         np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - decay_factor)
     )
-    air_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
-    air_std = (
+    gust_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
+    gust_std = (
         dt
         * declared.turbulence_rad_s2
         * np.sqrt(
-            (1.0 + decay_factor * air_correlation)
-            / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * air_correlation))
+            (1.0 + decay_factor * gust_correlation)
+            / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * gust_correlation))
         )
     )
     gyro_std = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
-    return np.sqrt(constant_std**2 + air_std**2 + gyro_std**2)
+    return np.sqrt(constant_std**2 + gust_std**2 + gyro_std**2)
 
 
 class ConstantThresholdObserver:

@@ -96,8 +96,8 @@ class RlsMonitor:
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Score every pair; the first beyond the limit is the fault."""
         scores = [
-            prediction_test.step(float(command[surface_index]), float(rate))
-            for prediction_test, surface_index, rate in zip(
+            prediction_test.step(float(command[surface_index]), float(measured_rate))
+            for prediction_test, surface_index, measured_rate in zip(
                 self.prediction_tests, self.leading_surfaces, measured.x, strict=True
             )
         ]

@@ -338,10 +338,10 @@ isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()]
 
 def isolation_variant_index(config: FdiConfig) -> int:
     """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
-    authority = config.authority if config.weighs_chance else "worst-case"
-    if config.fault_class == "all" and authority == "statistical":
-        authority = "either"
-    return list(ISOLATION_VARIANTS).index((config.fault_class, authority))
+    alarm_authority = config.authority if config.weighs_chance else "worst-case"
+    if config.fault_class == "all" and alarm_authority == "statistical":
+        alarm_authority = "either"
+    return list(ISOLATION_VARIANTS).index((config.fault_class, alarm_authority))
 
 
 @apart

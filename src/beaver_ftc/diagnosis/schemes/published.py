@@ -170,7 +170,7 @@ def train_state_network(network, training_signal, dt):
 
 
 @kernel
-def train_fdae_network(published, fdae, is_detected, dt):
+def train_fdae_network(published_record, fdae, is_detected, dt):
     """The FDAE's network learns from the residual the frame began with, once a fault is detected.
 
     Without the dead zone it learns from the first frame on, with any residual.
@@ -178,15 +178,15 @@ def train_fdae_network(published, fdae, is_detected, dt):
     is_outside_threshold = False
     for i in range(3):
         is_outside_threshold = is_outside_threshold or abs(fdae.output.residual[i]) > fdae.output.threshold[i]
-    if not published.config.uses_dead_zone or (is_detected and is_outside_threshold):
-        train_state_network(published.network, fdae.output.residual, dt)
+    if not published_record.config.uses_dead_zone or (is_detected and is_outside_threshold):
+        train_state_network(published_record.network, fdae.output.residual, dt)
 
 
 @kernel
-def update_fdae_network_output(published, fdae, main_surfaces, x, y, u):
+def update_fdae_network_output(published_record, fdae, main_surfaces, x, y, u):
     """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
-    evaluate_state_network(published.network, main_surfaces, x, y, u)
-    replace_network_output(fdae.network, published.network.output)
+    evaluate_state_network(published_record.network, main_surfaces, x, y, u)
+    replace_network_output(fdae.network, published_record.network.output)
 
 
 @kernel
@@ -201,17 +201,17 @@ def fdae_alarm_axis(fdae):
 @apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
-    published, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
+    published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     filters.update_bank(
         fdi.bank, bound_record, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
     )
     adaptive_estimators.update_isolation_estimators(fdi, prediction)
-    train_fdae_network(published, fdi.fdae, fdi.verdict.detected, dt)
+    train_fdae_network(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
         fdi.fdae, bound_record, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
     )
-    if published.config.constant_threshold > 0.0:
-        set_all_constant_thresholds(fdi, published.config.constant_threshold)
+    if published_record.config.constant_threshold > 0.0:
+        set_all_constant_thresholds(fdi, published_record.config.constant_threshold)
 
 
 @kernel

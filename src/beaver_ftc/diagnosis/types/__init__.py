@@ -226,8 +226,8 @@ def feasible_set(fdi: np.void, s: int, type_index: int) -> tuple[float, float]:
 
 def midpoint_parameter_estimate(fdi: np.void, s: int, type_index: int) -> float:
     """The middle of the feasible set of a type's parameter on surface s."""
-    low, high = feasible_set(fdi, s, type_index)
-    return 0.5 * (low + high)
+    set_low, set_high = feasible_set(fdi, s, type_index)
+    return 0.5 * (set_low + set_high)
 
 
 @kernel
@@ -248,12 +248,12 @@ def intersect_feasible_set(surface, type_index, other_interval):
     """Keep of the set of a type what is also in other_interval; exclude the type when nothing is left. The
     set then holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type
     that it excludes keeps its set."""
-    low, high = other_interval
-    if low == np.inf:
+    interval_low, interval_high = other_interval
+    if interval_low == np.inf:
         surface.feasible_sets.excluded[type_index] = 1
         return
-    surface.feasible_sets.low[type_index] = max(surface.feasible_sets.low[type_index], low)
-    surface.feasible_sets.high[type_index] = min(surface.feasible_sets.high[type_index], high)
+    surface.feasible_sets.low[type_index] = max(surface.feasible_sets.low[type_index], interval_low)
+    surface.feasible_sets.high[type_index] = min(surface.feasible_sets.high[type_index], interval_high)
     if surface.feasible_sets.low[type_index] > surface.feasible_sets.high[type_index]:
         surface.feasible_sets.excluded[type_index] = 1
 
@@ -306,22 +306,22 @@ def shift_observations(surface):
 
 
 @kernel
-def copy_observation(target, source):
+def copy_observation(target_observation, source_observation):
     """Copy one observation to another."""
     (
-        target.healthy_position,
-        target.position_low,
-        target.position_high,
-        target.is_anomalous,
-        target.weighted_mean_error_per_position_range,
+        target_observation.healthy_position,
+        target_observation.position_low,
+        target_observation.position_high,
+        target_observation.is_anomalous,
+        target_observation.weighted_mean_error_per_position_range,
     ) = (
-        source.healthy_position,
-        source.position_low,
-        source.position_high,
-        source.is_anomalous,
-        source.weighted_mean_error_per_position_range,
+        source_observation.healthy_position,
+        source_observation.position_low,
+        source_observation.position_high,
+        source_observation.is_anomalous,
+        source_observation.weighted_mean_error_per_position_range,
     )
-    target.stop_can_hide_deflection[:] = source.stop_can_hide_deflection
+    target_observation.stop_can_hide_deflection[:] = source_observation.stop_can_hide_deflection
 
 
 @kernel

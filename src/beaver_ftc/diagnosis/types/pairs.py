@@ -46,16 +46,16 @@ from beaver_ftc.diagnosis.types.verdict import (
 
 
 @kernel
-def record_group_alarms(pair, filter_bank):
+def record_group_alarms(pair_record, filter_bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for axis in range(3):
-        group = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
+        group_index = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
         for filter_index in range(filter_bank.config.n_filters):
             if (
                 abs(filter_bank.output.residual[filter_index, axis])
                 > filter_bank.output.threshold[filter_index, axis]
             ):
-                pair.group_has_alarm[group] = 1
+                pair_record.group_has_alarm[group_index] = 1
 
 
 @kernel
@@ -197,7 +197,7 @@ def set_isolation_status(surface, is_isolated, type_index, t):
 def decide_roll_and_yaw_isolation(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw. Returns whether the fault of this plane is outside
     the class."""
-    config, pair = types.config, types.pair
+    config, pair_record = types.config, types.pair
     roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     roll_alone_can_be_at_fault, yaw_alone_can_be_at_fault = (
         can_be_at_fault(roll_surface),
@@ -205,7 +205,7 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     )
     both_must_be_at_fault = not roll_alone_can_be_at_fault and not yaw_alone_can_be_at_fault
     class_is_refuted = (
-        pair.lateral_fault_outside_class == 1
+        pair_record.lateral_fault_outside_class == 1
         or not verdict.any_type_remains(roll_surface)
         or not verdict.any_type_remains(yaw_surface)
     )
@@ -213,7 +213,7 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     types_are_undecided = both_must_be_at_fault and not (
         verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
     )
-    can_isolate = pair.group_has_alarm[LATERAL_GROUP] == 1 and not (
+    can_isolate = pair_record.group_has_alarm[LATERAL_GROUP] == 1 and not (
         fault_is_outside_class or types_are_undecided
     )
     set_isolation_status(
@@ -237,21 +237,21 @@ def store_first_pitch_fault_sets(types, s):
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
-    pair, surface, has_new_exclusion = types.pair, types.surface[s], False
+    pair_record, surface, has_new_exclusion = types.pair, types.surface[s], False
     stored_sets = surface.first_pitch_fault_sets
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         has_new_exclusion = (
             has_new_exclusion
             or surface.feasible_sets.excluded[type_index] != stored_sets.excluded[type_index]
         )
-    pair.n_frames_since_unstored_exclusion = (
-        pair.n_frames_since_unstored_exclusion + 1 if has_new_exclusion else 0
+    pair_record.n_frames_since_unstored_exclusion = (
+        pair_record.n_frames_since_unstored_exclusion + 1 if has_new_exclusion else 0
     )
     if (
-        pair.first_pitch_fault_surface != s
-        or pair.n_frames_since_unstored_exclusion >= types.config.slowest_half_cycle_frames
+        pair_record.first_pitch_fault_surface != s
+        or pair_record.n_frames_since_unstored_exclusion >= types.config.slowest_half_cycle_frames
     ):
-        pair.first_pitch_fault_surface, pair.n_frames_since_unstored_exclusion = s, 0
+        pair_record.first_pitch_fault_surface, pair_record.n_frames_since_unstored_exclusion = s, 0
         stored_sets.low[:], stored_sets.high[:] = surface.feasible_sets.low, surface.feasible_sets.high
         stored_sets.excluded[:] = 1
         stored_sets.excluded[:N_CONSTANT_PARAMETER_TYPES] = surface.feasible_sets.excluded[
@@ -435,10 +435,10 @@ def choose_pair_accommodation(types, layout):
         verdict.set_accommodation_mode(surface, -1)
         if should_be_accommodated(types, layout, s):
             may_be_at_fault = surface.status.is_isolated == 1 or can_be_at_fault(surface)
-            mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
-            if verdict.update_fault_presence(types.config, surface, mode, may_be_at_fault):
-                verdict.set_accommodation_mode(surface, mode)
-                is_replaced_elevator = s == layout.main[PITCH] and mode in (SCALE_COMMAND, GIVE_UP)
+            surface_mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
+            if verdict.update_fault_presence(types.config, surface, surface_mode, may_be_at_fault):
+                verdict.set_accommodation_mode(surface, surface_mode)
+                is_replaced_elevator = s == layout.main[PITCH] and surface_mode in (SCALE_COMMAND, GIVE_UP)
                 if accommodated_surface == NO_SURFACE or is_replaced_elevator:
-                    accommodated_surface, accommodation_mode = s, mode
+                    accommodated_surface, accommodation_mode = s, surface_mode
     return accommodated_surface, accommodation_mode

@@ -135,20 +135,22 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought_key)
 
 
-def _compile_kernel(name: str, arguments: str, body_lines: list[str], namespace: dict[str, Any]) -> Kernel:
+def _compile_kernel(
+    name: str, argument_list: str, body_lines: list[str], namespace: dict[str, Any]
+) -> Kernel:
     """A kernel whose body is `body_lines`, in which `part_3` is a part of type 3.
 
     Compiled code calls only what it can name, so the calls are written out, one a type.
     """
-    source_code = "\n    ".join([f"def {name}({arguments}):", *body_lines])
+    source_code = "\n    ".join([f"def {name}({argument_list}):", *body_lines])
     exec(compile(source_code, __file__, "exec"), namespace)
     return kernel(namespace[name])
 
 
-def _call_expression(type_index: int, arguments: str) -> str:
+def _call_expression(type_index: int, argument_list: str) -> str:
     """The call of a part of type `type_index`; the argument of that name is its number."""
     call_arguments = (
-        str(type_index) if argument == "type_index" else argument for argument in arguments.split(", ")
+        str(type_index) if argument == "type_index" else argument for argument in argument_list.split(", ")
     )
     return f"part_{type_index}({', '.join(call_arguments)})"
 
@@ -162,15 +164,19 @@ def _kernel_namespace(part_kernels: dict[int, Kernel], **other_names: Any) -> di
     }
 
 
-def _kernel_calling_each_type(part_name: str, arguments: str, result_kernel: Kernel | None = None) -> Kernel:
+def _kernel_calling_each_type(
+    part_name: str, argument_list: str, result_kernel: Kernel | None = None
+) -> Kernel:
     """A kernel that calls this part of every type; result_kernel(surface, type_index, interval): called with
     what that returns."""
     part_kernels = _kernels_by_type(part_name)
-    parameters = ", ".join(argument for argument in arguments.split(", ") if argument != "type_index")
-    call_expressions = {type_index: _call_expression(type_index, arguments) for type_index in part_kernels}
+    parameters = ", ".join(argument for argument in argument_list.split(", ") if argument != "type_index")
+    call_expressions = {
+        type_index: _call_expression(type_index, argument_list) for type_index in part_kernels
+    }
     body_lines = [
-        f"result_kernel(surface, {type_index}, {call})" if result_kernel else call
-        for type_index, call in call_expressions.items()
+        f"result_kernel(surface, {type_index}, {call_expression})" if result_kernel else call_expression
+        for type_index, call_expression in call_expressions.items()
     ]
     return _compile_kernel(
         f"{part_name}_each",
@@ -180,20 +186,22 @@ def _kernel_calling_each_type(part_name: str, arguments: str, result_kernel: Ker
     )
 
 
-def _kernel_calling_one_type(part_name: str, arguments: str, default: Any) -> Kernel:
-    """A kernel that returns what this part of the type `type_index` returns; `default` for a type without
-    it."""
+def _kernel_calling_one_type(part_name: str, argument_list: str, default_result: Any) -> Kernel:
+    """A kernel that returns what this part of the type `type_index` returns; `default_result` for
+    a type without it."""
     part_kernels = _kernels_by_type(part_name)
     body_lines = [
-        f"if type_index == {type_index}: return {_call_expression(type_index, arguments)}"
+        f"if type_index == {type_index}: return {_call_expression(type_index, argument_list)}"
         for type_index in part_kernels
     ]
-    parameters = arguments if "type_index" in arguments.split(", ") else f"{arguments}, type_index"
+    parameters = (
+        argument_list if "type_index" in argument_list.split(", ") else f"{argument_list}, type_index"
+    )
     return _compile_kernel(
         f"{part_name}_of",
         parameters,
         [*body_lines, "return default"],
-        _kernel_namespace(part_kernels, default=default),
+        _kernel_namespace(part_kernels, default=default_result),
     )
 
 

@@ -350,12 +350,12 @@ def choose_accommodation_mode(surface):
     and moves the command, so that a surface that does not follow shows in the next frame.
     """
     constant_type_remains = any_constant_type_remains(surface)
-    for mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-        if constant_type_remains and serves_all_constant_types(surface, mode):
-            return mode
-    for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-        if not constant_type_remains and serves_any_varying_type(surface, mode):
-            return mode
+    for candidate_mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
+        if constant_type_remains and serves_all_constant_types(surface, candidate_mode):
+            return candidate_mode
+    for candidate_mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
+        if not constant_type_remains and serves_any_varying_type(surface, candidate_mode):
+            return candidate_mode
     return SUBTRACT_OFFSET
 
 
@@ -456,9 +456,9 @@ def deflection_error(surface, is_at_fault):
     if is_at_fault:
         for type_index in DEFLECTION_ERROR_TYPES_BY_PRECEDENCE:
             if type_remains(surface, type_index):
-                error_rad = deflection_error_under_type(surface, type_index)
-                if np.isfinite(error_rad):
-                    return error_rad
+                deflection_error_rad = deflection_error_under_type(surface, type_index)
+                if np.isfinite(deflection_error_rad):
+                    return deflection_error_rad
                 break
     return observed_deflection_error(surface)
 

@@ -149,7 +149,7 @@ def consistent_offset_interval(surface):
         surface.commands,
     )
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
-        return isolation.EMPTY_SET
+        return isolation.EMPTY_THETA_INTERVAL
     min_instant_position, max_instant_position = (
         position_low - max(healthy_position - commands.min_healthy_position[1], 0.0),
         position_high + max(commands.max_healthy_position[1] - healthy_position, 0.0),
@@ -287,11 +287,11 @@ def consistent_growing_bias_interval(config, surface, type_index, k):
 
 
 @kernel
-def has_run_towards_stop(surface, direction):
+def has_run_towards_stop(surface, stop_direction):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
-    if direction == 0:
+    if stop_direction == 0:
         return False
-    return surface.growing_bias.has_run_towards_stop[1 if direction > 0 else 0] == 1
+    return surface.growing_bias.has_run_towards_stop[1 if stop_direction > 0 else 0] == 1
 
 
 def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:

@@ -14,7 +14,6 @@ from tools.docs.tables.chosen import (
     choices,
     chosen_constants,
     chosen_flights,
-    chosen_results,
     draws_of,
 )
 
@@ -82,14 +81,12 @@ def test_no_flight_of_the_reproduction_is_one_that_its_gains_were_chosen_on():
 
 
 def test_a_row_says_its_constant_its_flights_and_its_results():
-    """Under the same number and name in each of the three tables."""
+    """Under the same number and name in both tables."""
     head, _, first, *_ = chosen_constants().splitlines()
     assert head == "| " + " | ".join(CONSTANT_HEAD) + " |"
     assert first.startswith("| 1 | tuned parameters | all values in `grades` |")
     assert "| 201 to 205, 211 to 216 |" in chosen_flights().splitlines()[2]
-    assert "| 101 to 111, 301 to 312 |" in chosen_results().splitlines()[2]
-    assert (
-        len({len(table().splitlines()) for table in (chosen_constants, chosen_flights, chosen_results)}) == 1
-    )
+    assert chosen_flights().splitlines()[2].endswith("| 101 to 111, 301 to 312 |")
+    assert len(chosen_constants().splitlines()) == len(chosen_flights().splitlines())
     assert _said({"drawn_by": "x", "seeds": [3, 1, 2, 9]}) == "1 to 3, 9"
     assert _said({"says": "none"}) == "-"

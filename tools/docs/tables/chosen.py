@@ -25,9 +25,11 @@ FILE = Path(__file__).parents[1] / "chosen.yaml"
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 TUNED_DRAWS = range(61)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-CONSTANT_HEAD = ("row", "name", "constant", "value", "determines", "file", "chosen by")
-FLIGHT_HEAD = ("row", "name", "flights that chose the constant", "their seeds")
-RESULT_HEAD = ("row", "name", "page", "flights of the results", "their seeds")
+CONSTANT_HEAD = ("row", "name", "constant", "value", "determines", "chosen by", "file")
+FLIGHT_HEAD = (
+    "row", "name", "flights that chose the constant", "seeds of the choice", "flights of the results",
+    "seeds of the results",
+)  # fmt: skip
 
 
 def chosen_constants() -> str:
@@ -39,13 +41,13 @@ def chosen_constants() -> str:
 
 
 def chosen_flights() -> str:
-    """Of each row, the flights that chose the constant."""
-    return _table(FLIGHT_HEAD, lambda choice: (choice["flights"]["says"], _said(choice["flights"])))
-
-
-def chosen_results() -> str:
-    """Of each row, the results that depend on the constant, and their flights."""
-    return _table(RESULT_HEAD, lambda choice: _result(choice["results"]))
+    """Of each row, the flights that chose the constant, beside those of the results that depend on it."""
+    return _table(
+        FLIGHT_HEAD,
+        lambda choice: (
+            choice["flights"]["says"], _said(choice["flights"]), *_result(choice["results"]),
+        ),
+    )  # fmt: skip
 
 
 RATIOS, RATIO_DRAWS = (3.0, 4.5, 6.5, 9.0, 13.0, 20.0), (101, 102)
@@ -133,11 +135,11 @@ def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) 
 
 
 def _where(choice: Document) -> tuple[str, str]:
-    return f"`{choice['where']}`", f"`{choice['command']}`" if choice["command"] else "by hand"
+    return f"`{choice['command']}`" if choice["command"] else "by hand", f"`{choice['where']}`"
 
 
-def _result(results: Document) -> tuple[str, str, str]:
-    return results["page"], results["says"], _said(results)
+def _result(results: Document) -> tuple[str, str]:
+    return f"{results['page']}: {results['says']}", _said(results)
 
 
 def choices() -> list[Document]:

@@ -213,7 +213,8 @@ def test_filters_of_bounds_are_those_of_residuals():
 
 def new_map(**fields):
     record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
-    record["n_boxes"], record["n_levels"], record["n_time_rows"], record["is_outside_all_boxes"] = 2, 3, 2, 7
+    record["n_boxes"], record["n_travel_levels"], record["n_time_rows"] = 2, 3, 2
+    record["is_outside_all_boxes"] = 7
     record["box_low"], record["box_high"] = -1e6, 1e6
     record["box_low"][0, 0], record["box_high"][0, 0] = -0.1, 0.1  # the inner box by roll rate
     record["box_low"][1, 5], record["box_high"][1, 5] = 30.0, 60.0  # the outer one by airspeed

@@ -121,7 +121,7 @@ def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     surface_positions_before: deflections in the frame before, rad; error_bound_now: error here, rad/s2.
     engine_asymmetry_bound: bound on the yawing moment of healthy engines, by box."""
     return record(
-        n_boxes=int, n_levels=int, n_time_rows=int, one_surface_may_be_anywhere=int,
+        n_boxes=int, n_travel_levels=int, n_time_rows=int, one_surface_may_be_anywhere=int,
         several_surfaces_may_be_anywhere=int,
         is_outside_all_boxes=int, box_index=int, time_row_index=int,
         time_s=float, until_s=MAX_AGES, box_low=(n_boxes, N_MAP_COORDINATES), box_high=(n_boxes,
@@ -161,18 +161,18 @@ def fill_error_map(
 ) -> None:
     """Write the map of the aircraft, if it has one. one_surface_may_be_anywhere: a faulty surface may be
     anywhere in its travel; several_surfaces_may_be_anywhere: more than one may."""
-    declared_map = aircraft.file.model_error_map
-    if declared_map is None:
+    declared_error_map = aircraft.file.model_error_map
+    if declared_error_map is None:
         return
-    n_levels, n_time_rows = len(declared_map.travel_share), len(declared_map.until_s)
+    n_travel_levels, n_time_rows = len(declared_error_map.travel_share), len(declared_error_map.until_s)
     error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
     error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
-    error_map["n_boxes"] = len(declared_map.boxes)
-    error_map["n_levels"], error_map["n_time_rows"] = n_levels, n_time_rows
-    error_map["until_s"][:n_time_rows] = declared_map.until_s
-    error_map["travel_share_by_level"][:n_levels] = declared_map.travel_share
+    error_map["n_boxes"] = len(declared_error_map.boxes)
+    error_map["n_travel_levels"], error_map["n_time_rows"] = n_travel_levels, n_time_rows
+    error_map["until_s"][:n_time_rows] = declared_error_map.until_s
+    error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
     travel_share_of_surface = np.array(
-        [declared_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
+        [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
     error_map["travel_low"] = travel_share_of_surface * [
         travel.min_rad for travel in aircraft.travel.values()
@@ -180,12 +180,14 @@ def fill_error_map(
     error_map["travel_high"] = travel_share_of_surface * [
         travel.max_rad for travel in aircraft.travel.values()
     ]
-    for box_index, box in enumerate(declared_map.boxes):
+    for box_index, box in enumerate(declared_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
         error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
         error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
         errors_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        error_map["error_bound"][:n_time_rows, box_index, :n_levels] = np.stack(errors_by_axis, axis=-1)
+        error_map["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
+            errors_by_axis, axis=-1
+        )
         error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
 
 
@@ -271,10 +273,8 @@ def fill_signal_magnitudes(declared_errors, x, y, u):
 def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
     """Fill moment_magnitude (3,), the sum of the magnitudes of a moment's terms, and moment_error_bound (3,),
     the bound on the error of this sum; N m."""
-    measured_pressure, max_pressure = (
-        declared_errors.magnitude_y[QDYN],
-        declared_errors.magnitude_bound_y[QDYN],
-    )
+    measured_dynamic_pressure = declared_errors.magnitude_y[QDYN]
+    max_dynamic_pressure = declared_errors.magnitude_bound_y[QDYN]
     moment_table = design.moments
     for i in range(3):
         coefficient_magnitude, max_coefficient_magnitude = 0.0, 0.0
@@ -293,10 +293,11 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
             ) * max_factor_magnitude
         wing_area_times_length = design.S * (design.c if i == 1 else design.b)
         declared_errors.moment_magnitude[i] = (
-            wing_area_times_length * measured_pressure * coefficient_magnitude
+            wing_area_times_length * measured_dynamic_pressure * coefficient_magnitude
         )
         declared_errors.moment_error_bound[i] = wing_area_times_length * (
-            max_pressure * max_coefficient_magnitude - measured_pressure * coefficient_magnitude
+            max_dynamic_pressure * max_coefficient_magnitude
+            - measured_dynamic_pressure * coefficient_magnitude
         )
 
 
@@ -459,7 +460,7 @@ def map_travel_level_index_for_positions(error_map, u):
     """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
     travel may be used."""
     if error_map.several_surfaces_may_be_anywhere:
-        return error_map.n_levels - 1
+        return error_map.n_travel_levels - 1
     travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
@@ -471,7 +472,7 @@ def map_travel_level_index_for_positions(error_map, u):
 @kernel
 def map_travel_level_index_for_share(error_map, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
-    last_level_index = error_map.n_levels - 1
+    last_level_index = error_map.n_travel_levels - 1
     for j in range(last_level_index):
         if travel_share <= error_map.travel_share_by_level[j]:
             return j
@@ -479,11 +480,11 @@ def map_travel_level_index_for_share(error_map, travel_share):
 
 
 @kernel
-def max_travel_share_used(error_map, s, position_interval, share_before, n_instants):
+def max_travel_share_used(error_map, s, position_interval, travel_share_before, n_instants):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
-    position_interval: (low, high) rad, of the mean position over the instants; share_before: the share at the
-    start of the frame, where the surface may still be at the first instant.
+    position_interval: (low, high) rad, of the mean position over the instants; travel_share_before: the share
+    at the start of the frame, where the surface may still be at the first instant.
     """
     max_share_used, (position_low, position_high) = 0.0, position_interval
     if position_high > 0.0:
@@ -493,7 +494,9 @@ def max_travel_share_used(error_map, s, position_interval, share_before, n_insta
             max_share_used, position_low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0
         )
     if n_instants > 1:
-        max_share_used = max(share_before, (n_instants * max_share_used + share_before) / (n_instants - 1))
+        max_share_used = max(
+            travel_share_before, (n_instants * max_share_used + travel_share_before) / (n_instants - 1)
+        )
     return min(max_share_used, 1.0)
 
 
@@ -926,9 +929,9 @@ def moment_term_tolerances(
         + relative_term_tolerances * coefficient_magnitudes
     )
     coefficient_slope_magnitudes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
-    span, chord = aircraft.geometry.span_m, aircraft.geometry.chord_m
+    span_m, chord_m = aircraft.geometry.span_m, aircraft.geometry.chord_m
     for gyro, signal_index, rate_normalisation_length_m in zip(
-        AXES, (PH, QH, RH), (span / 2, chord, span / 2), strict=True
+        AXES, (PH, QH, RH), (span_m / 2, chord_m, span_m / 2), strict=True
     ):
         normalised_rate_error = sensor_errors[gyro].steady * rate_normalisation_length_m / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):

@@ -313,13 +313,18 @@ def update_gust_rotation(gust, y, attitude, dt):
     update_gust_axes(gust, sin_heading_change, cos_heading_change)
     update_gust_axes_rate(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    unmeasured_share_before = gust.memory.unmeasured_yawing_share_by_turn_now
+    unmeasured_yawing_share_before = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(
         gust, V, heading_change / dt
     )
-    unmeasured_share = max(unmeasured_share_before, gust.memory.unmeasured_yawing_share_by_turn_now)
+    unmeasured_yawing_share = max(
+        unmeasured_yawing_share_before, gust.memory.unmeasured_yawing_share_by_turn_now
+    )
     gust.memory.unmeasured_yawing_share_by_past_turns = min(
-        max(np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns, unmeasured_share),
+        max(
+            np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns,
+            unmeasured_yawing_share,
+        ),
         1.0,
     )
     gust.memory.unmeasured_pitching_share_by_start *= np.exp(-dt / pitching_lag_s)
@@ -331,7 +336,7 @@ def update_gust_rotation(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
-    if unmeasured_share < 1.0:
+    if unmeasured_yawing_share < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
             predicted_velocity_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)

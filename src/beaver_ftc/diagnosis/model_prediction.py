@@ -108,7 +108,7 @@ def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
                     bound_record.declared_errors.acceleration_error_per_rad[i, s] * abs(u[s])
                 )
     if bound_record.model_error_map.one_surface_may_be_anywhere:
-        for j in range(bound_record.model_error_map.n_levels):
+        for j in range(bound_record.model_error_map.n_travel_levels):
             for i in range(3):
                 bound_record.additional_error_by_travel_level[j, i] += (
                     prediction.frame_share_per_instant

@@ -115,7 +115,7 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
         bound["model_error_map"]["one_surface_may_be_anywhere"],
-        bound["model_error_map"]["n_levels"],
+        bound["model_error_map"]["n_travel_levels"],
         bound["model_error_map"]["travel_share_by_level"][:3],
     ) = (
         1,

@@ -71,26 +71,26 @@ def residual_interval(
     theta_estimate,
     uncertainty_bound,
 ):
-    """The signed interval (lower, upper), rad/s, that holds the residual of the true estimator.
+    """The signed interval (low, high), rad/s, that holds the residual of the true estimator.
 
     The parameter may move anywhere within [theta_min, theta_max] at every instant, so an incipient or
     intermittent fault is covered. With Z+ and Z- the filtered positive and negative part of Z, the filtered
     Z theta lies between theta_min Z+ + theta_max Z- and theta_max Z+ + theta_min Z-. The residual is this
     effect minus Omega thetahat, plus or minus the bound on the uncertainty.
     """
-    lower = (
+    residual_low = (
         theta_min * filtered_positive_Z
         + theta_max * filtered_negative_Z
         - filtered_regressor * theta_estimate
         - uncertainty_bound
     )
-    upper = (
+    residual_high = (
         theta_max * filtered_positive_Z
         + theta_min * filtered_negative_Z
         - filtered_regressor * theta_estimate
         + uncertainty_bound
     )
-    return lower, upper
+    return residual_low, residual_high
 
 
 @kernel
@@ -217,12 +217,12 @@ def residual_threshold_ratio(filter_bank, m, i):
 @kernel
 def filter_nearest_to_alarm(filter_bank, i):
     """The filter that is nearest to its bound on axis i: the one the alarm comes from, if there is one."""
-    m_nearest, max_ratio = 0, 0.0
+    nearest_filter_index, max_ratio = 0, 0.0
     for m in range(filter_bank.config.n_filters):
         ratio = residual_threshold_ratio(filter_bank, m, i)
         if ratio > max_ratio:
-            m_nearest, max_ratio = m, ratio
-    return m_nearest
+            nearest_filter_index, max_ratio = m, ratio
+    return nearest_filter_index
 
 
 @kernel

@@ -101,11 +101,11 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
 
 
 @kernel
-def fill_force_flow_lag_error_bound(force, scaled_force_before, has_earlier_update, dt):
+def fill_force_flow_lag_error_bound(force_record, scaled_force_before, has_earlier_update, dt):
     """Fill `force_flow_lag_error_bound` from the change of the model's e since `scaled_force_before`: force
     and flow differ in time."""
-    force.force_flow_lag_error_bound = (
-        MAX_FORCE_FLOW_LAG_S * abs(force.predicted_scaled_force - scaled_force_before) / dt
+    force_record.force_flow_lag_error_bound = (
+        MAX_FORCE_FLOW_LAG_S * abs(force_record.predicted_scaled_force - scaled_force_before) / dt
         if has_earlier_update
         else 0.0
     )
@@ -119,14 +119,14 @@ def fill_readings_without_vanes(forces, air_rotation, y):
     """
     forces.y_without_vanes[:] = y
     for force_index in range(2):
-        force = forces.component[force_index]
+        force_record = forces.component[force_index]
         vane_index = BETA if force_index == SIDE_COMPONENT else ALPHA
         air_rotation_effect = 0.0
         for k in range(3):
-            air_rotation_effect += force.innovation_per_air_rotation[k] * air_rotation[k]
+            air_rotation_effect += force_record.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
-            force.innovation / forces.dynamic_pressure_over_trim + air_rotation_effect
-        ) / force.axis_and_force_innovation_per_vane_error[1]
+            force_record.innovation / forces.dynamic_pressure_over_trim + air_rotation_effect
+        ) / force_record.axis_and_force_innovation_per_vane_error[1]
 
 
 @kernel
@@ -138,47 +138,48 @@ def stop_using_forces(forces, gust, inertial_gust):
 
 
 @kernel
-def integrate_inertial_flow_angle(forces, force, force_index, y, dt):
+def integrate_inertial_flow_angle(forces, force_record, force_index, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     vane_angle = y[BETA if force_index == SIDE_COMPONENT else ALPHA]
     innovation_per_vane_rad = (
-        force.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
+        force_record.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
     )
-    force.inertial_flow_angle = (
-        force.inertial_flow_angle + dt * forces.flow_angle_rate[force_index]
+    force_record.inertial_flow_angle = (
+        force_record.inertial_flow_angle + dt * forces.flow_angle_rate[force_index]
         if forces.n_updates_capped_at_minimum
         else vane_angle
     )
-    force.innovation_per_flow_angle_drift += dt * innovation_per_vane_rad
-    force.innovation_at_inertial_flow_angle = force.innovation - innovation_per_vane_rad * (
-        vane_angle - force.inertial_flow_angle
+    force_record.innovation_per_flow_angle_drift += dt * innovation_per_vane_rad
+    force_record.innovation_at_inertial_flow_angle = force_record.innovation - innovation_per_vane_rad * (
+        vane_angle - force_record.inertial_flow_angle
     )
 
 
 @kernel
 def update_force_innovation(forces, gust, force_index, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
-    force_table, force = gust.memory.force_table, forces.component[force_index]
+    force_table, force_record = gust.memory.force_table, forces.component[force_index]
     first_term_index = force_table.free_from[SIDE_FORCE_TABLE_INDEX + force_index]
     end_term_index = force_table.surface_to[SIDE_FORCE_TABLE_INDEX + force_index]
     scaled_force_per_coefficient = (
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
     scaled_force = 0.0
-    force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
-    force.scaled_force_per_surface_rad[:], force.scaled_force_per_surface_rad_error_bound[:] = 0.0, 0.0
+    force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
+    force_record.scaled_force_per_surface_rad[:] = 0.0
+    force_record.scaled_force_per_surface_rad_error_bound[:] = 0.0
     for k in range(first_term_index, end_term_index):
         s = force_table.surface[k]
         scaled_force_per_term_value = (
             scaled_force_per_coefficient * force_table.power[force_table.monomial[k]]
         )
         if s >= 0:
-            force.scaled_force_per_surface_rad[s] += force_table.value[k] * scaled_force_per_term_value
-            force.scaled_force_per_surface_rad_error_bound[s] += force.regressor_tolerance[
+            force_record.scaled_force_per_surface_rad[s] += force_table.value[k] * scaled_force_per_term_value
+            force_record.scaled_force_per_surface_rad_error_bound[s] += force_record.regressor_tolerance[
                 k - first_term_index
             ] * abs(scaled_force_per_term_value)
             scaled_force_per_term_value *= u[s]
-        force.regressor[k - first_term_index] = scaled_force_per_term_value
+        force_record.regressor[k - first_term_index] = scaled_force_per_term_value
         scaled_force += force_table.value[k] * scaled_force_per_term_value
     if force_index == SIDE_COMPONENT:
         sideslip_rate_scaled_force = (
@@ -188,20 +189,23 @@ def update_force_innovation(forces, gust, force_index, measured, u):
             * forces.wing_span
             / (2.0 * measured.y[AIRSPEED])
         )
-        force.regressor[end_term_index - first_term_index] = sideslip_rate_scaled_force
+        force_record.regressor[end_term_index - first_term_index] = sideslip_rate_scaled_force
         scaled_force += sideslip_rate_scaled_force
-    force.regressor[force.n_regressors - 1], force.predicted_scaled_force = scaled_force, scaled_force
+    force_record.regressor[force_record.n_regressors - 1] = scaled_force
+    force_record.predicted_scaled_force = scaled_force
     if forces.n_updates_capped_at_minimum == 0:
-        force.previous_scaled_force_per_surface_rad[:] = force.scaled_force_per_surface_rad
+        force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
     for s in range(u.size):
-        force.scaled_force_of_surface_at_command[s] = force.previous_scaled_force_per_surface_rad[s] * u[s]
-    force.innovation = measured.force[1 + force_index] * forces.inverse_chord_per_m - scaled_force
+        force_record.scaled_force_of_surface_at_command[s] = (
+            force_record.previous_scaled_force_per_surface_rad[s] * u[s]
+        )
+    force_record.innovation = measured.force[1 + force_index] * forces.inverse_chord_per_m - scaled_force
     pressure_noise_scaled_force_std = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     for k in range(2):
-        force.noise_variance[k] = (
-            force.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
+        force_record.noise_variance[k] = (
+            force_record.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
             + pressure_noise_scaled_force_std * pressure_noise_scaled_force_std
-            + force.accelerometer_innovation_variance
+            + force_record.accelerometer_innovation_variance
         )
 
 
@@ -251,8 +255,11 @@ def configure_forces(
 
     acceleration_slopes_by_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
     """
-    y, statistical, aircraft, sensor_errors = trim[1], fdi["statistical"], declared.aircraft, declared.sensors
-    forces, gust, geometry = statistical["forces"], statistical["gust"], aircraft.geometry
+    y = trim[1]
+    statistical_record = fdi["statistical"]
+    aircraft = declared.aircraft
+    sensor_errors = declared.sensors
+    forces, gust, geometry = statistical_record["forces"], statistical_record["gust"], aircraft.geometry
     forces["inverse_chord_per_m"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
     forces["trim_dynamic_pressure"] = y[QDYN]
     forces["dynamic_pressure_noise_std"] = sensor_errors["qdyn"].random
@@ -269,34 +276,34 @@ def configure_forces(
         y, fdi["bound"]["declared_errors"], sensor_errors
     )
     for force_index, (vane_index, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
-        force, terms = forces["component"][force_index], force_terms(aircraft, force_index)
+        force_record, terms = forces["component"][force_index], force_terms(aircraft, force_index)
         force_slopes_with_slipstream = scaled_force_per_coefficient * _force_coefficient_slopes(
             aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim
         )
         force_slopes = force_slopes_with_slipstream[:-1]
         force_per_slipstream = force_slopes_with_slipstream[-1]
-        force["axis_and_force_innovation_per_vane_error"] = (
+        force_record["axis_and_force_innovation_per_vane_error"] = (
             -acceleration_slopes_by_y[axis, vane_index],
             -force_slopes[vane_index],
         )
-        force["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
-        force["innovation_per_air_rotation"] = force_slopes[3:]
+        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
+        force_record["innovation_per_air_rotation"] = force_slopes[3:]
         force_slopes_through_slipstream = force_slopes.copy()
         force_slopes_through_slipstream[AIRSPEED] += force_per_slipstream * slipstream_per_airspeed
         variance_by_reading = (force_slopes_through_slipstream * reading_noise_std) ** 2
         innovation_noise_variance = (
             variance_by_reading.sum() + force_per_slipstream**2 * slipstream_variance_by_other_readings
         )
-        force["trim_noise_variance_with_without_vane"] = (
+        force_record["trim_noise_variance_with_without_vane"] = (
             innovation_noise_variance,
             innovation_noise_variance - variance_by_reading[vane_index],
         )
         accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
-        force["accelerometer_innovation_variance"] = (
+        force_record["accelerometer_innovation_variance"] = (
             forces["inverse_chord_per_m"] * accelerometer_noise_std
         ) ** 2
         _configure_force_tolerances(
-            force,
+            force_record,
             declared,
             terms,
             y,
@@ -307,16 +314,16 @@ def configure_forces(
         surfaces_scaled_force_per_rad = scaled_force_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
-        force["deflection_error_effect_bound"] = (
+        force_record["deflection_error_effect_bound"] = (
             surfaces_scaled_force_per_rad * declared.actuators.deflection_rad
         )
-        force["flow_angle_drift_bound"] = _flow_angle_drift_bound(
+        force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
             sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
         )
         flow_angle_drift_intensity = (
-            FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force["flow_angle_drift_bound"]
+            FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force["inertial_innovation_drift_intensity"] = force_slopes[vane_index] ** 2 * (
+        force_record["inertial_innovation_drift_intensity"] = force_slopes[vane_index] ** 2 * (
             flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 
@@ -363,7 +370,7 @@ def _flow_angle_drift_bound(
 
 
 def _configure_force_tolerances(
-    force: np.void,
+    force_record: np.void,
     declared: Declared,
     terms: list[Term],
     y: np.ndarray,
@@ -378,23 +385,23 @@ def _configure_force_tolerances(
     accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
     relative_pressure_error_bound = sensor_errors["qdyn"].steady / y[QDYN] + sensor_errors["qdyn"].slope
     for k, term in enumerate(terms):
-        force["regressor_tolerance"][k] = (
+        force_record["regressor_tolerance"][k] = (
             coefficient_tolerance + relative_pressure_error_bound + vane_errors.slope
         ) * abs(term.value)
         if term.is_constant:
-            force["regressor_tolerance"][k] += vane_errors.steady * abs(coefficient_per_vane_rad)
+            force_record["regressor_tolerance"][k] += vane_errors.steady * abs(coefficient_per_vane_rad)
     n_regressors = len(terms)
     if force_index == SIDE_COMPONENT:
-        force["regressor_tolerance"][n_regressors] = (
+        force_record["regressor_tolerance"][n_regressors] = (
             coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
         )
         n_regressors = n_regressors + 1
     if accelerometer_errors.steady:
-        force["regressor_tolerance"][n_regressors] = accelerometer_errors.steady
-        force["regressor"][n_regressors] = inverse_chord_per_m
+        force_record["regressor_tolerance"][n_regressors] = accelerometer_errors.steady
+        force_record["regressor"][n_regressors] = inverse_chord_per_m
         n_regressors = n_regressors + 1
-    force["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer_errors.slope
-    force["n_regressors"] = n_regressors + 1
+    force_record["regressor_tolerance"][n_regressors] = MASS_TOLERANCE + accelerometer_errors.slope
+    force_record["n_regressors"] = n_regressors + 1
 
 
 def _force_coefficient(aircraft: Aircraft, coefficient_name: str, flight_state: TrimState) -> float:

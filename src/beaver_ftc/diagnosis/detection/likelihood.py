@@ -151,10 +151,10 @@ _FILTER_FIELDS = {
 FILTER_RECORD = record(**_FILTER_FIELDS)
 
 
-def set_supporting_correlation_signs(block: np.void, kinds: Sequence[int]) -> None:
+def set_supporting_correlation_signs(block: np.void, hypothesis_kinds: Sequence[int]) -> None:
     """Fill the sign of N that supports each hypothesis, in all of its onset tests."""
     block["onset_tests"]["supporting_correlation_sign"] = 0.0
-    for h, kind in enumerate(kinds):
+    for h, kind in enumerate(hypothesis_kinds):
         first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
         block["onset_tests"]["supporting_correlation_sign"][
             h // HYPOTHESES_PER_TEST_GROUP, first_test_index : first_test_index + N_ONSET_SLOTS
@@ -274,21 +274,21 @@ def advance_covariance(block, dt):
 
 
 @kernel
-def whiten(block, state, acceleration, dt, out):
+def whiten(block, filter_state, acceleration, dt, out):
     """Advance the filter by one frame of an acceleration (2,) rad/s2; dt s.
 
-    state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g; that of
-    the innovation has covariance S.
+    filter_state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g;
+    that of the innovation has covariance S.
     """
     for i in range(block.n_axes):
-        out[i] = state[i] + dt * (acceleration[i] - state[2 + i])
+        out[i] = filter_state[i] + dt * (acceleration[i] - filter_state[2 + i])
     for i in range(block.n_axes):
         remaining_rate_error, drift_correction = out[i], 0.0
         for j in range(block.n_axes):
             remaining_rate_error -= block.K_x[i, j] * out[j]
             drift_correction += block.K_d[i, j] * out[j]
-        state[i] = remaining_rate_error
-        state[2 + i] = block.drift_decay_factor * state[2 + i] + drift_correction
+        filter_state[i] = remaining_rate_error
+        filter_state[2 + i] = block.drift_decay_factor * filter_state[2 + i] + drift_correction
 
 
 @kernel

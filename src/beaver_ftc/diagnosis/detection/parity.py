@@ -427,8 +427,12 @@ def innovation_component(view, forces, gust, inertial_gust, innovation, componen
                 view, gust, inertial_gust
             ).output.mean_gust_acceleration[component]
         return innovation[component] - gust_acceleration
-    force = forces.component[component - SIDE_FORCE]
-    return force.innovation_at_inertial_flow_angle if view.uses_inertial_flow_angle else force.innovation
+    force_record = forces.component[component - SIDE_FORCE]
+    return (
+        force_record.innovation_at_inertial_flow_angle
+        if view.uses_inertial_flow_angle
+        else force_record.innovation
+    )
 
 
 @kernel
@@ -441,10 +445,9 @@ def column_entry_and_error(view, forces, bound_record, G, plane_axis_index):
         ].axis_and_force_innovation_per_vane_error[plane_axis_index]
         return column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(column_entry)
     if component >= SIDE_FORCE:
-        force = forces.component[component - SIDE_FORCE]
-        return force.previous_scaled_force_per_surface_rad[s], force.scaled_force_per_surface_rad_error_bound[
-            s
-        ]
+        force_record = forces.component[component - SIDE_FORCE]
+        column_entry = force_record.previous_scaled_force_per_surface_rad[s]
+        return column_entry, force_record.scaled_force_per_surface_rad_error_bound[s]
     error_bound = (
         bound_record.surface_error_per_rad[component, s] if bound_record.has_declared_surface_errors else 0.0
     )
@@ -587,17 +590,17 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         uncertainty_bound += abs(m[i]) * (
             noise_model.uncertainty_bound[i] + noise_model.additional_bound_for_surface_anywhere[i]
         )
-    for force_index, force in enumerate(forces.component):
+    for force_index, force_record in enumerate(forces.component):
         model_noise_std += abs(m[SIDE_FORCE + force_index]) * np.sqrt(
-            force.noise_variance[view.uses_inertial_flow_angle]
+            force_record.noise_variance[view.uses_inertial_flow_angle]
         )
         if view.uses_inertial_flow_angle:
             drift_intensity += (
                 m[SIDE_FORCE + force_index] * forces.dynamic_pressure_over_trim
-            ) ** 2 * force.inertial_innovation_drift_intensity
+            ) ** 2 * force_record.inertial_innovation_drift_intensity
         uncertainty_bound += abs(m[SIDE_FORCE + force_index]) * (
-            force.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
-            + force.force_flow_lag_error_bound
+            force_record.deflection_error_effect_bound * forces.dynamic_pressure_over_trim
+            + force_record.force_flow_lag_error_bound
         )
     if gust.output.accounts_for_gusts:
         fill_gust_sensitivity(view, forces, gust.output.rate_damping)
@@ -643,13 +646,13 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
             block.regressor[j, 0] = m[ROLL] * rate_block.regressor[j, 0] + m[YAW] * rate_block.regressor[j, 1]
     next_regressor_index = rate_block.n_regressors
     if second_component >= SIDE_FORCE and m[second_component] != 0.0:
-        force = forces.component[second_component - SIDE_FORCE]
-        for j in range(force.n_regressors):
-            block.regressor[next_regressor_index + j, 0] = m[second_component] * force.regressor[j]
-        next_regressor_index += force.n_regressors
+        force_record = forces.component[second_component - SIDE_FORCE]
+        for j in range(force_record.n_regressors):
+            block.regressor[next_regressor_index + j, 0] = m[second_component] * force_record.regressor[j]
+        next_regressor_index += force_record.n_regressors
         if view.uses_inertial_flow_angle:
             block.regressor[next_regressor_index, 0] = (
-                m[second_component] * force.innovation_per_flow_angle_drift
+                m[second_component] * force_record.innovation_per_flow_angle_drift
             )
             next_regressor_index = next_regressor_index + 1
     if view.orthogonal_to_surface != AXIS_VIEW:
@@ -735,14 +738,14 @@ def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
     view."""
     if view.orthogonal_to_surface == s:
         return False
-    m, sensitivity = view.direction, 0.0
+    m, projected_effect_per_rad = view.direction, 0.0
     for i in range(3):
-        sensitivity += m[i] * effectiveness_column[i]
+        projected_effect_per_rad += m[i] * effectiveness_column[i]
     for force_index in range(2):
-        sensitivity += (
+        projected_effect_per_rad += (
             m[SIDE_FORCE + force_index] * forces.component[force_index].scaled_force_per_surface_rad[s]
         )
-    return sensitivity != 0.0
+    return projected_effect_per_rad != 0.0
 
 
 @kernel
@@ -887,8 +890,8 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
             )
 
 
-def _sum_of_unit_vectors(components: tuple[int, ...]) -> tuple[float, ...]:
-    return tuple(float(i in components) for i in range(NORMAL_FORCE + 1))
+def _sum_of_unit_vectors(component_indices: tuple[int, ...]) -> tuple[float, ...]:
+    return tuple(float(i in component_indices) for i in range(NORMAL_FORCE + 1))
 
 
 def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:

@@ -361,9 +361,11 @@ def _configure_bounded_uncertainty(
         block["alarm_level"] = statistical["test_config"]["alarm_level"]
         block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
         block["uncertainty_change_over_bound_per_frame"] = uncertainty_change_over_bound
-        kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
+        hypothesis_kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
-            block["n_hypotheses"] = np.sum((kinds != GROWING_LOSS) & (kinds != LOSS_END))
+            block["n_hypotheses"] = np.sum(
+                (hypothesis_kinds != GROWING_LOSS) & (hypothesis_kinds != LOSS_END)
+            )
         block["hypothesis"]["remaining_growth_decay_factor"] = exp(-LOSS_GROWTH_RATE_PER_S * dt_s)
 
 
@@ -384,10 +386,12 @@ def _configure_drift_and_model_noise(
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
         max_constant_error_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
-    _, G, f_x, f_y = jacobian(design, *trim)
-    statistical["noise"]["acceleration_variance_without_air_data"] = f_x**2 @ reading_noise_std[:3] ** 2
+    _, G, acceleration_slopes_by_x, acceleration_slopes_by_y = jacobian(design, *trim)
+    statistical["noise"]["acceleration_variance_without_air_data"] = (
+        acceleration_slopes_by_x**2 @ reading_noise_std[:3] ** 2
+    )
     acceleration_variance_by_air_data = (
-        f_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
+        acceleration_slopes_by_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
     )  # later as `add_reading_regressors` says
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
@@ -610,12 +614,12 @@ ALARM_RECORD = record(
 
 
 @sized
-def statistical_dtype(size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
+def statistical_dtype(record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
         test_config=TEST_CONFIG_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
-        block=(block_dtype(size.rate_block_capacity), N_FILTER_BLOCKS),
-        n_views=int, views=(parity_view_dtype(size.view_block_capacity), size.n_views),
+        block=(block_dtype(record_size.rate_block_capacity), N_FILTER_BLOCKS),
+        n_views=int, views=(parity_view_dtype(record_size.view_block_capacity), record_size.n_views),
         tone_config=TONE_CONFIG_RECORD,
         forces=MEASURED_FORCES_RECORD, gust=GUST_RECORD, inertial_gust=GUST_RECORD,
     )  # fmt: skip
@@ -854,27 +858,30 @@ def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_
     loss_llr_share_limit = 1.0 if is_abrupt and has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
     loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
     for lateral_block in blocks[LATERAL_BLOCK:]:
-        min_alternative_llr = best_alternative_llr_lower_bound(
+        alternative_llr_lower_bound = best_alternative_llr_lower_bound(
             pitch_block, estimators, loss_estimator, surface
         )
-        min_alternative_llr = max(
-            min_alternative_llr,
+        alternative_llr_lower_bound = max(
+            alternative_llr_lower_bound,
             best_alternative_llr_lower_bound(lateral_block, estimators, loss_estimator, surface),
         )
-        max_loss_llr = max(
+        upper_bound_of_loss_llr = max(
             loss_llr_upper_bound(pitch_block, surface, False),
             loss_llr_upper_bound(lateral_block, surface, False),
         )
-        max_loss_end_llr = loss_llr_upper_bound(lateral_block, surface, True)
+        upper_bound_of_loss_end_llr = loss_llr_upper_bound(lateral_block, surface, True)
         if may_loss_end_in_pitch:
-            max_loss_end_llr = max(max_loss_end_llr, loss_llr_upper_bound(pitch_block, surface, True))
+            upper_bound_of_loss_end_llr = max(
+                upper_bound_of_loss_end_llr, loss_llr_upper_bound(pitch_block, surface, True)
+            )
         is_loss_unlikely = (
-            max_loss_llr < loss_llr_share_limit * min_alternative_llr
-            and max_loss_end_llr < loss_end_llr_share_limit * min_alternative_llr
+            upper_bound_of_loss_llr < loss_llr_share_limit * alternative_llr_lower_bound
+            and upper_bound_of_loss_end_llr < loss_end_llr_share_limit * alternative_llr_lower_bound
         )
         if (
             is_loss_unlikely
-            and min_alternative_llr - max(max_loss_llr, max_loss_end_llr) > test_config.isolation_llr_margin
+            and alternative_llr_lower_bound - max(upper_bound_of_loss_llr, upper_bound_of_loss_end_llr)
+            > test_config.isolation_llr_margin
         ):
             return True
     return False
@@ -994,7 +1001,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
             )
         if bound_record.model_error_map.one_surface_may_be_anywhere:
             noise_model.additional_bound_for_surface_anywhere[i] = additional_error_at_travel_level(
-                bound_record.model_error_map, bound_record.model_error_map.n_levels - 1, i
+                bound_record.model_error_map, bound_record.model_error_map.n_travel_levels - 1, i
             )
     for block_index, block in enumerate(blocks):
         for i, axis in enumerate(block.axes[: block.n_axes]):

@@ -46,7 +46,10 @@ def _sections() -> Iterator[str]:
         names = [name for name in left if name.startswith(beginnings)]
         left = [name for name in left if name not in names]
         rows = [_row(name) for name in names]
-        caption = f"*Table {number}. {heading}: curves of each flight, its scenario, and its outcome.*"
+        caption = (
+            f"*Table {number}. {heading}: picture, scenario and outcome of each flight. "
+            "Deflections are in deg, times in s.*"
+        )
         yield f"## {heading}\n\n{caption}\n\n{markdown_table(('flight', 'scenario', 'outcome'), rows)}"
 
 
@@ -56,7 +59,8 @@ def _row(name: str) -> tuple[str, str, str]:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(_thumbnail(flight), encoding="utf-8")
     description = " ".join(bf.load(name).description.split())
-    return f"![Curves of {name}]({path.as_posix()})", f"`{name}`<br>{description}", _outcome(flight)
+    shown = f"![{name}: deflection, and ratio of residual to threshold, over time]({path.as_posix()})"
+    return shown, f"`{name}`<br>{description}", _outcome(flight)
 
 
 def _outcome(flight: Flight) -> str:

@@ -194,7 +194,7 @@ MISMATCH = {
 IDENTIFY = {
     "beaver_ftc_logs__vehicle__load_vehicle": "vehicle",
     "beaver_ftc_logs__samples__load_flights_for_fit": ["flight"],
-    "beaver_ftc_logs__identification__scale_commands_by_dynamic_pressure": (
+    "beaver_ftc_logs__identification__scale_by_dynamic_pressure_if_better": (
         [SimpleNamespace(name="pressed", n_log_parts=2, notes=["long"])],
         "described",
     ),

@@ -119,9 +119,10 @@ def reproduction_not_borne_out() -> str:
 
 
 def _not_borne_out(document: Document) -> str:
-    return markdown_table(("published", "statement", "ours", "limit", "why"), [
-        (claim["where"], claim["statement"], _ours(claim), limit(claim), claim["because"])
-        for claim in measured(document) if claim["verdict"] == NOT_BORNE_OUT
+    shown = [claim for claim in measured(document) if claim["verdict"] == NOT_BORNE_OUT]
+    return markdown_table(("row", "published", "statement", "ours", "limit", "why"), [
+        (str(row), claim["where"], claim["statement"], _ours(claim), limit(claim), claim["because"])
+        for row, claim in enumerate(shown, 1)
     ])  # fmt: skip
 
 
@@ -199,10 +200,14 @@ def reproduction_beside() -> str:
 
 def _beside(document: Document) -> str:
     both = document["beside"]
-    head = ("case, flown by", "isolated after, s", "RMS before, deg/s", "after", "travel, deg", "work")
+    head = (
+        "case", "flown by", "isolated after, s", "RMS before, deg/s", "RMS after, deg/s", "travel, deg",
+        "work, deg²/s",
+    )  # fmt: skip
     rows = [
         (
-            f"{row['case']}, {row['flown_by']}",
+            row["case"],
+            row["flown_by"],
             *(plain_number(row[key]) for key in ("isolated_s", "before_deg_s", "after_deg_s")),
             *(f"{row[key]:.0f}" for key in ("travel_deg", "work_deg2_per_s")),
         )

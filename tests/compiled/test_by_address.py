@@ -138,8 +138,16 @@ OF_A_FLIGHT |= {f"laws.{step}" for step in ("prepare", "command_surfaces", "comp
 def test_a_flight_asks_for_what_it_uses_and_for_nothing_else():
     done = subprocess.run([sys.executable, "-c", FLIGHTS], capture_output=True, text=True, check=True)
     published, diagnoses_all_types = (set(line.split()) for line in done.stdout.splitlines()[-2:])
-    steps_of_losses = ("skip_begin_loss_isolation", "skip_record_commands_for_losses", "isolate_loss")
-    steps_of_types = ("begin_fault_type_isolation", "record_surface_commands", "isolate_fault_type")
+    steps_of_losses = (
+        "skip_begin_loss_isolation",
+        "skip_record_commands_for_losses",
+        "isolate_loss_by_worst_case",
+    )
+    steps_of_types = (
+        "begin_fault_type_isolation",
+        "record_surface_commands",
+        "isolate_fault_type_by_worst_case",
+    )
     of_class = [
         {f"adaptive_estimators.{step}" for step in steps} for steps in (steps_of_losses, steps_of_types)
     ]

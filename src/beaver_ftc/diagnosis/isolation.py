@@ -224,10 +224,10 @@ def reset_feasible_theta_sets(fie, projection_disabled):
 def intersect_feasible_theta_sets(fie, axis, theta_interval, shared_by_axes):
     """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `theta_interval`."""
     theta_low, theta_high = theta_interval
-    for other_axis in range(3):
-        if shared_by_axes or other_axis == axis:
-            fie.feasible_theta_min[other_axis] = max(fie.feasible_theta_min[other_axis], theta_low)
-            fie.feasible_theta_max[other_axis] = min(fie.feasible_theta_max[other_axis], theta_high)
+    for set_axis in range(3):
+        if shared_by_axes or set_axis == axis:
+            fie.feasible_theta_min[set_axis] = max(fie.feasible_theta_min[set_axis], theta_low)
+            fie.feasible_theta_max[set_axis] = min(fie.feasible_theta_max[set_axis], theta_high)
 
 
 @kernel

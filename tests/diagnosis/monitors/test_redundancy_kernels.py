@@ -9,11 +9,12 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW_TEST,
-    ANGLE_TEST,
     BETA,
     BETA_FLOW_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
+    FIRST_ANGLE_TEST,
+    FIRST_TURN_TEST,
     MANIFOLD_PRESSURE_TEST,
     QDYN,
     REDUNDANCY_RECORD,
@@ -21,7 +22,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     TEST_RECORD,
     THETA,
-    TURN_TEST,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
@@ -155,8 +155,8 @@ def test_residuals_are_readings_less_predictions():
     predicted[PHI : PHI + 3] = now + 2.0 * np.pi * np.array([0, 0, 1])
     then[[QDYN, AIRSPEED]] = 1000.0, 40.0
     residual = compared(now, signal, predicted, then)
-    assert residual[TURN_TEST : TURN_TEST + 3] == pytest.approx([1e-4, -2e-4, 3e-4], rel=1e-6)
-    assert residual[ANGLE_TEST : ANGLE_TEST + 3] == pytest.approx(attitude - now, abs=1e-14)
+    assert residual[FIRST_TURN_TEST : FIRST_TURN_TEST + 3] == pytest.approx([1e-4, -2e-4, 3e-4], rel=1e-6)
+    assert residual[FIRST_ANGLE_TEST : FIRST_ANGLE_TEST + 3] == pytest.approx(attitude - now, abs=1e-14)
     assert residual[[SPEED_TEST, ALPHA_FLOW_TEST, BETA_FLOW_TEST, CLIMB_TEST]] == pytest.approx(
         [0.3, 0.01, -0.02, 4.0]
     )
@@ -252,8 +252,8 @@ SIDES = ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, 1, -1), (1, 1, -1))
 SIZES = {AIRSPEED: 2.0, QDYN: 50.0, ALTITUDE: 10.0, **dict.fromkeys(range(AX, N_SENSORS), 1.0)}
 # The tests by which an instrument is known: its bounds there are hardly wider than what it can do.
 KNOWN_BY = {
-    **{gyro: {TURN_TEST + gyro, ANGLE_TEST + gyro} for gyro in range(3)},
-    **{PHI + i: {TURN_TEST + i, ANGLE_TEST + i} for i in range(3)},
+    **{gyro: {FIRST_TURN_TEST + gyro, FIRST_ANGLE_TEST + gyro} for gyro in range(3)},
+    **{PHI + i: {FIRST_TURN_TEST + i, FIRST_ANGLE_TEST + i} for i in range(3)},
     ALPHA: {ALPHA_FLOW_TEST},
     BETA: {BETA_FLOW_TEST},
     AIRSPEED: {SPEED_TEST, DENSITY_TEST},
@@ -456,10 +456,10 @@ def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
         signal[THETA] = pitch
         redundancy.run_redundancy_tests(relations, signal, False)
         redundancy.store_sample(relations, signal, signal[AX:])
-        shares.append(relations["test"]["residual_bound_ratio"][ANGLE_TEST + 1])
+        shares.append(relations["test"]["residual_bound_ratio"][FIRST_ANGLE_TEST + 1])
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
     assert shares[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
-    assert relations["test"]["filtered_residual"][ANGLE_TEST + 1] == pytest.approx(
+    assert relations["test"]["filtered_residual"][FIRST_ANGLE_TEST + 1] == pytest.approx(
         [-0.03] * 3
     )  # nothing of what was before
 
@@ -512,4 +512,6 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
         else:
             redundancy.run_redundancy_tests(relations, signal, False)
             redundancy.store_sample(relations, signal, signal[AX:])
-        assert (relations["test"]["residual_bound_ratio"][TURN_TEST : TURN_TEST + 3] <= 1.0).all(), k
+        assert (
+            relations["test"]["residual_bound_ratio"][FIRST_TURN_TEST : FIRST_TURN_TEST + 3] <= 1.0
+        ).all(), k

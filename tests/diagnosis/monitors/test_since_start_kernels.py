@@ -18,6 +18,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     BETA_HYPOTHESIS,
     CLIMB_TEST,
     DENSITY_TEST,
+    FIRST_TURN_TEST,
     N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
     PHI_HYPOTHESIS,
@@ -26,7 +27,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     THETA_HYPOTHESIS,
-    TURN_TEST,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, AX, N_SENSORS, PHI
 
@@ -201,10 +201,10 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
         (ALPHA_HYPOTHESIS, 7, (7,), False),
         (AIRSPEED_HYPOTHESIS, CLIMB_TEST, (SPEED_TEST, DENSITY_TEST), True),
         (AIRSPEED_HYPOTHESIS, DENSITY_TEST, (DENSITY_TEST,), False),
-        (PHI_HYPOTHESIS, 8, (TURN_TEST, TURN_TEST + 2, 3), True),
+        (PHI_HYPOTHESIS, 8, (FIRST_TURN_TEST, FIRST_TURN_TEST + 2, 3), True),
         (PHI_HYPOTHESIS, 8, (4,), False),
-        (PHI_HYPOTHESIS, TURN_TEST, (TURN_TEST,), False),
-        (THETA_HYPOTHESIS, 8, (TURN_TEST + 1, 4), True),
+        (PHI_HYPOTHESIS, FIRST_TURN_TEST, (FIRST_TURN_TEST,), False),
+        (THETA_HYPOTHESIS, 8, (FIRST_TURN_TEST + 1, 4), True),
         (THETA_HYPOTHESIS, 8, (3,), False),
         (BETA_HYPOTHESIS, CLIMB_TEST, (12,), False),
         (BETA_HYPOTHESIS, CLIMB_TEST, (), True),

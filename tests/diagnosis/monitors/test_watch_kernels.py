@@ -11,11 +11,12 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
     ALPHA_FLOW_TEST,
-    ANGLE_TEST,
     BETA,
     BETA_FLOW_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
+    FIRST_ANGLE_TEST,
+    FIRST_TURN_TEST,
     GYRO_ERROR_CONFIRMED,
     GYRO_ERROR_REFUTED,
     GYRO_ERROR_UNDECIDED,
@@ -28,7 +29,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SENSOR_MONITOR_RECORD,
     SPEED_TEST,
     THETA,
-    TURN_TEST,
 )
 from beaver_ftc.diagnosis.state import NOT_ISOLATED
 from beaver_ftc.loop import frame
@@ -129,18 +129,24 @@ def suspects(shares, lead=None, **fields):
         ({BETA_FLOW_TEST: 5.0}, {BETA, *FORCES}),
         ({ALPHA_FLOW_TEST: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
         ({BETA_FLOW_TEST: 2.0}, {BETA, 2, *FORCES}),
-        ({ALPHA_FLOW_TEST: 5.0, TURN_TEST + 1: 2.0}, {1}),
-        ({BETA_FLOW_TEST: 5.0, TURN_TEST + 2: 2.0}, {2}),
-        ({BETA_FLOW_TEST: 5.0, TURN_TEST: 2.0}, {0}),  # no instrument of the flow moves the attitude's tests
-        ({ALPHA_FLOW_TEST: 5.0, TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
-        ({TURN_TEST: 2.1}, {0}),
-        ({TURN_TEST + 2: 2.1}, {2}),
-        ({TURN_TEST: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
-        ({TURN_TEST + 1: 1.9}, {1, THETA}),
-        ({TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}, {1, THETA}),
-        ({TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
-        ({ANGLE_TEST + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
-        ({ANGLE_TEST: 2.0, ANGLE_TEST + 2: 1.5}, {0, 1, 2}),
+        ({ALPHA_FLOW_TEST: 5.0, FIRST_TURN_TEST + 1: 2.0}, {1}),
+        ({BETA_FLOW_TEST: 5.0, FIRST_TURN_TEST + 2: 2.0}, {2}),
+        (
+            {BETA_FLOW_TEST: 5.0, FIRST_TURN_TEST: 2.0},
+            {0},
+        ),  # no instrument of the flow moves the attitude's tests
+        ({ALPHA_FLOW_TEST: 5.0, FIRST_TURN_TEST: 2.0, FIRST_TURN_TEST + 1: 1.5}, set()),
+        ({FIRST_TURN_TEST: 2.1}, {0}),
+        ({FIRST_TURN_TEST + 2: 2.1}, {2}),
+        ({FIRST_TURN_TEST: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
+        ({FIRST_TURN_TEST + 1: 1.9}, {1, THETA}),
+        ({FIRST_TURN_TEST + 1: 2.0, FIRST_ANGLE_TEST + 1: 1.5}, {1, THETA}),
+        ({FIRST_TURN_TEST: 2.0, FIRST_TURN_TEST + 1: 1.5}, set()),
+        (
+            {FIRST_ANGLE_TEST + 2: 2.0},
+            {0, 1, 2, PSI},
+        ),  # an angle alone may be the first to show what a gyro does
+        ({FIRST_ANGLE_TEST: 2.0, FIRST_ANGLE_TEST + 2: 1.5}, {0, 1, 2}),
     ],
 )
 def test_who_is_suspected_of_what_the_tests_show(shares, who):
@@ -148,18 +154,18 @@ def test_who_is_suspected_of_what_the_tests_show(shares, who):
 
 
 def test_an_angle_that_is_frozen_is_no_gyro_s_doing():
-    shares, still = {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}, np.zeros(N_SENSORS, int)
+    shares, still = {FIRST_TURN_TEST + 1: 2.0, FIRST_ANGLE_TEST + 1: 1.5}, np.zeros(N_SENSORS, int)
     for looks, who in ((2, {1, THETA}), (3, {THETA})):
         still[THETA] = looks
         assert suspects(shares, n_identical_samples=still) == who
-    assert suspects({TURN_TEST: 2.1}, n_identical_samples=still) == set()
+    assert suspects({FIRST_TURN_TEST: 2.1}, n_identical_samples=still) == set()
 
 
 def test_a_large_error_moves_its_neighbours_a_little():
     """What is below a share of the largest of its kind is beyond its bound for a neighbour's sake."""
-    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 2.9}) == {0}
-    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 3.1}) == set()
-    assert suspects({ANGLE_TEST: 100.0, ANGLE_TEST + 1: 2.9}) == {0, 1, 2, PHI}
+    assert suspects({FIRST_TURN_TEST: 100.0, FIRST_TURN_TEST + 1: 2.9}) == {0}
+    assert suspects({FIRST_TURN_TEST: 100.0, FIRST_TURN_TEST + 1: 3.1}) == set()
+    assert suspects({FIRST_ANGLE_TEST: 100.0, FIRST_ANGLE_TEST + 1: 2.9}) == {0, 1, 2, PHI}
 
 
 @pytest.mark.parametrize(
@@ -189,7 +195,7 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
 def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
     assert (
         suspects(
-            {TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5},
+            {FIRST_TURN_TEST + 1: 2.0, FIRST_ANGLE_TEST + 1: 1.5},
             gyro_error_verdict=(GYRO_ERROR_UNDECIDED, say, GYRO_ERROR_UNDECIDED),
         )
         == who
@@ -197,9 +203,9 @@ def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
 
 
 def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
-    monitor = with_shares({TURN_TEST: 0.2, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.3})
+    monitor = with_shares({FIRST_TURN_TEST: 0.2, FIRST_TURN_TEST + 1: 0.5, FIRST_TURN_TEST + 2: 0.3})
     assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [1, 1, 1]
-    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 0.5, TURN_TEST + 2: 0.5})
+    monitor = with_shares({FIRST_TURN_TEST: 0.5, FIRST_TURN_TEST + 1: 0.5, FIRST_TURN_TEST + 2: 0.5})
     assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [0, 1, 2]
 
 
@@ -233,7 +239,7 @@ def test_how_much_of_the_flow_a_gyro_may_move_unseen(flow, gyro, share, less):
     """Twice what its own test leaves, by the kinematics of a flow at 0.2 rad and -0.3 rad."""
     monitor = new_watch()
     monitor["redundancy"]["memory"]["previous_reading"][[ALPHA, BETA]] = 0.2, -0.3
-    monitor["redundancy"]["test"]["filtered_bound"][TURN_TEST + gyro] = 40.0
+    monitor["redundancy"]["test"]["filtered_bound"][FIRST_TURN_TEST + gyro] = 40.0
     own = (flow, gyro) in ((ALPHA_FLOW_TEST, 1), (BETA_FLOW_TEST, 2))
     monitor["redundancy"]["test"]["filtered_residual"][flow] = -less * (80.0 * share + (2.0 if own else 1.0))
     assert watching.gyro_error_may_be_hidden(monitor, flow, gyro, own) == (less < 1.0 and share > 0.0)
@@ -488,7 +494,10 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
 def test_the_first_whole_frame_shows_no_jump(begun, asked):
     monitor, fdi = (
         with_shares(
-            {TURN_TEST: 2.0, ANGLE_TEST: 1.5}, substep=0, apparent_gyro_error=(0, 0.3, 0), start_stage=begun
+            {FIRST_TURN_TEST: 2.0, FIRST_ANGLE_TEST: 1.5},
+            substep=0,
+            apparent_gyro_error=(0, 0.3, 0),
+            start_stage=begun,
         ),
         new_fdi(),
     )
@@ -538,9 +547,9 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     monitor = new_watch(gyro_error_estimate=(0.0, -0.5, 0.0), gyro_error_estimate_bound=(0.1, 0.3, 0.1))
     test = monitor["redundancy"]["test"]
     test["filtered_bound"][:] = 9.0
-    test["filtered_bound"][TURN_TEST + 1, 0] = 0.02
+    test["filtered_bound"][FIRST_TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
-    test["residual"][TURN_TEST + 1] = size * limit + H * 0.5
+    test["residual"][FIRST_TURN_TEST + 1] = size * limit + H * 0.5
     watching.exclude_gyros_if_attitude_disagrees(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
@@ -693,7 +702,7 @@ def test_a_broken_altimeter_is_named_and_replaced_from_then_on():
 def test_the_rates_are_asked_once_a_frame(substep, asked):
     monitor, fdi = (
         with_shares(
-            {TURN_TEST: 2.0, ANGLE_TEST: 1.5},
+            {FIRST_TURN_TEST: 2.0, FIRST_ANGLE_TEST: 1.5},
             substep=substep,
             apparent_gyro_error=(0, 0.3, 0),
             start_stage=watching.START_STAGE_SHOWING_GYRO_ERROR_CHANGE,
@@ -746,29 +755,36 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
 def test_at_its_bound_a_test_is_within_it():
     """Shares of exactly one, and residuals of exactly the share that neighbours explain, are no suspicion."""
     at_first = {ALPHA, BETA, AIRSPEED, PHI, THETA}  # nothing is beyond what a first error may have done
-    assert suspects({TURN_TEST: 1.0, TURN_TEST + 1: 1.0}, lead=TURN_TEST) == {0, 1, 2, PSI} | at_first
-    assert suspects({ANGLE_TEST: 2.0, ANGLE_TEST + 1: 1.0}) == {0, 1, 2, PHI}
-    assert suspects({TURN_TEST: 100.0, TURN_TEST + 1: 100.0 * watching.MIN_SHARE_OF_LARGEST_RESIDUAL}) == {0}
+    assert (
+        suspects({FIRST_TURN_TEST: 1.0, FIRST_TURN_TEST + 1: 1.0}, lead=FIRST_TURN_TEST)
+        == {0, 1, 2, PSI} | at_first
+    )
+    assert suspects({FIRST_ANGLE_TEST: 2.0, FIRST_ANGLE_TEST + 1: 1.0}) == {0, 1, 2, PHI}
+    assert suspects(
+        {FIRST_TURN_TEST: 100.0, FIRST_TURN_TEST + 1: 100.0 * watching.MIN_SHARE_OF_LARGEST_RESIDUAL}
+    ) == {0}
     assert suspects({SPEED_TEST: 1.0, DENSITY_TEST: 1.0}, lead=DENSITY_TEST) == {QDYN} | at_first
 
 
 def test_of_a_kind_the_first_filter_says_how_large_it_is():
     """The others have less of it, or more of what was before."""
-    monitor = with_shares({TURN_TEST: 0.5, TURN_TEST + 1: 2.0}, alarm_test_index=TURN_TEST + 1)
-    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST : TURN_TEST + 3, 1:] = 1e3
-    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 50.0
-    assert watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
-    monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0] = 70.0
-    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
+    monitor = with_shares(
+        {FIRST_TURN_TEST: 0.5, FIRST_TURN_TEST + 1: 2.0}, alarm_test_index=FIRST_TURN_TEST + 1
+    )
+    monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST : FIRST_TURN_TEST + 3, 1:] = 1e3
+    monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST, 0] = 50.0
+    assert watching.exceeds_bound_beyond_cross_coupling(monitor, FIRST_TURN_TEST + 1, FIRST_TURN_TEST)
+    monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST, 0] = 70.0
+    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, FIRST_TURN_TEST + 1, FIRST_TURN_TEST)
     (
-        monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST, 0],
-        monitor["redundancy"]["test"]["filtered_residual"][TURN_TEST + 2, 0],
+        monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST, 0],
+        monitor["redundancy"]["test"]["filtered_residual"][FIRST_TURN_TEST + 2, 0],
     ) = (
         0.0,
         -70.0,
     )
-    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, TURN_TEST + 1, TURN_TEST)
-    for c in (TURN_TEST, ANGLE_TEST):
+    assert not watching.exceeds_bound_beyond_cross_coupling(monitor, FIRST_TURN_TEST + 1, FIRST_TURN_TEST)
+    for c in (FIRST_TURN_TEST, FIRST_ANGLE_TEST):
         small = new_watch()
         (
             small["redundancy"]["test"]["residual_bound_ratio"][c],
@@ -780,8 +796,8 @@ def test_of_a_kind_the_first_filter_says_how_large_it_is():
 
 
 def test_angles_are_held_against_angles_and_rates_against_rates():
-    assert suspects({TURN_TEST + 2: 100.0, ANGLE_TEST: 2.0}) == {2, PHI}
-    assert suspects({ANGLE_TEST: 100.0, TURN_TEST + 2: 2.0}, lead=TURN_TEST + 2) == {2, PHI}
+    assert suspects({FIRST_TURN_TEST + 2: 100.0, FIRST_ANGLE_TEST: 2.0}) == {2, PHI}
+    assert suspects({FIRST_ANGLE_TEST: 100.0, FIRST_TURN_TEST + 2: 2.0}, lead=FIRST_TURN_TEST + 2) == {2, PHI}
 
 
 def test_suspicions_of_the_frame_before_are_gone():

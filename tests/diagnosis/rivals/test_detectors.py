@@ -242,7 +242,7 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
     fit = SurfaceFit(1.0)
     for e, omega in zip(eps, Omega, strict=True):
         fit.step(e, omega)
-    surface, theta, misfit = fit.best_surface()
+    surface, theta, misfit = fit.fit_best_surface()
     solution = np.linalg.lstsq(Omega[:, :, 1].reshape(-1, 1), eps.ravel(), rcond=None)[0][0]
     assert surface == 1
     assert theta == pytest.approx(solution)

@@ -65,12 +65,13 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     ALPHA,
     ALPHA_FLOW_TEST,
     ALPHA_HYPOTHESIS,
-    ANGLE_TEST,
     BETA,
     BETA_FLOW_TEST,
     BETA_HYPOTHESIS,
     CLIMB_TEST,
     DENSITY_TEST,
+    FIRST_ANGLE_TEST,
+    FIRST_TURN_TEST,
     MAX_PITCH_RAD,
     MIN_AIRSPEED_MPS,
     MIN_DYNAMIC_PRESSURE_PA,
@@ -81,7 +82,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     THETA_HYPOTHESIS,
-    TURN_TEST,
     max_pitch_angle,
 )
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
@@ -101,20 +101,21 @@ SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 # per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
 # reading that is off comes first; VANE: of alpha and of beta.
 (
-    PHI_PITCH_RATE_COUPLING,  # h q
-    PHI_YAW_RATE_COUPLING,  # h r
-    PHI_GRAVITY_DOWN_COUPLING,  # h g cos(theta) cos(phi)
-    PHI_GRAVITY_SIDE_COUPLING,  # h g cos(theta) sin(phi)
-    THETA_GRAVITY_COUPLING,  # h g cos(largest mean of reading and truth)
-    ALPHA_CLIMB_COUPLING,  # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
-    VANE_ROLL_RATE_COUPLING,  # h (p cos(alpha) + r sin(alpha))
-    VANE_YAW_RATE_COUPLING,  # h (p sin(alpha) - r cos(alpha))
-    ALPHA_FORCE_UNCERTAINTY,  # of the coupling of alpha with BETA_FLOW: bound on the part of the force
-    BETA_FORCE_UNCERTAINTY,  # of the coupling of beta with ALPHA_FLOW: the same
-    AIRSPEED_NORMAL_FORCE_COUPLING,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
-    AIRSPEED_SIDE_FORCE_COUPLING,  # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
-    AIRSPEED_DENSITY_COUPLING,  # 2 (log V - log V before)
-    THETA_HEADING_RATE_COUPLING,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
+    PHI_PITCH_RATE_COUPLING_INDEX,  # h q
+    PHI_YAW_RATE_COUPLING_INDEX,  # h r
+    PHI_GRAVITY_DOWN_COUPLING_INDEX,  # h g cos(theta) cos(phi)
+    PHI_GRAVITY_SIDE_COUPLING_INDEX,  # h g cos(theta) sin(phi)
+    THETA_GRAVITY_COUPLING_INDEX,  # h g cos(largest mean of reading and truth)
+    # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
+    ALPHA_CLIMB_COUPLING_INDEX,
+    VANE_ROLL_RATE_COUPLING_INDEX,  # h (p cos(alpha) + r sin(alpha))
+    VANE_YAW_RATE_COUPLING_INDEX,  # h (p sin(alpha) - r cos(alpha))
+    ALPHA_FORCE_UNCERTAINTY_INDEX,  # of the coupling of alpha with BETA_FLOW: bound on the part of the force
+    BETA_FORCE_UNCERTAINTY_INDEX,  # of the coupling of beta with ALPHA_FLOW: the same
+    AIRSPEED_NORMAL_FORCE_COUPLING_INDEX,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+    AIRSPEED_SIDE_FORCE_COUPLING_INDEX,  # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
+    AIRSPEED_DENSITY_COUPLING_INDEX,  # 2 (log V - log V before)
+    THETA_HEADING_RATE_COUPLING_INDEX,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
 ) = range(14)
 
 
@@ -162,9 +163,11 @@ def set_error_bounds_at_start(initial_errors, readings):
 
 
 @kernel
-def index_of_test_showing_error_change(hypothesis):
+def index_of_test_showing_error_change(hypothesis_index):
     """The test whose residual is, at once, the change of the error of a hypothesis."""
-    return (ALPHA_FLOW_TEST, BETA_FLOW_TEST, SPEED_TEST, ANGLE_TEST, ANGLE_TEST + 1)[hypothesis]
+    return (ALPHA_FLOW_TEST, BETA_FLOW_TEST, SPEED_TEST, FIRST_ANGLE_TEST, FIRST_ANGLE_TEST + 1)[
+        hypothesis_index
+    ]
 
 
 @kernel
@@ -222,24 +225,24 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
-        max_effect[PHI_HYPOTHESIS, TURN_TEST + i] = second_order_turn_rad2 + (
+        max_effect[PHI_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + (
             pitch_yaw_turn if i > 0 else 0.0
         )
-        max_effect[THETA_HYPOTHESIS, TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
+        max_effect[THETA_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
         # Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by e:
         # phi' = p + m tan(theta), psi' = m / cos(theta), with m = q sin(phi) + r cos(phi). The tangents, or
         # secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
         # theta' = q cos(phi) - r sin(phi) there is no theta.
-        max_effect[PHI_HYPOTHESIS, ANGLE_TEST + i] = theta_secant * (
+        max_effect[PHI_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
             pitch_yaw_turn + theta_secant * second_order_turn_rad2
         )
-        max_effect[THETA_HYPOTHESIS, ANGLE_TEST + i] = theta_secant * (
+        max_effect[THETA_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
             (max_heading_turn if i != 1 else 0.0) + max_theta_secant * second_order_turn_rad2
         )
     (
-        coupling_effect[PHI_PITCH_RATE_COUPLING],
-        coupling_effect[PHI_YAW_RATE_COUPLING],
-        coupling_effect[THETA_HEADING_RATE_COUPLING],
+        coupling_effect[PHI_PITCH_RATE_COUPLING_INDEX],
+        coupling_effect[PHI_YAW_RATE_COUPLING_INDEX],
+        coupling_effect[THETA_HEADING_RATE_COUPLING_INDEX],
     ) = (
         h * q,
         h * r,
@@ -250,7 +253,7 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     # times twice that.
     log_airspeed_change = np.log(max(readings[AIRSPEED], MIN_AIRSPEED_MPS) / V)
     max_effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
-    coupling_effect[AIRSPEED_DENSITY_COUPLING] = 2.0 * log_airspeed_change
+    coupling_effect[AIRSPEED_DENSITY_COUPLING_INDEX] = 2.0 * log_airspeed_change
 
 
 @kernel
@@ -346,12 +349,12 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     max_effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
     # is turned by the error
-    coupling_effect[PHI_GRAVITY_DOWN_COUPLING] = h * g * cos_theta * cos_phi
-    coupling_effect[PHI_GRAVITY_SIDE_COUPLING] = h * g * cos_theta * sin_phi
+    coupling_effect[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
+    coupling_effect[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch_magnitude = abs(previous_reading[THETA])
-    coupling_effect[THETA_GRAVITY_COUPLING] = (
+    coupling_effect[THETA_GRAVITY_COUPLING_INDEX] = (
         h
         * g
         * np.cos(
@@ -366,18 +369,18 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    coupling_effect[ALPHA_CLIMB_COUPLING] = (
+    coupling_effect[ALPHA_CLIMB_COUPLING_INDEX] = (
         h * V * cos_beta * vertical_projection_length * np.cos(min(max_mean_angle, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + flow_yaw_rate sin(e / 2)). beta off by
     # e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of either
     # sign, is an uncertainty of both
-    coupling_effect[VANE_ROLL_RATE_COUPLING], coupling_effect[VANE_YAW_RATE_COUPLING] = (
+    coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX], coupling_effect[VANE_YAW_RATE_COUPLING_INDEX] = (
         h * flow_roll_rate,
         h * flow_yaw_rate,
     )
-    coupling_effect[ALPHA_FORCE_UNCERTAINTY] = h * abs(sin_beta) * max_acceleration / V
-    coupling_effect[BETA_FORCE_UNCERTAINTY] = (
+    coupling_effect[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * max_acceleration / V
+    coupling_effect[BETA_FORCE_UNCERTAINTY_INDEX] = (
         h
         * np.sin(min(max_sideslip, 0.5 * np.pi))
         * beta_secant
@@ -386,8 +389,8 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
         / V
     )
     # V: a across the flow, over the airspeed
-    coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING] = h * normal_acceleration * beta_secant / V
-    coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING] = h * side_acceleration / V
+    coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * normal_acceleration * beta_secant / V
+    coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * side_acceleration / V
 
 
 @kernel
@@ -417,48 +420,52 @@ def max_effect_of_any_error(redundancy, test_index, pole_index):
 
 
 @kernel
-def max_current_error_effect(redundancy, initial_errors, hypothesis, test_index, pole_index):
+def max_current_error_effect(redundancy, initial_errors, hypothesis_index, test_index, pole_index):
     """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
     through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
     return (
         max_effect_of_any_error(redundancy, test_index, pole_index)
         + 2.0
-        * initial_errors.error_change_bound[hypothesis]
-        * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, pole_index]
+        * initial_errors.error_change_bound[hypothesis_index]
+        * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, pole_index]
     )
 
 
 @kernel
-def tighten_error_bound(initial_errors, hypothesis, max_effect, min_effect_per_unit_error):
+def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect_per_unit_error):
     """Lower the bound on an error whose effect is at most max_effect, and at least min_effect_per_unit_error
     a unit."""
     if min_effect_per_unit_error > 0.0:
-        initial_errors.error_bound[hypothesis] = min(
-            initial_errors.error_bound[hypothesis],
+        initial_errors.error_bound[hypothesis_index] = min(
+            initial_errors.error_bound[hypothesis_index],
             max_effect / (MIN_REMAINING_COUPLING_EFFECT_SHARE * min_effect_per_unit_error),
         )
 
 
 @kernel
-def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis, pole_index):
+def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis_index, pole_index):
     """The bound of `max_current_error_effect` on the velocity, m/s, in any direction."""
     V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     max_flow_angle_effect = np.hypot(
-        max_current_error_effect(redundancy, initial_errors, hypothesis, ALPHA_FLOW_TEST, pole_index),
-        max_current_error_effect(redundancy, initial_errors, hypothesis, BETA_FLOW_TEST, pole_index),
+        max_current_error_effect(redundancy, initial_errors, hypothesis_index, ALPHA_FLOW_TEST, pole_index),
+        max_current_error_effect(redundancy, initial_errors, hypothesis_index, BETA_FLOW_TEST, pole_index),
     )
     return np.hypot(
-        max_current_error_effect(redundancy, initial_errors, hypothesis, SPEED_TEST, pole_index),
+        max_current_error_effect(redundancy, initial_errors, hypothesis_index, SPEED_TEST, pole_index),
         V * max_flow_angle_effect,
     )
 
 
 @kernel
-def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis, pole_index):
+def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_index, pole_index):
     """The bound of `max_current_error_effect` on the rotation about the body's second and third axes, rad."""
     return np.hypot(
-        max_current_error_effect(redundancy, initial_errors, hypothesis, TURN_TEST + 1, pole_index),
-        max_current_error_effect(redundancy, initial_errors, hypothesis, TURN_TEST + 2, pole_index),
+        max_current_error_effect(
+            redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 1, pole_index
+        ),
+        max_current_error_effect(
+            redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 2, pole_index
+        ),
     )
 
 
@@ -472,8 +479,8 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             PHI_HYPOTHESIS,
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect[PHI_PITCH_RATE_COUPLING],
-                filtered_coupling_effect[PHI_YAW_RATE_COUPLING],
+                filtered_coupling_effect[PHI_PITCH_RATE_COUPLING_INDEX],
+                filtered_coupling_effect[PHI_YAW_RATE_COUPLING_INDEX],
             ),
         )
         tighten_error_bound(
@@ -481,25 +488,25 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             PHI_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect[PHI_GRAVITY_DOWN_COUPLING],
-                filtered_coupling_effect[PHI_GRAVITY_SIDE_COUPLING],
+                filtered_coupling_effect[PHI_GRAVITY_DOWN_COUPLING_INDEX],
+                filtered_coupling_effect[PHI_GRAVITY_SIDE_COUPLING_INDEX],
             ),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            filtered_coupling_effect[THETA_GRAVITY_COUPLING],
+            filtered_coupling_effect[THETA_GRAVITY_COUPLING_INDEX],
         )
         max_rotation_effect = np.hypot(
-            max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, TURN_TEST, m),
+            max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, THETA_HYPOTHESIS, m),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
             max_rotation_effect,
-            abs(filtered_coupling_effect[THETA_HEADING_RATE_COUPLING]),
+            abs(filtered_coupling_effect[THETA_HEADING_RATE_COUPLING_INDEX]),
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -511,15 +518,15 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
     max_half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
-        np.cos(max_half_error) * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING])
-        - np.sin(max_half_error) * abs(filtered_coupling_effect[VANE_YAW_RATE_COUPLING])
-        - filtered_coupling_effect[ALPHA_FORCE_UNCERTAINTY]
+        np.cos(max_half_error) * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX])
+        - np.sin(max_half_error) * abs(filtered_coupling_effect[VANE_YAW_RATE_COUPLING_INDEX])
+        - filtered_coupling_effect[ALPHA_FORCE_UNCERTAINTY_INDEX]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        filtered_coupling_effect[ALPHA_CLIMB_COUPLING],
+        filtered_coupling_effect[ALPHA_CLIMB_COUPLING_INDEX],
     )
     tighten_error_bound(
         initial_errors,
@@ -529,8 +536,8 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING])
-        - filtered_coupling_effect[BETA_FORCE_UNCERTAINTY]
+        * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX])
+        - filtered_coupling_effect[BETA_FORCE_UNCERTAINTY_INDEX]
     )
     tighten_error_bound(
         initial_errors,
@@ -556,7 +563,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING]),
+        abs(filtered_coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX]),
     )
     tighten_error_bound(
         initial_errors,
@@ -565,7 +572,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING]),
+        abs(filtered_coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING_INDEX]),
     )
     max_change_effect = (
         2.0
@@ -578,7 +585,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
         + max_change_effect,
-        abs(filtered_coupling_effect[AIRSPEED_DENSITY_COUPLING]),
+        abs(filtered_coupling_effect[AIRSPEED_DENSITY_COUPLING_INDEX]),
     )
 
 
@@ -595,19 +602,21 @@ def update_initial_error_bounds(redundancy, initial_errors, readings):
 
 
 @kernel
-def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis, test_index):
+def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis_index, test_index):
     """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
     pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
     test = redundancy.test[test_index]
-    error_bound = initial_errors.error_bound[hypothesis] + initial_errors.error_change_bound[hypothesis]
+    error_bound = (
+        initial_errors.error_bound[hypothesis_index] + initial_errors.error_change_bound[hypothesis_index]
+    )
     if test_index >= RPM_TEST:
         return test.residual_bound_ratio > 1.0
     bound_factor = 1.0 + (
-        error_bound if hypothesis == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST else 0.0
+        error_bound if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST else 0.0
     )
     for m in range(redundancy.config.filter_decay.size):
         max_error_effect = (
-            error_bound * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, m]
+            error_bound * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
         )
         if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + max_error_effect:
             return True
@@ -621,12 +630,12 @@ def store_error_bounds_at_alarm(initial_errors):
 
 
 @kernel
-def max_error_effect_at_alarm(initial_errors, hypothesis, test_index, pole_index):
+def max_error_effect_at_alarm(initial_errors, hypothesis_index, test_index, pole_index):
     """Bound the effect on a test, through a filter, of an error as large as that of a hypothesis could be at
     the alarm: b W_tm, in the unit of the residual."""
     return (
-        initial_errors.error_bound_at_alarm[hypothesis]
-        * initial_errors.filtered_max_effect_per_unit_error[hypothesis, test_index, pole_index]
+        initial_errors.error_bound_at_alarm[hypothesis_index]
+        * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, pole_index]
     )
 
 
@@ -645,17 +654,19 @@ def record_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_a
 
 
 @kernel
-def test_reacts_to_error_change(hypothesis, test_index):
+def test_reacts_to_error_change(hypothesis_index, test_index):
     """Whether a test reacts at once to a change of the error of a hypothesis."""
-    if hypothesis in (PHI_HYPOTHESIS, THETA_HYPOTHESIS):
-        return test_index < ANGLE_TEST or test_index == index_of_test_showing_error_change(hypothesis)
-    return test_index == index_of_test_showing_error_change(hypothesis) or (
-        hypothesis == AIRSPEED_HYPOTHESIS and test_index == DENSITY_TEST
+    if hypothesis_index in (PHI_HYPOTHESIS, THETA_HYPOTHESIS):
+        return test_index < FIRST_ANGLE_TEST or test_index == index_of_test_showing_error_change(
+            hypothesis_index
+        )
+    return test_index == index_of_test_showing_error_change(hypothesis_index) or (
+        hypothesis_index == AIRSPEED_HYPOTHESIS and test_index == DENSITY_TEST
     )
 
 
 @kernel
-def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test_index):
+def initial_error_explains_alarm(initial_errors, hypothesis_index, alarm_test_index):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
@@ -663,9 +674,9 @@ def initial_error_explains_alarm(initial_errors, hypothesis, alarm_test_index):
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
     for test_index in range(initial_errors.is_refuted_by_test.shape[1]):
-        if initial_errors.is_refuted_by_test[hypothesis, test_index] and (
-            test_reacts_to_error_change(hypothesis, alarm_test_index)
-            or not test_reacts_to_error_change(hypothesis, test_index)
+        if initial_errors.is_refuted_by_test[hypothesis_index, test_index] and (
+            test_reacts_to_error_change(hypothesis_index, alarm_test_index)
+            or not test_reacts_to_error_change(hypothesis_index, test_index)
         ):
             return False
     return True

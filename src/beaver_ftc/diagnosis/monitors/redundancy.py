@@ -43,8 +43,8 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
 (
-    TURN_TEST,
-    ANGLE_TEST,
+    FIRST_TURN_TEST,
+    FIRST_ANGLE_TEST,
     SPEED_TEST,
     ALPHA_FLOW_TEST,
     BETA_FLOW_TEST,
@@ -68,8 +68,8 @@ DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS i
 N_TESTS = N_COMPUTED_TESTS + len(DUPLICATE_SENSORS)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
 TEST_INDEX_BY_NAME = {
-    "roll": TURN_TEST, "pitch": TURN_TEST + 1, "yaw": TURN_TEST + 2,
-    "bank angle": ANGLE_TEST, "pitch angle": ANGLE_TEST + 1, "heading": ANGLE_TEST + 2,
+    "roll": FIRST_TURN_TEST, "pitch": FIRST_TURN_TEST + 1, "yaw": FIRST_TURN_TEST + 2,
+    "bank angle": FIRST_ANGLE_TEST, "pitch angle": FIRST_ANGLE_TEST + 1, "heading": FIRST_ANGLE_TEST + 2,
     "speed": SPEED_TEST, "incidence": ALPHA_FLOW_TEST, "sideslip": BETA_FLOW_TEST, "density": DENSITY_TEST,
     "climb": CLIMB_TEST, "engine speed": RPM_TEST, "manifold pressure": MANIFOLD_PRESSURE_TEST,
 }  # fmt: skip
@@ -77,11 +77,17 @@ TEST_INDEX_BY_NAME = {
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
 DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSORS], np.int64)
-DUPLICATED_READING_INDEX = np.array([SENSORS.index(to.reading) for _, to in DUPLICATE_SENSORS], np.int64)
-DUPLICATED_READING_TEST_INDEX = np.array(
-    [TEST_INDEX_BY_NAME[ROWS[SENSORS.index(to.reading)].test] for _, to in DUPLICATE_SENSORS], np.int64
+DUPLICATED_READING_INDEX = np.array(
+    [SENSORS.index(counterpart.reading) for _, counterpart in DUPLICATE_SENSORS], np.int64
 )
-DUPLICATE_TOLERANCE = np.array([to.within for _, to in DUPLICATE_SENSORS], float)
+DUPLICATED_READING_TEST_INDEX = np.array(
+    [
+        TEST_INDEX_BY_NAME[ROWS[SENSORS.index(counterpart.reading)].test]
+        for _, counterpart in DUPLICATE_SENSORS
+    ],
+    np.int64,
+)
+DUPLICATE_TOLERANCE = np.array([counterpart.within for _, counterpart in DUPLICATE_SENSORS], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
@@ -377,16 +383,21 @@ def fill_quaternion(phi, theta, psi, out):
 @kernel
 def advance_quaternion(quaternion, rates, duration_s, out):
     """Fill out (4,): the unit quaternion (4,) after duration_s at body rates (3,) rad/s, one Euler step."""
-    half_x, half_y, half_z = (
+    half_angle_x, half_angle_y, half_angle_z = (
         0.5 * duration_s * rates[0],
         0.5 * duration_s * rates[1],
         0.5 * duration_s * rates[2],
     )
-    q, norm = quaternion, np.sqrt(1.0 + half_x * half_x + half_y * half_y + half_z * half_z)
-    out[0] = (q[0] - q[1] * half_x - q[2] * half_y - q[3] * half_z) / norm
-    out[1] = (q[1] + q[0] * half_x + q[2] * half_z - q[3] * half_y) / norm
-    out[2] = (q[2] + q[0] * half_y + q[3] * half_x - q[1] * half_z) / norm
-    out[3] = (q[3] + q[0] * half_z + q[1] * half_y - q[2] * half_x) / norm
+    q, norm = (
+        quaternion,
+        np.sqrt(
+            1.0 + half_angle_x * half_angle_x + half_angle_y * half_angle_y + half_angle_z * half_angle_z
+        ),
+    )
+    out[0] = (q[0] - q[1] * half_angle_x - q[2] * half_angle_y - q[3] * half_angle_z) / norm
+    out[1] = (q[1] + q[0] * half_angle_x + q[2] * half_angle_z - q[3] * half_angle_y) / norm
+    out[2] = (q[2] + q[0] * half_angle_y + q[3] * half_angle_x - q[1] * half_angle_z) / norm
+    out[3] = (q[3] + q[0] * half_angle_z + q[1] * half_angle_y - q[2] * half_angle_x) / norm
 
 
 @kernel
@@ -535,10 +546,10 @@ def fill_residuals(redundancy, readings):
     tests, memory, predicted_reading = redundancy.test, redundancy.memory, redundancy.memory.predicted_reading
     fill_quaternion(readings[PHI], readings[THETA], readings[PSI], memory.scratch)
     for i in range(3):
-        tests[TURN_TEST + i].residual = small_rotation_angle(
+        tests[FIRST_TURN_TEST + i].residual = small_rotation_angle(
             memory.predicted_quaternion, memory.scratch, i + 1
         )
-        tests[ANGLE_TEST + i].residual = wrapped(readings[PHI + i] - predicted_reading[PHI + i])
+        tests[FIRST_ANGLE_TEST + i].residual = wrapped(readings[PHI + i] - predicted_reading[PHI + i])
     tests[SPEED_TEST].residual = readings[AIRSPEED] - predicted_reading[AIRSPEED]
     tests[ALPHA_FLOW_TEST].residual = readings[ALPHA] - predicted_reading[ALPHA]
     tests[BETA_FLOW_TEST].residual = readings[BETA] - predicted_reading[BETA]
@@ -631,7 +642,7 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
             max_turn_rate * (attitude_error_bound + max_pitch_secant * previous_error_bound[THETA])
             + tilt_reading_change * momentary_error_bound / config.sample_time_s
         )
-        tests[TURN_TEST + i].bound_per_s = (
+        tests[FIRST_TURN_TEST + i].bound_per_s = (
             EARTH_RATE_BOUND_RAD_S
             + 2.0 * config.attitude_drift_rad_s
             + previous_error_bound[P + i]
@@ -646,15 +657,21 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
             + (1.0 + max_pitch_secant * max_turn) * gyro_error_bound_sum
             + rate_error_by_attitude
         )
-        tests[ANGLE_TEST + i].bound_per_s, tests[ANGLE_TEST + i].bound_per_sample = (
+        tests[FIRST_ANGLE_TEST + i].bound_per_s, tests[FIRST_ANGLE_TEST + i].bound_per_sample = (
             max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
             error_change_bound[PHI + i],
         )
     max_sin_theta = abs(np.sin(readings[THETA])) + error_change_bound[THETA]
     max_sin_phi = abs(np.sin(readings[PHI])) + error_change_bound[PHI]
-    tests[TURN_TEST].bound_per_sample = error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
-    tests[TURN_TEST + 1].bound_per_sample = error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
-    tests[TURN_TEST + 2].bound_per_sample = error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
+    tests[FIRST_TURN_TEST].bound_per_sample = (
+        error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
+    )
+    tests[FIRST_TURN_TEST + 1].bound_per_sample = (
+        error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
+    )
+    tests[FIRST_TURN_TEST + 2].bound_per_sample = (
+        error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
+    )
 
 
 @kernel
@@ -751,15 +768,17 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
 def log_change_error_bound(redundancy, readings, sensor):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
-    constant_error, previous_reading = (
+    constant_error_bound, previous_reading = (
         redundancy.config.constant_error[sensor],
         redundancy.memory.previous_reading[sensor],
     )
     smaller_reading = max(min(readings[sensor], previous_reading), 1.0)
-    first_order_bound = constant_error * abs(
+    first_order_bound = constant_error_bound * abs(
         1.0 / max(readings[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
     )
-    return first_order_bound / max(1.0 - constant_error / smaller_reading, MIN_READING_SHARE_IN_LOGARITHM)
+    return first_order_bound / max(
+        1.0 - constant_error_bound / smaller_reading, MIN_READING_SHARE_IN_LOGARITHM
+    )
 
 
 @kernel

@@ -66,7 +66,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     ALPHA,
     ALPHA_FLOW_TEST,
     ALPHA_HYPOTHESIS,
-    ANGLE_TEST,
     BETA,
     BETA_FLOW_TEST,
     BETA_HYPOTHESIS,
@@ -76,6 +75,8 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     DUPLICATED_READING_INDEX,
     DUPLICATED_READING_TEST_INDEX,
     FILTER_POLES_PER_S,
+    FIRST_ANGLE_TEST,
+    FIRST_TURN_TEST,
     GYRO_ERROR_CONFIRMED,
     GYRO_ERROR_REFUTED,
     GYRO_ERROR_UNDECIDED,
@@ -92,7 +93,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     RPM_TEST,
     SPEED_TEST,
     THETA,
-    TURN_TEST,
     UNREACHABLE_FROZEN_SAMPLES,
     body_turn_per_euler_angle,
     compare_duplicate_sensors,
@@ -249,11 +249,11 @@ def sum_flow_residuals(monitor, readings):
             )
             continue
         memory.flow_residual_sum_since_alarm[j] += test.residual
-        hypothesis = initial_error_hypothesis_of_test(SPEED_TEST + j)
+        hypothesis_index = initial_error_hypothesis_of_test(SPEED_TEST + j)
         memory.flow_bound_sum_since_alarm[j] += config.sample_time_s * test.bound_per_s
         memory.initial_error_effect_sum_since_alarm[j] += (
-            initial_errors.error_bound_at_alarm[hypothesis]
-            * initial_errors.max_effect_per_unit_error[hypothesis, SPEED_TEST + j]
+            initial_errors.error_bound_at_alarm[hypothesis_index]
+            * initial_errors.max_effect_per_unit_error[hypothesis_index, SPEED_TEST + j]
         )
         memory.min_flow_reading_since_alarm[j], memory.max_flow_reading_since_alarm[j] = (
             min(memory.min_flow_reading_since_alarm[j], flow_reading),
@@ -304,7 +304,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
     other_test_index = DENSITY_TEST if alarm_test_index == SPEED_TEST else CLIMB_TEST
     if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test_index]:
         return False
-    hypothesis = initial_error_hypothesis_of_test(alarm_test_index)
+    hypothesis_index = initial_error_hypothesis_of_test(alarm_test_index)
     for m in range(redundancy.config.filter_decay.size):
         expected_residual, speed_test = (
             abs(monitor.memory.filtered_climb_error_m[m]),
@@ -318,10 +318,10 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
                 * (abs(speed_test.filtered_residual[m]) - speed_test.filtered_bound[m])
                 / max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
             )
-            expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis], 1.0)
+            expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis_index], 1.0)
         if expected_residual > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
             redundancy.test[other_test_index].filtered_bound[m]
-            + max_error_effect_at_alarm(initial_errors, hypothesis, other_test_index, m)
+            + max_error_effect_at_alarm(initial_errors, hypothesis_index, other_test_index, m)
         ):
             return True
     return False
@@ -439,7 +439,7 @@ def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, boun
         memory.previous_substep_gyro_error_peak[:] = memory.substep_gyro_error_peak
         memory.substep_gyro_error_peak[:] = 0.0
     for i in range(3):
-        apparent_gyro_error = -redundancy.test[TURN_TEST + i].residual / redundancy.config.sample_time_s
+        apparent_gyro_error = -redundancy.test[FIRST_TURN_TEST + i].residual / redundancy.config.sample_time_s
         if memory.substep == 0:
             memory.apparent_gyro_error[i] = apparent_gyro_error
         else:
@@ -517,7 +517,7 @@ def exclude_gyros_if_attitude_disagrees(monitor):
     """
     memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
-        test = monitor.redundancy.test[TURN_TEST + i]
+        test = monitor.redundancy.test[FIRST_TURN_TEST + i]
         W_error_bound = memory.gyro_error_estimate_bound[i] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(
             memory.gyro_error_estimate[i]
         )
@@ -633,7 +633,7 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
         attitude_noise_bound = (  # of apparent_error, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
-            * monitor.redundancy.test[TURN_TEST + i].bound_per_sample
+            * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
         )
         max_innovation = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
@@ -687,7 +687,7 @@ def record_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
     redundancy, tests_exceeded_since_alarm = monitor.redundancy, monitor.memory.tests_exceeded_since_alarm
     for test_index in range(N_TESTS):
-        first_test_index = TURN_TEST if test_index < ANGLE_TEST else ANGLE_TEST
+        first_test_index = FIRST_TURN_TEST if test_index < FIRST_ANGLE_TEST else FIRST_ANGLE_TEST
         is_exceeded = (
             exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_index)
             if test_index < SPEED_TEST
@@ -815,11 +815,13 @@ def find_suspects_of_flow_test(monitor, vane_index, flow_test_index, fully_actin
     if monitor.output.alarm_test_index != flow_test_index:
         return
     is_exceeded, is_suspect = monitor.memory.tests_exceeded_since_alarm, monitor.output.is_suspect
-    n_exceeded_turn_tests = is_exceeded[TURN_TEST] + is_exceeded[TURN_TEST + 1] + is_exceeded[TURN_TEST + 2]
+    n_exceeded_turn_tests = (
+        is_exceeded[FIRST_TURN_TEST] + is_exceeded[FIRST_TURN_TEST + 1] + is_exceeded[FIRST_TURN_TEST + 2]
+    )
     suspect_accelerometers(monitor, n_exceeded_turn_tests > 0)
     is_suspect[vane_index] = not (n_exceeded_turn_tests > 0 or monitor.memory.is_cleared[vane_index])
     for i in range(3):
-        turn_test_shows_gyro = n_exceeded_turn_tests == 1 and is_exceeded[TURN_TEST + i] == 1
+        turn_test_shows_gyro = n_exceeded_turn_tests == 1 and is_exceeded[FIRST_TURN_TEST + i] == 1
         is_suspect[i] = turn_test_shows_gyro or (
             n_exceeded_turn_tests == 0
             and gyro_error_may_be_hidden(monitor, flow_test_index, i, i == fully_acting_gyro_index)
@@ -839,7 +841,10 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
         if flow_test_index == ALPHA_FLOW_TEST
         else abs(np.sin(alpha))
     )
-    flow_test_record, turn_test = redundancy.test[flow_test_index], redundancy.test[TURN_TEST + gyro_index]
+    flow_test_record, turn_test = (
+        redundancy.test[flow_test_index],
+        redundancy.test[FIRST_TURN_TEST + gyro_index],
+    )
     for m in range(flow_test_record.filtered_residual.size):
         flow_residual_bound = (
             FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO * flow_test_record.filtered_bound[m]
@@ -884,18 +889,18 @@ def suspect_gyros_and_attitude(monitor):
     is_exceeded, gyro_error_verdict = memory.tests_exceeded_since_alarm, memory.gyro_error_verdict
     n_exceeded_turn_tests, angle_is_frozen = 0, False
     for i in range(3):
-        n_exceeded_turn_tests += is_exceeded[TURN_TEST + i]
+        n_exceeded_turn_tests += is_exceeded[FIRST_TURN_TEST + i]
         angle_is_frozen = angle_is_frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
         no_other_axis_exceeded = n_exceeded_turn_tests == 0 or (
-            is_exceeded[TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
+            is_exceeded[FIRST_TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
         )
         is_suspect[i] = (
             no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
         )
         angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
         may_be_only_this_angle = no_other_angle_test_exceeded(monitor, i) and (
-            is_exceeded[ANGLE_TEST + i] == 1 or angle_explains_turning
+            is_exceeded[FIRST_ANGLE_TEST + i] == 1 or angle_explains_turning
         )
         angle_may_be_wrong = (
             may_be_only_this_angle
@@ -916,9 +921,9 @@ def no_other_angle_test_exceeded(monitor, angle_index):
     the start does not explain."""
     for j in range(3):
         is_exceeded = (
-            monitor.memory.tests_exceeded_since_alarm[ANGLE_TEST + j]
+            monitor.memory.tests_exceeded_since_alarm[FIRST_ANGLE_TEST + j]
             if angle_index == 2
-            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, ANGLE_TEST + j]
+            else monitor.initial_errors.is_refuted_by_test[PHI_HYPOTHESIS + angle_index, FIRST_ANGLE_TEST + j]
         )
         if j != angle_index and is_exceeded:
             return False
@@ -929,23 +934,23 @@ def no_other_angle_test_exceeded(monitor, angle_index):
 def angle_error_explains_turn_tests(monitor, angle_index):
     """Whether an error of an angle (0, 1, 2: phi, theta, psi) explains the tests of the axes: one as large as
     the residual of the angle's own test allows."""
-    redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[ANGLE_TEST + angle_index]
+    redundancy, angle_test = monitor.redundancy, monitor.redundancy.test[FIRST_ANGLE_TEST + angle_index]
     reading_error_bound = redundancy.memory.reading_error_bound
     tilt_error_bound = reading_error_bound[PHI] + reading_error_bound[THETA]
     for j in range(3):
-        turn_test = redundancy.test[TURN_TEST + j]
+        turn_test = redundancy.test[FIRST_TURN_TEST + j]
         max_turn_per_angle = abs(body_turn_per_euler_angle(redundancy, j, angle_index)) + tilt_error_bound
         for m in range(redundancy.config.filter_decay.size):
             max_angle_error = abs(angle_test.filtered_residual[m]) + angle_test.filtered_bound[m]
             max_initial_error_effect = (
                 max_error_effect_at_alarm(
-                    monitor.initial_errors, PHI_HYPOTHESIS + angle_index, TURN_TEST + j, m
+                    monitor.initial_errors, PHI_HYPOTHESIS + angle_index, FIRST_TURN_TEST + j, m
                 )
                 if angle_index < 2
                 else 0.0
             )
             if (
-                monitor.memory.tests_exceeded_since_alarm[TURN_TEST + j]
+                monitor.memory.tests_exceeded_since_alarm[FIRST_TURN_TEST + j]
                 and abs(turn_test.filtered_residual[m])
                 > max_turn_per_angle * max_angle_error
                 + turn_test.filtered_bound[m]
@@ -961,7 +966,10 @@ def axis_of_largest_turn_residual(monitor, default_axis):
     if none is larger than its own."""
     axis, tests = default_axis, monitor.redundancy.test
     for j in range(3):
-        if tests[TURN_TEST + j].residual_bound_ratio > tests[TURN_TEST + axis].residual_bound_ratio:
+        if (
+            tests[FIRST_TURN_TEST + j].residual_bound_ratio
+            > tests[FIRST_TURN_TEST + axis].residual_bound_ratio
+        ):
             axis = j
     return axis
 
@@ -1005,20 +1013,20 @@ def has_alarm(monitor):
 def replace_isolated_readings(monitor, prediction, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: then none of them is used."""
-    readings, any_replaced, slipstream_input_replaced = measured.signal, False, False
+    readings, any_reading_replaced, slipstream_input_replaced = measured.signal, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
             monitor.output.is_replaced[i] = 1
         if monitor.output.is_replaced[i] and i < AX:
             readings[i] = estimate_reading(monitor, prediction, readings, i)
-            any_replaced = True
+            any_reading_replaced = True
             slipstream_input_replaced = slipstream_input_replaced or i in (
                 AIRSPEED,
                 QDYN,
                 ENGINE_SPEED,
                 MANIFOLD,
             )
-    if any_replaced:
+    if any_reading_replaced:
         share_out(measured)
     if slipstream_input_replaced and monitor.config.has_engine_sensors:
         note_slipstream(measured)
@@ -1056,7 +1064,7 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     config, memory, test = (
         monitor.redundancy.config,
         monitor.redundancy.memory,
-        monitor.redundancy.test[TURN_TEST + axis],
+        monitor.redundancy.test[FIRST_TURN_TEST + axis],
     )
     u = prediction.u_before if monitor.memory.substep == 0 else prediction.u
     predicted_acceleration = prediction.f[axis]

@@ -22,7 +22,10 @@ from beaver_ftc.diagnosis.rivals.kalman import (
 
 LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
 # (leader of roll, pitch or yaw, theta); the last one is noise
-MODE_DEFINITIONS = ((None, 0.0), *((s, level) for s in range(3) for level in LOSS_THETA_LEVELS))
+MODE_DEFINITIONS = (
+    (None, 0.0),
+    *((leading_axis, theta) for leading_axis in range(3) for theta in LOSS_THETA_LEVELS),
+)
 N_MODES = len(MODE_DEFINITIONS) + 1
 _MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 

@@ -42,7 +42,7 @@ class SurfaceFit:
         self.cross_sums = self._fading_factor * self.cross_sums + eps @ Omega
         self.regressor_square_sums = self._fading_factor * self.regressor_square_sums + (Omega**2).sum(axis=0)
 
-    def best_surface(self) -> tuple[int, float, float]:
+    def fit_best_surface(self) -> tuple[int, float, float]:
         """(surface, theta, mean misfit square of an axis) of the surface that fits best."""
         theta_by_surface = np.clip(
             self.cross_sums / np.maximum(self.regressor_square_sums, 1e-300), -1.0, 0.0
@@ -63,7 +63,7 @@ class SurfaceFit:
 def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
     declared, dt = context.declared, context.dt_s
-    constant_std = (
+    model_error_std = (
         np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - decay_factor)
     )
     gust_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
@@ -76,7 +76,7 @@ def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
         )
     )
     gyro_std = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
-    return np.sqrt(constant_std**2 + gust_std**2 + gyro_std**2)
+    return np.sqrt(model_error_std**2 + gust_std**2 + gyro_std**2)
 
 
 class ConstantThresholdObserver:
@@ -132,7 +132,7 @@ class ConstantThresholdObserver:
         self.surface_fit.step(
             self.residual_since_alarm / self.threshold, self.filtered_effects / self.threshold[:, None]
         )
-        surface_index, theta, misfit = self.surface_fit.best_surface()
+        surface_index, theta, misfit = self.surface_fit.fit_best_surface()
         if misfit > 1.0:
             return Verdict(True, self.alarm_axis, "unanticipated", "unanticipated")
         return Verdict(True, self.alarm_axis, self.leaders[surface_index], "loss_of_effectiveness", theta)

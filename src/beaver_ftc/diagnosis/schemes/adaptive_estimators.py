@@ -222,7 +222,7 @@ def decide_isolated_loss(fdi, t):
 
 
 @apart
-def isolate_loss(fdi, measured, t, isolation_started_earlier):
+def isolate_loss_by_worst_case(fdi, measured, t, isolation_started_earlier):
     """Isolate by the worst case alone (IsolationVariant)."""
     exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
     decide_isolated_loss(fdi, t)
@@ -250,7 +250,7 @@ def isolate_loss_by_statistics(fdi, measured, t, isolation_started_earlier):
 
 
 @apart
-def isolate_fault_type(fdi, measured, t, isolation_started_earlier):
+def isolate_fault_type_by_worst_case(fdi, measured, t, isolation_started_earlier):
     """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
     exclude_by_worst_case(fdi, measured.x, t, isolation_started_earlier)
     decide_fault_type(fdi, t, isolation_started_earlier)
@@ -314,7 +314,7 @@ def record_surface_commands(fdi, prediction):
 
 ISOLATION_VARIANTS = {
     ("published", "worst-case"): IsolationVariant(
-        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss
+        skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_worst_case
     ),
     ("published", "either"): IsolationVariant(
         skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_either_detector
@@ -323,7 +323,7 @@ ISOLATION_VARIANTS = {
         skip_begin_loss_isolation, skip_record_commands_for_losses, isolate_loss_by_statistics
     ),
     ("all", "worst-case"): IsolationVariant(
-        begin_fault_type_isolation, record_surface_commands, isolate_fault_type
+        begin_fault_type_isolation, record_surface_commands, isolate_fault_type_by_worst_case
     ),
     ("all", "either"): IsolationVariant(
         begin_fault_type_isolation, record_surface_commands, isolate_fault_type_by_either_detector

@@ -331,13 +331,13 @@ def infer_position(config, surface, fie, axis, innovation, innovation_bound, hyp
     fie: its estimator of a position; axis: on which it has most effect; hypothesis_effect: what that supposes
     of the same frame or block, dtype FAULT_EFFECT_RECORD.
     """
-    last_observation, commands = surface.last_observation, surface.commands
+    last_observation, command_record = surface.last_observation, surface.commands
     last_observation.healthy_position = (
         -hypothesis_effect.acceleration_at_zero_theta[axis] / hypothesis_effect.regressor[axis]
     )
     last_observation.weighted_mean_error_per_position_range = (
         0.25
-        * (commands.max_acceleration_per_rad - commands.min_acceleration_per_rad)
+        * (command_record.max_acceleration_per_rad - command_record.min_acceleration_per_rad)
         / abs(hypothesis_effect.regressor[axis])
     )
     last_observation.position_low, last_observation.position_high = fie.theta_min, fie.theta_max
@@ -426,7 +426,8 @@ def observed_deflection_error(surface):
 
 def read_observed_deflection_error(surface: np.void) -> float:
     """`observed_deflection_error` of a record outside compiled code, rad."""
-    observation = surface["last_observation"]
+    last_observation = surface["last_observation"]
     return float(
-        0.5 * (observation["position_low"] + observation["position_high"]) - observation["healthy_position"]
+        0.5 * (last_observation["position_low"] + last_observation["position_high"])
+        - last_observation["healthy_position"]
     )

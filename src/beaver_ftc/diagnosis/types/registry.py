@@ -411,35 +411,43 @@ def record_commands(types, commanded_rad, frame_means):
     """
     frames_per_block = types.config.frames_per_block
     for s, surface in enumerate(types.surface):
-        commands = surface.commands
+        command_record = surface.commands
         if types.block.n_frames_so_far == 0:
             for blocks_ago in range(N_COMMAND_BLOCKS_KEPT - 1, 0, -1):
-                commands.command_history[blocks_ago, :frames_per_block] = commands.command_history[
-                    blocks_ago - 1, :frames_per_block
-                ]
-                commands.min_command[blocks_ago], commands.max_command[blocks_ago] = (
-                    commands.min_command[blocks_ago - 1],
-                    commands.max_command[blocks_ago - 1],
+                command_record.command_history[blocks_ago, :frames_per_block] = (
+                    command_record.command_history[blocks_ago - 1, :frames_per_block]
                 )
-            commands.min_command[0], commands.max_command[0] = np.inf, -np.inf
-            commands.min_healthy_position[1], commands.max_healthy_position[1] = (
-                commands.min_healthy_position[0],
-                commands.max_healthy_position[0],
+                command_record.min_command[blocks_ago], command_record.max_command[blocks_ago] = (
+                    command_record.min_command[blocks_ago - 1],
+                    command_record.max_command[blocks_ago - 1],
+                )
+            command_record.min_command[0], command_record.max_command[0] = np.inf, -np.inf
+            command_record.min_healthy_position[1], command_record.max_healthy_position[1] = (
+                command_record.min_healthy_position[0],
+                command_record.max_healthy_position[0],
             )
-            commands.min_healthy_position[0], commands.max_healthy_position[0] = np.inf, -np.inf
-            commands.min_acceleration_per_rad, commands.max_acceleration_per_rad = np.inf, -np.inf
+            command_record.min_healthy_position[0], command_record.max_healthy_position[0] = np.inf, -np.inf
+            command_record.min_acceleration_per_rad, command_record.max_acceleration_per_rad = np.inf, -np.inf
         limited_command = min(
             max(commanded_rad[s], surface.actuator.travel_low), surface.actuator.travel_high
         )
-        commands.command_history[0, types.block.n_frames_so_far] = limited_command
-        commands.min_command[0], commands.max_command[0] = (
-            min(commands.min_command[0], limited_command),
-            max(commands.max_command[0], limited_command),
+        command_record.command_history[0, types.block.n_frames_so_far] = limited_command
+        command_record.min_command[0], command_record.max_command[0] = (
+            min(command_record.min_command[0], limited_command),
+            max(command_record.max_command[0], limited_command),
         )
-        commands.min_healthy_position[0] = min(commands.min_healthy_position[0], frame_means.u_min[s])
-        commands.max_healthy_position[0] = max(commands.max_healthy_position[0], frame_means.u_max[s])
-        commands.min_acceleration_per_rad = min(commands.min_acceleration_per_rad, frame_means.G_min[s])
-        commands.max_acceleration_per_rad = max(commands.max_acceleration_per_rad, frame_means.G_max[s])
+        command_record.min_healthy_position[0] = min(
+            command_record.min_healthy_position[0], frame_means.u_min[s]
+        )
+        command_record.max_healthy_position[0] = max(
+            command_record.max_healthy_position[0], frame_means.u_max[s]
+        )
+        command_record.min_acceleration_per_rad = min(
+            command_record.min_acceleration_per_rad, frame_means.G_min[s]
+        )
+        command_record.max_acceleration_per_rad = max(
+            command_record.max_acceleration_per_rad, frame_means.G_max[s]
+        )
 
 
 @kernel

@@ -93,24 +93,33 @@ TABLES: dict[str, Callable[[], Columns]] = {
 
 
 _SAYS = """Which columns do the log of a flight and the tables of studies have? This page is for readers who
-evaluate results with their own program.
+evaluate results with a program of their own. *Example.* This program prints the time at which the residual of
+the pitch axis first exceeds its threshold, 12.01 s:
+
+```python
+import beaver_ftc as bf
+
+log = bf.fly("elevator-partial-loss").log
+ratio = (log.q_alarm_residual_rad_s / log.q_alarm_threshold_rad_s).abs()
+print(log.t_s[ratio > 1].iloc[0])
+```
 
 ## How to read a table
 
-- **column**: the name. A name that ends in a unit has this unit. A word in capitals stands for several names,
-  which Table 1 lists: `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
+- **column**: the name. A name that ends in a unit has this unit. A word in capitals stands for several names
+  (Table 1). For example, `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
 - **type**: number, whole number, text, or true or false.
 - **unit**: `1` is a pure number. An empty cell means that the column has no unit.
 - **what it is**: the meaning. The [glossary](reference/glossary.md) explains the terms, and the
   [nomenclature](reference/nomenclature.md) has symbols and signs.
 
-*Table 1. Words in capitals.*
+*Table 1. Words in capitals, and the names for which each stands.*
 
 | word | stands for |
 | --- | --- |
 | AXIS | `p` (roll), `q` (pitch) and `r` (yaw) |
 | SURFACE | the name of each control surface, for example `elevator` |
-| ESTIMATOR | the name of each isolation estimator, i.e. of its surface, or of its surface and fault type |
+| ESTIMATOR | the name of each isolation estimator: a surface, or a surface and a fault type |
 | SIGNAL | the name of each signal that the aircraft file declares, for example `dpt` |
 | SOURCE | each source of the mismatch: {sources} |
 | WITHIN | a number of seconds: {within} |"""
@@ -146,7 +155,8 @@ def _contents(texts: Mapping[str, Mapping[str, str]]) -> str:
         for text in (texts[name] for name in TABLES)
     ]
     listed = markdown_table(("table", "written by", "one row for each"), rows)
-    return f"## Contents\n\n*Table 2. The tables of this page.*\n\n{listed}"
+    caption = "*Table 2. The tables of this page, the commands that write each, and the meaning of a row.*"
+    return f"## Contents\n\n{caption}\n\n{listed}"
 
 
 def _first(says: str) -> tuple[str, str]:

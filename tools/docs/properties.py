@@ -22,9 +22,19 @@ _TEXTS = Path(__file__).with_suffix(".yaml")
 _HEAD = """# Properties of the aircraft
 
 Which JSBSim properties does the Beaver have, and what does each mean? This page is for readers who fly the
-model in JSBSim alone, or who read a property in Python, for example `sim["aero/dpt"]` of a
-[simulation](reference/python.md). A scenario file needs no property names. Its sections `faults`,
-`uncertainty` and `actuators` set these properties ([scenarios](reference/scenarios.md)).
+model in JSBSim alone, or who read a property in Python. A scenario file needs no property names: its sections
+`faults`, `uncertainty` and `actuators` set the properties ([scenarios](reference/scenarios.md)).
+
+*Example.* This program flies 1 s and prints the position of the elevator in rad
+([simulation](reference/python.md)):
+
+```python
+import beaver_ftc as bf
+
+sim = bf.Simulation("fault-free")
+sim.step(frames=100)
+print(sim["fcs/elevator-pos-rad"])
+```
 
 The names and values are those of [beaver.xml](../aircraft/beaver/beaver.xml) and of the files of its
 actuators. The page has three tables:
@@ -40,12 +50,14 @@ How to read the tables:
   `lbsft` is pound-force times foot. A name without a unit is dimensionless.
 - The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
   these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw.
-- In formulas, p, q and r are the body rates in rad/s, b is the span in m, c the chord in m, n the engine
-  speed in rpm, pz the manifold pressure in inHg. P is the power in kW, V the airspeed in m/s, rho the
-  density in kg/m3. Ix, Iy, Iz and Jxz are the [moments of inertia](reference/beaver.md), and a name with
-  `dot` is a derivative with respect to time.
-- The *command* is the position that the law or the pilot requires. The *demand* is the command after it is
-  limited to the stops: the input of the actuator.
+- Symbols of the motion: p, q and r are the body rates in rad/s, V is the airspeed in m/s, and rho is the
+  density in kg/m3. A name with `dot` is a derivative with respect to time.
+- Symbols of the aircraft: b is the span in m, and c is the chord in m. Ix, Iy, Iz and Jxz are the
+  [moments of inertia](reference/beaver.md) in kg m2.
+- Symbols of the engine: n is the engine speed in rpm, pz is the manifold pressure in inHg, and P is the shaft
+  power in kW.
+- The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to
+  the stops. It is the input of the actuator.
 - A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
 _TILTED = "aero/coefficient/CY_betadot-tilted"
 _PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))

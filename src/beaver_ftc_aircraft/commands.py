@@ -28,8 +28,8 @@ def derive(
     """Derive an aircraft's design model from JSBSim.
 
     The command computes the accelerations of the aircraft in many states of its envelope, and fits a few
-    terms to them. It then measures the largest error of the terms, in the states of the fit and in others.
-    1.3 times this error becomes the declared bound. Afterwards a scenario can contain
+    terms to them. It then measures the largest error of the fitted model, in the states of the fit and in
+    other states. The declared bound is 1.3 times this error. Afterwards a scenario can contain
     `aircraft: jsbsim:NAME`.
 
     Examples:

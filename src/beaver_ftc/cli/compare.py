@@ -68,8 +68,8 @@ def command(options: Options) -> None:
     grade: With --tune: use only flights of this grade: exact, actuators or errors. Default: all three grades.
     trials: With --tune: number of trials for each method and grade.
     seed: With --tune: seed of the random numbers of the search.
-    draw: With --tune: which set of calibration flights is drawn; 0: the standard set. From draw 1 on, the
-    command also measures the gain of the tuning.
+    draw: With --tune: number of the set of calibration flights. 0 is the standard set. With another set, the
+    command also measures what the tuning gains.
     tuned: With --sweep or --benchmark: read the parameters from this file instead of the parameters of the
     package.
     schemes: Names of schemes, separated by commas. Without --schemes and --laws, all registered schemes and
@@ -77,10 +77,10 @@ def command(options: Options) -> None:
     laws: Names of laws, separated by commas. Without --schemes and --laws, all registered schemes and laws
     are compared.
     only: With --benchmark: fly only this set of flights.
-    flights: A number N flies at most N flights of each sweep. A FOLDER compares on the recorded flights in
-    it.
-    other_days: With --flights FOLDER: diagnose altered copies of the labelled flights instead, as if flown on
-    other days.
+    flights: A number N: fly at most N flights of each sweep. A FOLDER: compare detectors on the recorded
+    flights in it.
+    other_days: With --flights FOLDER: diagnose changed copies of the labelled flights, as if they were flown
+    on other days.
     out: Folder for the comparison.
     leaderboard: With --benchmark or --flights FOLDER: path of the page with the ranking.
     """

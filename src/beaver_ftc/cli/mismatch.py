@@ -39,6 +39,10 @@ def command(
 ) -> None:
     """Decompose the model error by source.
 
+    The command flies each scenario and computes the mismatch: the angular acceleration of the truth minus
+    that of the design model. It reports the part of each source, such as sensors, fault or coefficients, and
+    its share of the declared bound.
+
     With --format json the command prints one JSON object. For one flight it contains rms, max, share and
     bound_share for each axis and source (axes.{p,q,r}.{source}). For several flights it is {"runs": [...],
     "recommended": ..., "guarantee": ...}.

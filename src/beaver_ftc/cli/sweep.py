@@ -79,7 +79,7 @@ def command(arguments: Arguments) -> None:
     random.
     certificate: Write a certificate into each kept result folder. Without --keep-logs, the worst flights are
     kept.
-    rare: Estimate by subset simulation the probability that a flight misses this expectation.
+    rare: Estimate the probability that a flight misses this expectation, by subset simulation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
         from beaver_ftc.studies.engine.workers import start_early

@@ -430,10 +430,10 @@ def _line(label: str, cells: Iterable[str]) -> str:
 class Verify(StudyCommand):
     """Test the guarantees on flights within the declared bounds.
 
-    The command counts violations of the guarantees, with exact confidence limits. A violation is a false
-    alarm, an excluded true fault, a wrong isolation, or a detection more than one frame later than
-    guaranteed. The published and the sharpened scheme diagnose the same flights. The exit status is 1 if a
-    guarantee is violated.
+    The guarantees hold as long as all errors are within the declared bounds. The command counts violations of
+    the guarantees, with exact confidence limits. A violation is a false alarm, an excluded true fault, a
+    wrong isolation, or a detection more than one frame later than guaranteed. The published and the sharpened
+    scheme diagnose the same flights. The exit status is 1 if a guarantee is violated.
 
     If the command is interrupted, the same command resumes it.
 
@@ -444,8 +444,8 @@ class Verify(StudyCommand):
     faults: Number of flights with one random fault.
     seed: Seed of all random draws.
     out: Folder for the flights. An interrupted command continues from this folder.
-    steps: Also fly the intermediate schemes, each with one more step from the published to the sharpened
-    scheme.
+    steps: Also fly the schemes between the published and the sharpened scheme. Each of them has one step more
+    than the one before it.
     """
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0

@@ -22,20 +22,21 @@ of one command.
 ## How to read an entry
 
 **Usage line.** A word in capitals stands for a value that you give. `{X}` is required. `[X]` can be left out.
-A value with `...` after it can be repeated. Write the options before or after the values.
+You can give several values if `...` follows the word. Write the options before or after the values.
+*Example.* `beaver-ftc run [OPTIONS] {SCENARIO}...` requires at least one scenario, and accepts several.
 
 **Table of options.** The first column has the option, and the kind of its value in `<...>`. A kind is a path,
-a text (`str`), a whole number (`int`), a number (`float`) or one of the listed words. `list` means that the
-option or value can be repeated. The second column has the effect and the unit. In brackets it has:
+a text (`str`), a whole number (`int`), a number (`float`) or one of the listed words. `list` means that you
+can give the option or value several times. The second column has the effect and the unit. In brackets it has:
 
 - `[default: X]`: the value if the option is left out. Without it, the text states the default, or the option
   is off.
-- `[1<=x<=60]`: the allowed range of the value x.
+- `[1<=x<=60]`: the allowed range of the value, here from 1 to 60.
 - `[required]`: the command does not run without this value.
 
-**Results.** `--out` names the folder. With `--format json` a command prints one JSON document instead of
-text. [Columns](reference/columns.md) lists the columns of the tables. The [glossary](reference/glossary.md)
-explains the terms of the diagnosis."""
+**Results.** `--out` is the folder for the results. With `--format json` a command prints one JSON document
+instead of text. [Columns](reference/columns.md) lists the columns of the tables. The
+[glossary](reference/glossary.md) explains the terms of the diagnosis."""
 _NEXT = """## Next
 
 [Exit statuses](reference/exit-statuses.md) explains the status with which a command ends.
@@ -75,6 +76,8 @@ _PURPOSES = {
 
 # Command -> what its first example prints, where the help does not say it.
 _PRINTED = {
+    "live": "Each example prints the address of the page. The second example also prints 30 links for "
+    "guests.",
     "run": "The first example prints a verdict of about 20 lines: fault, detection, isolation, modes of the"
     " supervisor, notes, tracking errors, and each expectation with its result.",
     "list": "The example prints the names of each list.",
@@ -107,6 +110,9 @@ _PRINTED = {
     "bench": "The example prints the time of a frame, and its ratio to the time of the bare aircraft.",
     "verify": "The example prints the number of flights, violations and upper confidence limits for each "
     "scheme.",
+    "check": "The second example prints each statement as a sentence.",
+    "evidence": "The example prints one row for each requirement: verdict, margin and worst flight.",
+    "mechanisms": "The example prints one row for each mechanism.",
     "separate": "The example prints one line for each pair of candidates.",
     "identify": "The example needs the folder `my-logs` of `beaver-ftc new my-logs --log`. It prints the "
     "number of samples, and the share of each rate that the model explains on data left out of the fit.",

@@ -191,10 +191,11 @@ def median(rows: Sequence[Mapping[str, Any]], name: str) -> Document:
 class Decay(StudyCommand):
     """Measure how verdicts degrade beyond declared bounds.
 
-    The command flies each error that `fdi.bounds` can declare at 1, 1.5, 2 and 4 times its declared size,
-    alone and with all other errors. If an error is not declared, it is flown alone, in multiples of a unit.
-    Only the sign of an error is random. The command reports false alarms, detections, right names, wrong
-    names and tracking errors, each with its 95 % interval.
+    `fdi.bounds` can declare several errors. The command flies each declared error at 1, 1.5, 2 and 4 times
+    its declared size, first alone and then together with all other errors. It flies an error that is not
+    declared alone, in multiples of a unit. The sign of an error is random, its size is not. The command
+    reports false alarms, detections, right names, wrong names and tracking errors, each with its 95 %
+    interval.
 
     If the command is interrupted, the same command resumes it.
 

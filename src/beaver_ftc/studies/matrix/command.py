@@ -21,12 +21,12 @@ from beaver_ftc.studies.matrix import pitch_lost as lost
 class Matrix(StudyCommand):
     """Fly every fault type on every surface.
 
-    The command reports which faults are detected and which are named. It compares the tracking error with the
-    tracking error of the informed law. The informed law receives the true fault. With --declared the command
-    also reports how many faults the informed test detects, and how many of these faults are named.
+    The command reports which faults are detected and which are named. It also divides the tracking error by
+    that of the informed law, a law that receives the true fault. With --declared the command also reports how
+    many faults the informed test detects, and how many of these faults are named.
 
-    The exit status is 1 if a fault is named wrongly or an alarm is false. With --pitch-lost it is 1 if an
-    aircraft is lost with control by engine power, but is not lost without it.
+    The exit status is 1 if a fault is named wrongly or an alarm is false. With --pitch-lost, the exit status
+    is 1 if an aircraft is lost only with control by engine power.
 
     If the command is interrupted, the same command resumes it.
 

@@ -38,10 +38,11 @@ class Mechanisms(StudyCommand):
     The command flies two systems on the same random flights: the published system and the default system.
     Each system flies with all of its mechanisms, and then without one mechanism at a time. The mechanisms are
     adaptive thresholds, adaptation, networks, hand-over to the flap, bank of poles, memory, sharpened tests
-    and statistics. The random flights vary fault, bandwidth, undeclared error and instruments. For each
-    mechanism the command prints the net share of flights that are worse without it. It counts false alarms,
-    late alarms, names and tracking separately, each with its 95 % interval. For each false alarm of a
-    worst-case detector it prints the reason, and for the default scheme also the certificate.
+    and statistics. The random flights differ in fault, bandwidth of the law, undeclared error and
+    instruments. For each mechanism the command prints how many flights become worse without it, minus those
+    that become better, as a share of all flights. False alarms, late alarms, names and tracking have a share
+    of their own, each with its 95 % interval. For each false alarm of a worst-case detector it prints the
+    reason, and for the default scheme also the certificate.
 
     The exit status is 1 if a false alarm of a worst-case detector has no reason.
 

@@ -333,7 +333,8 @@ class Power(StudyCommand):
     altitude: Altitude above sea level, m. Default: the altitude at the start of a scenario without this key.
     aircraft: Aircraft: built-in name, jsbsim:NAME, or ./FOLDER in the working directory. Default: beaver.
     surface: Fly only losses of this surface. The command then prints one line for each loss.
-    rates_alone: Plug-ins receive only the body rates, without the air data that the built-in detector uses.
+    rates_alone: Plug-ins receive only the body rates, and no air data. The built-in detector uses air data,
+    too.
     out: Folder in which the result folder `power` is written.
     """
 

@@ -304,9 +304,9 @@ def _found(rows: Sequence[Any]) -> tuple[Document, Flights]:
 class Reproduce(StudyCommand):
     """Reproduce the published study and check its statements.
 
-    The command reports every figure of the study. For every statement it reports our number, the number
-    without the mechanism that the statement is about, and a verdict. It also flies the same cases with the
-    default scheme and law.
+    The study is [Zhang2005]. The command reports every figure and every statement of the study. For each
+    statement it reports the value that it found and a verdict. It also reports the value without the
+    mechanism to which the statement refers. It also flies the same cases with the default scheme and law.
 
     The exit status is 1 if a statement does not hold and the reason is not known.
 

@@ -259,14 +259,14 @@ def _counted(count: int, of: int) -> Document:
 class Smallest(StudyCommand):
     """Find the smallest loss that is detected within a time.
 
-    The command reports two sizes of a loss: the size that is certain to be detected, and the size that is
-    detected in 90 % of the flights, with its 95 % interval. The flights are those of the scenario without its
+    The command reports two sizes of a loss. The first size is certain to be detected. The second size is
+    detected in 90 % of the flights; it has a 95 % interval. The flights are those of the scenario without its
     faults. Seed and time of the loss are random. The command adds flights until the interval is narrow, up to
     480 flights.
 
-    Then it reports which condition limits the size. It repeats the flights without turbulence, without sensor
-    errors, without servos, without model uncertainty, and with references of twice the amplitude and twice
-    the frequency.
+    Finally it reports which condition limits the size. For this purpose it repeats the flights with one
+    change at a time: without turbulence, without sensor errors, without servos, without model uncertainty,
+    with references of twice the amplitude, and with references of twice the frequency.
 
     If the command is interrupted, the same command resumes it.
 

@@ -16,7 +16,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.readers import check_exists, detect_reader, read_parts
-from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers
+from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers_of_column
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
 from beaver_ftc_logs.units import (
@@ -314,7 +314,7 @@ def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
         name for name in table_columns if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _normalized_name(name))
     ]
     for name in sorted(time_like_columns, key=lambda name: name != TIME_COLUMN):
-        stamps = first_numbers(path, name)
+        stamps = first_numbers_of_column(path, name)
         median_step = float(np.median(np.diff(stamps[np.isfinite(stamps)][:50]))) if len(stamps) > 1 else 0.0
         plausible_units = [
             unit

@@ -39,7 +39,7 @@ from beaver_ftc_logs.diagnose import (
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.regression import (
-    group_values_by_surface,
+    expand_group_values_to_surfaces,
     surface_indices_by_group,
     unexplained_rates_and_responses,
 )
@@ -137,10 +137,10 @@ def _diagnosis_rows_from_least_squares(
         "low": np.minimum(unclipped_low, estimated_effectiveness),
         "high": np.maximum(unclipped_high, estimated_effectiveness),
     }
-    bounds = {name: group_values_by_surface(bound, model) for name, bound in bounds_by_group.items()}
+    bounds = {name: expand_group_values_to_surfaces(bound, model) for name, bound in bounds_by_group.items()}
     isolated_names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
     return _rows_with_default_bounds(
-        samples, isolated_names, group_values_by_surface(estimated_effectiveness, model), **bounds
+        samples, isolated_names, expand_group_values_to_surfaces(estimated_effectiveness, model), **bounds
     )
 
 

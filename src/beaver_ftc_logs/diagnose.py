@@ -16,7 +16,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import any_fault_log_odds_gains, hypothesis_posterior, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import group_values_by_surface, unexplained_rates_and_responses
+from beaver_ftc_logs.regression import expand_group_values_to_surfaces, unexplained_rates_and_responses
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -126,7 +126,7 @@ def finalize_rows_at_log_stamps(
     )
     has_known_gain = np.array(trust.is_group_gain_known(model), dtype=float)[None]
     has_unknown_gain = np.broadcast_to(
-        group_values_by_surface(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
+        expand_group_values_to_surfaces(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
     )
     return _rows_at_log_stamps(
         samples, rows.without_estimate(has_unknown_gain).without_verdict(rows_by_reason)
@@ -311,9 +311,9 @@ def diagnosis_rows_from_posterior(
         isolated_surfaces=_surfaces_at_fault(
             model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_health_likelier)
         ),
-        effectiveness=group_values_by_surface(effectiveness, model),
-        effectiveness_low=group_values_by_surface(effectiveness_low, model),
-        effectiveness_high=group_values_by_surface(effectiveness_high, model),
+        effectiveness=expand_group_values_to_surfaces(effectiveness, model),
+        effectiveness_low=expand_group_values_to_surfaces(effectiveness_low, model),
+        effectiveness_high=expand_group_values_to_surfaces(effectiveness_high, model),
         fault_probability=fault_probability,
         evidence_start_time_s=samples.t_s[evidence_start_row],
     )

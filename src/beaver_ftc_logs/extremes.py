@@ -21,7 +21,7 @@ from pydantic import Field
 from beaver_ftc.documents import Number, Section
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 
-_SHAPE_PRIOR_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
+_PARETO_SHAPE_PRIOR_SD, _PARETO_SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
 _PARETO_SCALE_RATIO_GRID = np.geomspace(0.2, 5.0, 61)
 """The grid of the shape, and of the scale over the mean excess."""
 _PEAK_RATE_QUANTILE_PROBABILITIES = (np.arange(40) + 0.5) / 40.0
@@ -196,12 +196,12 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     excess = np.array(tail.excess_over_level)
     scale_grid = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
     pareto_shape, pareto_scale = (
-        grid.ravel() for grid in np.meshgrid(_SHAPE_GRID, scale_grid, indexing="ij")
+        grid.ravel() for grid in np.meshgrid(_PARETO_SHAPE_GRID, scale_grid, indexing="ij")
     )
     log_posterior = (
         genpareto.logpdf(excess[:, None], pareto_shape, scale=pareto_scale).sum(axis=0) / tail.overdispersion
     )
-    log_posterior -= 0.5 * (pareto_shape / _SHAPE_PRIOR_SD) ** 2
+    log_posterior -= 0.5 * (pareto_shape / _PARETO_SHAPE_PRIOR_SD) ** 2
     grid_probability = np.exp(log_posterior - log_posterior.max())
     return pareto_shape, pareto_scale, grid_probability / grid_probability.sum()
 

@@ -33,7 +33,7 @@ MIN_LABEL_DURATION_S = 3.0
 RATE_LAG_COUNT_CANDIDATES = (1, 2, 3, 4)
 COMMAND_LAG_COUNT_CANDIDATES = (2, 3, 4, 6)
 _NEWEY_WEST_MAX_LAG_S = 2.0
-_MIN_RATE_SPREAD_RAD_S = 1e-6
+_MIN_RATE_SD_RAD_S = 1e-6
 _UNFITTED_MARGIN_BEFORE_FAILURE_S = 1.0
 _FAULT_PROBABILITY_FOR_ALARM, _ALARM_CONFIRMATION_TIME_S, _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED = (
     0.995,
@@ -301,9 +301,7 @@ def _fit_least_squares_of_order_uncached(
             f"{regressors.shape[1]} coefficients an axis"
         )
     motionless_axes = [
-        axis
-        for axis, rate_sd in zip("pqr", rates.std(axis=0), strict=True)
-        if rate_sd < _MIN_RATE_SPREAD_RAD_S
+        axis for axis, rate_sd in zip("pqr", rates.std(axis=0), strict=True) if rate_sd < _MIN_RATE_SD_RAD_S
     ]
     if motionless_axes:
         raise BadInput(
@@ -532,10 +530,10 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
         gain_covariance: Floats = np.asarray(
             np.kron(_prior_gain_covariance(fold_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
-        for one in held_out_flights:
-            group_responses, residual = _standardized_responses_and_residual(fold_model, one)
+        for held_out in held_out_flights:
+            group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
             group_responses = group_responses[:, :, has_known_effect].reshape(*residual.shape, -1)
-            n_windows = max(round(len(residual) * one.samples.dt_s / _GAIN_WINDOW_S), 1)
+            n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses, window_residual = (
                     _without_mean(group_responses[window_rows]),
@@ -546,7 +544,7 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
                     window_residual.ravel(),
                     gain_covariance,
                 )
-                inflations_by_ma_coefficients.setdefault(one.samples.noise_ma_coefficients, []).append(
+                inflations_by_ma_coefficients.setdefault(held_out.samples.noise_ma_coefficients, []).append(
                     min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_NOISE_INFLATION)
                 )
     noise_inflation_by_ma_coefficients = {
@@ -555,13 +553,13 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
     }
     if model.vehicle.other_laws:
         noise_inflation_by_ma_coefficients = {
-            one: inflation
+            ma_coefficients: inflation
             * (
                 _GYRO_NOISE_INFLATION_OTHER_LAWS
-                if _is_gyro_noise_spectrum(one)
+                if _is_gyro_noise_spectrum(ma_coefficients)
                 else _GUST_NOISE_INFLATION_OTHER_LAWS
             )
-            for one, inflation in noise_inflation_by_ma_coefficients.items()
+            for ma_coefficients, inflation in noise_inflation_by_ma_coefficients.items()
         }
     return _with_noise_inflation(model, noise_inflation_by_ma_coefficients)
 

@@ -91,7 +91,7 @@ def surface_indices_by_group(model: Model) -> list[list[int]]:
     return [[surface_names.index(name) for name in group_surfaces] for group_surfaces in model.groups]
 
 
-def group_values_by_surface(group_values: Floats, model: Model) -> Floats:
+def expand_group_values_to_surfaces(group_values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     group_of_surface = np.full(len(model.vehicle.surfaces), -1)
     for group_index, surface_indices in enumerate(surface_indices_by_group(model)):

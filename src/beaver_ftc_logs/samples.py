@@ -526,7 +526,7 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
         while len(kept_stretches) * _FIT_STRETCH_SAMPLES > MAX_FIT_SAMPLES and part_number > 1:
             kept_stretches, keep_every_nth = kept_stretches[::2], 2 * keep_every_nth
         read_until_s = samples.t_s[-1]
-    return samples if part_number == 1 else _concatenate(path.stem, kept_stretches, part_number)
+    return samples if part_number == 1 else _concatenate_samples(path.stem, kept_stretches, part_number)
 
 
 def first_samples(samples: Samples, n_samples: int) -> Samples:
@@ -545,7 +545,7 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
     return replace(samples, log_stamps_s=selected["t_s"], time_since_change_s=time_since_change_s, **selected)
 
 
-def _concatenate(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
+def _concatenate_samples(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
     """Samples one after the other, with a gap between."""
     field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(flights[0], name) is not None]
     joined_fields: dict[str, Any] = {

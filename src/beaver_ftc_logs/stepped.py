@@ -162,7 +162,7 @@ def diagnosis_rows_from_replay(
                 effectiveness_low[k],
                 effectiveness_high[k],
             )
-        if _gives_effectiveness(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
+        if _is_loss_or_untyped(verdict) and verdict.estimate is not None and verdict.isolated in surfaces:
             surface_index = surfaces.index(verdict.isolated)
             effectiveness[k, surface_index] = min(
                 max(1.0 + float(verdict.estimate), effectiveness_low[k, surface_index]),
@@ -204,7 +204,7 @@ def _fill_effectiveness_bounds(
             effectiveness_low[surfaces.index(name)] = single_fault_bounds[0][surfaces.index(name)]
 
 
-def _gives_effectiveness(verdict: Verdict) -> bool:
+def _is_loss_or_untyped(verdict: Verdict) -> bool:
     return verdict.type in (None, LOSS_FAULT_TYPE)
 
 

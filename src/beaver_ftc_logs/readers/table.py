@@ -57,7 +57,7 @@ def read_parts(
     """The flight in a table as `read` gives it, one of more than 1.2 times so many rows in parts of so many,
     numbered, each of which begins with the end of the one before: memory does not grow with the file."""
     time_column = given_time_column or TIME_COLUMN
-    all_columns, parts = _table_parts(
+    all_columns, parts = _column_names_and_parts(
         path, None if columns is None else {time_column, *columns}, rows_per_part
     )
     if time_column not in all_columns:
@@ -115,19 +115,19 @@ def _rows_with_time(path: Path, time_column: str, t_s: Floats) -> tuple[Floats |
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
     """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
     it is no table, or larger than any flight."""
-    names, parts = _table_parts(path, columns, None)
+    names, parts = _column_names_and_parts(path, columns, None)
     table = _with_unread_columns_as_nan(names, next(parts)[0])
     return {name: values for name, values in table.items() if columns is None or name in columns}
 
 
 def column_names(path: Path) -> list[str]:
     """The names of a table's columns. Raises BadInput where it is no table."""
-    return _table_parts(path, [], None)[0]
+    return _column_names_and_parts(path, [], None)[0]
 
 
-def first_numbers(path: Path, name: str) -> Floats:
+def first_numbers_of_column(path: Path, name: str) -> Floats:
     """The first numbers of a column."""
-    return next(_table_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
+    return next(_column_names_and_parts(path, [name], _BATCH_ROWS)[1])[0].numbers[name]
 
 
 def _text_table_layout(path: Path) -> TableLayout:
@@ -162,7 +162,7 @@ def check_time(path: Path, t_s: Floats, time_column: str = TIME_COLUMN, n_rows_b
         )
 
 
-def _table_parts(
+def _column_names_and_parts(
     path: Path, columns: Collection[str] | None, rows_per_part: int | None
 ) -> tuple[list[str], Iterator[TablePart]]:
     """The names of a table's columns, and its parts of so many rows; the whole where None."""

@@ -94,7 +94,7 @@ def test_all_parts_together_count_the_lines_that_are_left_out(tmp_path, monkeypa
         lines.insert(k, "1,2,3")
     path = tmp_path / "long.csv"
     path.write_text("\n".join(lines) + "\n")
-    _, parts = table._table_parts(path, None, 100)
+    _, parts = table._column_names_and_parts(path, None, 100)
     counted = [[int(text.rpartition(" ")[2]) for _, text in said] for _, said, _ in parts]
     assert len(counted) == 3
     assert sum(map(sum, counted)) == 4

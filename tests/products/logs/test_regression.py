@@ -67,9 +67,12 @@ def test_a_flight_shorter_than_the_past():
 def test_columns_of_groups_become_those_of_surfaces():
     values = np.array([[0.2, 0.4], [0.6, 0.8]])
     assert regression.surface_indices_by_group(TAIL) == [[0, 2], [1]]
-    assert regression.group_values_by_surface(values, TAIL).tolist() == [[0.2, 0.4, 0.2], [0.6, 0.8, 0.6]]
+    assert regression.expand_group_values_to_surfaces(values, TAIL).tolist() == [
+        [0.2, 0.4, 0.2],
+        [0.6, 0.8, 0.6],
+    ]
     apart = TAIL.model_copy(update={"groups": [["elevator"]]})
-    assert regression.group_values_by_surface(values[:, :1], apart).tolist() == [
+    assert regression.expand_group_values_to_surfaces(values[:, :1], apart).tolist() == [
         [1.0, 0.2, 1.0],
         [1.0, 0.6, 1.0],
     ]

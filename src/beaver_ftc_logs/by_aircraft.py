@@ -248,9 +248,9 @@ def _read_sample_inputs(
     )
 
     def sampled_values(quantity: QuantityColumn) -> Floats:
-        values, age_s = values_and_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
-        if age_s is not None:
-            mean_age_s_by_held_column[quantity.column] = age_s
+        values, mean_age_s = values_and_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
+        if mean_age_s is not None:
+            mean_age_s_by_held_column[quantity.column] = mean_age_s
         return values
 
     alpha_rad, beta_rad, qdyn_pa, *aircraft_signals = (
@@ -262,11 +262,11 @@ def _read_sample_inputs(
     full_deflection_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     attitude = np.zeros_like(samples.rates)
     if needs_attitude:
-        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
-            quantity_column = getattr(vehicle.attitude, angle) if vehicle.attitude else None
+        for axis, angle_name in enumerate(_ATTITUDE_ANGLE_NAMES):
+            quantity_column = getattr(vehicle.attitude, angle_name) if vehicle.attitude else None
             if quantity_column is None or quantity_column.column not in si_columns:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
+                raise BadInput(f"{samples.name}: attitude.{angle_name}: {reason}")
             attitude[:, axis] = sampled_values(quantity_column)
     return [
         samples.rates,

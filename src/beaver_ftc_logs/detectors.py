@@ -223,9 +223,9 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
         np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP)),
         np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
     )
-    known_responses = np.where(is_predictable[:, None, None], group_responses, 0.0)
+    predictable_responses = np.where(is_predictable[:, None, None], group_responses, 0.0)
     for group_index, surface_indices in enumerate(surface_groups):
-        contribution[:, :, group_index] = known_responses[:, group_index] / dt_s
+        contribution[:, :, group_index] = predictable_responses[:, group_index] / dt_s
         command[:, group_index] = np.nan_to_num(samples.commands[:, surface_indices].sum(axis=1))
     frames = zip(samples.t_s.tolist(), rates, acceleration, contribution, command, strict=True)
     model_error_sd_rad_s2 = _model_error_sd_rad_s2(model)

@@ -723,8 +723,10 @@ def add_fitted_ranges_and_alarm_threshold(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
         for held_out in held_out_flights:
-            noise_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(fold_model, held_out)
-            max_noise_variance_scale = max(max_noise_variance_scale, noise_scale)
+            held_out_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
+                fold_model, held_out
+            )
+            max_noise_variance_scale = max(max_noise_variance_scale, held_out_noise_variance_scale)
             if len(held_out_peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
                 max_column_mistake_gain = max(
                     max_column_mistake_gain, _max_column_mistake_log_likelihood_gain(fold_model, held_out)
@@ -916,7 +918,7 @@ def _noise_scale_and_healthy_alarm_peaks(
     """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
-    posterior, _, noise_scale = hypothesis_posterior(held_out.samples, model, bank)
+    posterior, _, noise_variance_scale = hypothesis_posterior(held_out.samples, model, bank)
     evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
     is_healthy = (
         held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
@@ -927,7 +929,7 @@ def _noise_scale_and_healthy_alarm_peaks(
         for begin, end in _consecutive_runs(healthy_rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(page_sum) for page_sum in page_sum_runs])
-    return float(noise_scale[held_out.is_usable].max(initial=1.0)), (
+    return float(noise_variance_scale[held_out.is_usable].max(initial=1.0)), (
         peaks,
         len(healthy_rows) * held_out.samples.dt_s / 3600.0,
     )
@@ -1119,9 +1121,13 @@ def whitened_residual_and_responses(
     is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
+    usable_rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
     intercept = model.whitened_intercept(usable_flight.samples.noise_ma_coefficients)
-    return rows, (unexplained_rates - group_responses.sum(axis=1) - intercept)[rows], group_responses[rows]
+    return (
+        usable_rows,
+        (unexplained_rates - group_responses.sum(axis=1) - intercept)[usable_rows],
+        group_responses[usable_rows],
+    )
 
 
 def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
@@ -1129,5 +1135,7 @@ def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tup
     is_predictable, unexplained_rates, group_responses = regression.unexplained_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
-    rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
-    return rows, (unexplained_rates - group_responses.sum(axis=1) - np.array(model.intercept))[rows]
+    usable_rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
+    return usable_rows, (unexplained_rates - group_responses.sum(axis=1) - np.array(model.intercept))[
+        usable_rows
+    ]

@@ -99,9 +99,9 @@ def flight_figure(
     panel_heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(panel_heights), sharex=True, height_ratios=panel_heights)
     _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
-    rate_limit_deg_s = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
+    rate_axis_limit_deg_s = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
     axes[0].set_ylim(
-        -max(rate_limit_deg_s, 1.0), max(rate_limit_deg_s, 1.0)
+        -max(rate_axis_limit_deg_s, 1.0), max(rate_axis_limit_deg_s, 1.0)
     )  # a landing's spike does not flatten the flight
     _draw_lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
     _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")

@@ -109,7 +109,7 @@ def _fit_angle_to_rate(
     which it is steep say nothing."""
     step_s = np.diff(t_s)
     step_without_gaps = np.where(step_s < _INTEGRATION_WINDOW_S, step_s, 0.0)
-    integrals = np.vstack(
+    rate_term_integrals = np.vstack(
         [
             np.zeros(len(rate_terms)),
             np.cumsum([step_without_gaps * _means_of_neighbours(one) for one in rate_terms], axis=1).T,
@@ -126,7 +126,7 @@ def _fit_angle_to_rate(
         is_window_gap_free &= n_steep[window_end] == n_steep[window_begin]
     angle_changes, rate_integrals = (
         (angle[window_end] - angle[window_begin])[is_window_gap_free],
-        (integrals[window_end] - integrals[window_begin])[is_window_gap_free],
+        (rate_term_integrals[window_end] - rate_term_integrals[window_begin])[is_window_gap_free],
     )
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle

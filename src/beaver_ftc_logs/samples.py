@@ -470,8 +470,8 @@ def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehic
 
 def constant_stretches(values: Floats) -> list[tuple[int, int]]:
     """Begin and end of each stretch of equal rows; nan is equal to nan."""
-    without_nan = np.nan_to_num(values, nan=-1.0)
-    change_rows = np.flatnonzero(np.any(np.diff(without_nan, axis=0) != 0.0, axis=1)) + 1
+    values_without_nan = np.nan_to_num(values, nan=-1.0)
+    change_rows = np.flatnonzero(np.any(np.diff(values_without_nan, axis=0) != 0.0, axis=1)) + 1
     return list(pairwise([0, *change_rows.tolist(), len(values)]))
 
 

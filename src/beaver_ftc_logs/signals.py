@@ -66,10 +66,10 @@ def _count_rows_at_previous_maxima(
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
     reached. maximum_number (n,): number of the present largest value, counted from 1."""
     n_at_maximum = np.cumsum(is_at_maximum)
-    first_rows = np.flatnonzero(np.diff(maximum_number, prepend=0))
+    first_row_of_maximum = np.flatnonzero(np.diff(maximum_number, prepend=0))
     return (
-        (n_at_maximum - is_at_maximum)[first_rows][maximum_number - 1]
-        if len(first_rows)
+        (n_at_maximum - is_at_maximum)[first_row_of_maximum][maximum_number - 1]
+        if len(first_row_of_maximum)
         else np.zeros(len(maximum_number), dtype=np.int64)
     )
 

@@ -504,10 +504,10 @@ def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floa
     is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
         samples, model
     )
-    rows = np.flatnonzero(is_predictable)
+    predictable_rows = np.flatnonzero(is_predictable)
     if (
         rows_by_part := regression.split_into_flight_parts(
-            rows[:: max(len(rows) // _MAX_COMPARED_SAMPLES, 1)]
+            predictable_rows[:: max(len(predictable_rows) // _MAX_COMPARED_SAMPLES, 1)]
         )
     ) is None:
         return None

@@ -283,9 +283,9 @@ class Aircraft:
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
 
     def separated_by_force(self, force: str) -> tuple[int, ...]:
-        """Indices of the surfaces that a measured force distinguishes, although the body rates do not.
+        """Indices of surfaces that the body rates cannot distinguish, but a measured force can.
 
-        - `force`: `CZ` selects the surfaces that lead pitch, which differ in lift. `CY` selects the others.
+        - `force`: `CZ` selects the surfaces of pitch, which differ in lift. `CY` selects the other surfaces.
 
         The tuple is empty if it would contain only one surface.
         """

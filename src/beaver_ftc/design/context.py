@@ -107,8 +107,8 @@ class Context:
     - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and surfaces in
       the trim at the start. `trim_y` has the order and units of `Measured.y`.
     - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.
-    - `constant_rad_s2` (3,) rad/s², `inertia_coupling` (3,): declared bounds on the constant error and on the
-      share of the inertia coupling that is uncertain.
+    - `constant_rad_s2` (3,) rad/s², `inertia_coupling` (3,): declared bounds on the constant error of the
+      angular acceleration, and on the relative error of the inertia coupling.
     - `seed`: seed of the scenario.
     - `options`: the mapping `fdi.options` for a detector, `control.options` for a law.
     - `surfaces`: names of the surfaces.

@@ -70,7 +70,7 @@ class Verdict(NamedTuple):
     - `effectiveness` (surfaces,): estimated effectiveness of every surface, 1 if it is healthy. The adaptive
       laws use it. None if the detector does not estimate it.
     - `statistic`: number that exceeds 1 when the alarm is raised. Compute it in every frame, also after the
-      alarm: `compare` evaluates other alarm levels with it.
+      alarm, because `compare` tries other alarm levels with it.
     - `candidates`: names that are not excluded.
     """
 

@@ -347,8 +347,8 @@ class Stepping:
     def scenario_flown(self) -> Scenario:
         """A scenario that repeats this flight with exactly the same numbers.
 
-        Its faults begin and end at the frames of `inject` and `repair`. Its reference contains the stick as
-        tables. Its duration is the time flown.
+        Its faults begin and end at the frames of `inject` and `repair`. Its reference contains the stick
+        inputs as tables (`csv`). Its duration is the time flown.
 
         Raises BadInput for a flight with your own surface commands, because a scenario cannot contain them.
         """

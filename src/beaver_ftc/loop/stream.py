@@ -42,7 +42,7 @@ class Diagnosis:
     Attributes: `declared` lists the errors that `fdi.bounds` declares, and the parts that use them. `t_s` is
     the time of the last sample since the first, s. `config` is the section `fdi` with all defaults.
 
-    All memory of the diagnosis is one record of fixed size. Raises BadInput with the key that is wrong.
+    The memory of the diagnosis is one record of fixed size. Raises BadInput with the key that is wrong.
     """
 
     def __init__(
@@ -118,8 +118,9 @@ class Diagnosis:
           in trim.
         - `attitude_rad` (3,) rad: roll, pitch and yaw angle. It is required if `fdi.bounds` declares
           turbulence.
-        - `altitude_m`: measured altitude above sea level, m, on which declared turbulence near the ground
-          depends. By default the previous altitude is used, and 1828.8 m before the first value.
+        - `altitude_m`: measured altitude above sea level, m. It is used if turbulence is declared, because
+          turbulence depends on the height. By default the previous altitude is used. Before the first value
+          it is 1828.8 m.
 
         Raises BadInput for a wrong shape, and for a value that is infinite or NaN. Such a sample is ignored.
         """
@@ -170,8 +171,8 @@ class Diagnosis:
         return innovation.copy(), bound.copy(), self._frame["prediction"]["frame_means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:
-        """The design model xdot = f + G u at the last sample: f (3,) rad/s², and G (3, surfaces) rad/s² per
-        rad.
+        """The design model xdot = f + G u at the last sample, as the tuple (f, G): f (3,) rad/s², G (3,
+        surfaces) rad/s² for each rad.
         """
         prediction = self._frame["prediction"]
         return prediction["f"].copy(), prediction["G"].copy()

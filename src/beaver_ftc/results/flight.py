@@ -165,13 +165,13 @@ class Flight:
         """The content of certificate.json: the alarm and the exclusions, each with the inequality that proves
         it.
 
-        The call flies the scenario again, because the certificate needs further columns of the log. Raises
-        BadInput for a flight without a log, and for a scheme that has no certificate.
+        The certificate needs further columns of the log. For this reason the call flies the scenario again.
+        Raises BadInput for a flight without a log, and for a scheme that has no certificate.
         """
         return self.proof().certificate
 
     def proof(self) -> Proof:
-        """The certificate together with the data for its check.
+        """The certificate, and the data that a check of it needs.
 
         The `Proof` contains `certificate`, the `log` with further columns, and `scenario`, the text of
         scenario.yaml.
@@ -245,7 +245,7 @@ def fly(
     """Fly a scenario to its end and return the finished flight.
 
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
-    - `log`: True keeps one row of the log for each frame in memory, 0.8 kB a row.
+    - `log`: True keeps the log in memory: one row of 0.8 kB for each frame.
     - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
     - `progress`: a function that is called during the flight. Its argument is the share of the flight that
       has been flown, from 0 to 1.

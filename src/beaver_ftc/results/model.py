@@ -139,7 +139,7 @@ class Statistical(Part):
 
     - `time_s`: time of its alarm, s; None without an alarm.
     - `alarm_level`: level that its score must exceed, in standard deviations.
-    - `closest_approach`: largest share of the alarm level that it reached before a fault.
+    - `closest_approach`: largest score before a fault, divided by the alarm level.
     """
 
     time_s: float | None
@@ -198,7 +198,7 @@ class Named(Part):
     - `estimate_deg`: the same size as an angle, deg.
     - `estimate_interval`: lower and upper end of the set that contains the size, in the unit of `estimate`.
     - `frequency_rad_s`: frequency of an oscillating fault, rad/s.
-    - `so_far`: True if the name follows from the exclusion of all other candidates. Later data can exclude
+    - `so_far`: True if the name was given because all other candidates are excluded. Later data can exclude
       this name, too.
     - `premature`: True if the name was given before the fault began.
     """

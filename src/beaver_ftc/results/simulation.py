@@ -34,7 +34,8 @@ class Simulation(Stepping):
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
     - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
     - `log`: True keeps one row of the log for each frame in memory. A `MemoryLog` receives the rows instead.
-    - `prepare`: a function that is called once before the flight, with the trimmed plant as argument.
+    - `prepare`: a function that is called once before the flight. Its argument is the trimmed plant, the
+      simulated aircraft.
 
     Attributes:
 
@@ -72,7 +73,7 @@ class Simulation(Stepping):
     def snapshot(self) -> "Snapshot":
         """The present state of the flight. Its method `resume` returns a new `Simulation` in this state.
 
-        A snapshot can be resumed any number of times. Each new flight has exactly the same numbers.
+        You can resume a snapshot any number of times. All these flights have exactly the same numbers.
         """
         plugged = tuple(
             name for name, of in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if of is not None
@@ -106,7 +107,8 @@ class Snapshot:
     The snapshot stores the commands and injected faults up to this instant, not the state of JSBSim. JSBSim
     keeps filters, delays, integrators and engines where no property can read them. `resume` therefore flies
     the flight again. The repeated flight is exact for every aircraft and sensor. It takes about 1 ms for each
-    second of flight at 100 Hz. A fork of the process would take as long as 8 s of repeated flight.
+    second of flight at 100 Hz. To copy the process instead (fork) would take as long as to repeat 8 s of
+    flight.
     """
 
     frames: int

@@ -19,11 +19,12 @@ public function, class and record, for readers who write Python. [Python](refere
 use the names in programs. The [glossary](reference/glossary.md) explains the terms of the diagnosis."""
 READING = """## How to read an entry
 
-- **Heading.** The name without `beaver_ftc.` in front. A name without a dot is in the package itself: write
-  `bf.fly`. A name with a dot needs an import: write `from beaver_ftc.results.model import Fault`.
-- **Signature.** An argument with `=` has this default, and `= ...` means that the default is
-  computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The
-  types are explained in the text below the signature.
+- **Heading.** The name without `beaver_ftc.` in front. A name without a dot needs no further import: for the
+  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write
+  `from beaver_ftc.results.model import Fault`.
+- **Signature.** An argument with `= value` has this default. With `= ...` the default is computed. Arguments
+  after `*` must be given by name. `X | None` means that the value may be None. The text below the signature
+  explains the types.
 - **Arguments and fields.** Each line of a list has the name, the shape of an array, the unit, and the
   meaning.
 - **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
@@ -81,18 +82,32 @@ NAMES: dict[str, dict[str, tuple[str, ...]]] = {
     "Errors": {"BadInput": (), "SimulationFailed": ()},
 }  # fmt: skip
 SAYS = {
-    "Scenarios and flights": "Load or write a scenario, fly it, and read the result.",
+    "Scenarios and flights": "Load or write a scenario, fly it, and read the result:\n\n```python\n"
+    "import beaver_ftc as bf\n\n"
+    'scenario = bf.load("elevator-partial-loss").with_({"faults[0].magnitude": 0.2})\n'
+    "flight = bf.fly(scenario)\n"
+    "print(flight.detection.delay_s, flight.isolation.fault)  # 0.01 elevator\n```",
     "Records of a flight": "The attributes of a `Flight` are records. This section lists their fields.",
     "Step by step": "Advance a flight with `Simulation`, or diagnose your own data with `Diagnosis`.",
-    "Many flights": "Fly variations of a scenario.",
-    "Aircraft, trim and linear models": "Read an aircraft file, trim the aircraft, and linearise it. "
+    "Many flights": "Fly variations of a scenario:\n\n```python\n"
+    "import beaver_ftc as bf\n\n"
+    'losses = {"faults[0].magnitude": {"linspace": [0.2, 0.8, 4]}}\n'
+    'rows = bf.sweep("elevator-partial-loss", losses)\n'
+    'print(rows["detection.delay_s"])\n```',
+    "Aircraft, trim and linear models": "Read an aircraft file, trim the aircraft, and linearise it:\n\n"
+    "```python\nimport beaver_ftc as bf\n\n"
+    "point = bf.trim(airspeed_mps=40)\n"
+    "model = bf.linearise(airspeed_mps=40)\n"
+    "print(point.elevator_rad, model.states)\n```\n\n"
     "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives an aircraft `jsbsim:NAME` at its first use, "
     "and checks an aircraft `./FOLDER` against its JSBSim model.",
     "Plug-ins": "The two classes that you can write, and the records that they receive and return.",
-    "Errors": "Both errors have a message of one line, fit for a user, and an `exit_code` for a script. "
-    "Subclasses of `BadInput` are `ScenarioError` (mistakes in a file, one line for each), `UnknownAircraft` "
-    "(no aircraft of this name), and `NotDerived`, an `UnknownAircraft` (an aircraft of JSBSim whose design "
-    "model is not derived yet).",
+    "Errors": "Both errors have a message for the user, and an `exit_code` for a script. `BadInput` has "
+    "these subclasses:\n\n"
+    "- `ScenarioError`: a file has mistakes. The message has one line for each mistake.\n"
+    "- `UnknownAircraft`: there is no aircraft of this name.\n"
+    "- `NotDerived`, a subclass of `UnknownAircraft`: the aircraft is one of JSBSim, and its design model is "
+    "not derived yet.",
 }
 
 

@@ -4,8 +4,9 @@ import json
 import re
 import subprocess
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ PLANES = {
     "jsbsim:SGS": "glider",
 }
 LONGEST_S = 900
+LIVE = "`live`, changes in flight"
 YES, NO = "✓", "✗"
 STUDIES = ("sweep", "compare", "detectability", "power")
 
@@ -71,21 +73,29 @@ def features() -> str:
 
 def features_probe() -> str:
     """On the aircraft that is built in, without the studies of several flights."""
-    return _table(("beaver",), [feature for feature in FEATURES if feature.line.split()[0] not in STUDIES])
+    quick = [feature for feature in FEATURES if feature.line.split()[0] not in STUDIES]
+    return _table(("beaver",), quick, {LIVE: _live})
 
 
-def _table(planes: Iterable[str], features: Sequence[Feature] = FEATURES) -> str:
+def _table(
+    planes: Iterable[str],
+    features: Sequence[Feature] = FEATURES,
+    functions: Mapping[str, Callable[[str], str]] | None = None,
+) -> str:
+    """A row a feature and a function, a column a plane. functions: what is tried without a command, by name;
+    each takes the plane and returns why it cannot be done, or nothing."""
+    functions = functions or {
+        "`matrix`": partial(_matrix, declared=False),
+        "`matrix --declared`": partial(_matrix, declared=True),
+        LIVE: _live,
+    }
     reasons: list[str] = []
-    rows = [[feature.name] for feature in features] + [
-        ["`matrix`"],
-        ["`matrix --declared`"],
-        ["`live`, changes in flight"],
-    ]
+    rows = [[feature.name] for feature in features] + [[name] for name in functions]
     for plane in planes:
         if plane.startswith("jsbsim:"):
             derive_if_needed(plane)
         said = [_tried(feature, plane) for feature in features]
-        said += [_matrix(plane, declared=told) for told in (False, True)] + [_live(plane)]
+        said += [tried(plane) for tried in functions.values()]
         for row, why in zip(rows, said, strict=True):
             if why and why not in reasons:
                 reasons.append(why)

@@ -17,6 +17,7 @@ DERIVED_IN = {
     7: "explanation/statistical.md",
     9: "explanation/instruments.md",
 }  # section of the page: where it is derived
+OF_TYPES = ("slowest_oscillation_rad_s", "slowest_rate_deg_s")  # keys of section 4 that another page derives
 CONSTANTS = (  # (section, meaning, module, name there, unit)
     (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
@@ -48,7 +49,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "growth rate in the signature of a growing loss", statistical, "LOSS_GROWTH_RATE_PER_S", "1/s"),
     (
         7,
-        "limit for the exclusion of a loss: its log-likelihood ratio over the best ratio",
+        "a loss is excluded only if its log-likelihood ratio is below this share of the best one",
         statistical,
         "MIN_LLR_SHARE_OF_CONSTANT_LOSS",
         "",
@@ -85,6 +86,8 @@ SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, un
     (3, "poles of further filters", "pole_bank_per_s", FdiConfig(), "1/s"),
     (4, "pole of the isolation estimators", "isolation_pole_per_s", FdiConfig(), "1/s"),
     (4, "time constant of the estimates", "forgetting_time_s", FdiConfig(), "s"),
+    (4, "slowest oscillation of a surface", "slowest_oscillation_rad_s", FdiConfig(), "rad/s"),
+    (4, "slowest rate limit; a slower surface counts as jammed", "slowest_rate_deg_s", FdiConfig(), "deg/s"),
     (7, "declared rate of false alarms", "false_alarms_per_h", Statistical(), "1/h"),
     (7, "probability that noise excludes the true fault in a second", "misnaming", Statistical(), ""),
     (7, "largest angular frequency of the model error", "uncertainty_rad_s", Statistical(), "rad/s"),
@@ -97,12 +100,20 @@ def theory_constants() -> str:
     rows = [(at, meaning, name, getattr(module, name), unit) for at, meaning, module, name, unit in CONSTANTS]
     rows += [(at, meaning, key, getattr(section, key), unit) for at, meaning, key, section, unit in SETTINGS]
     return markdown_table(
-        ("section", "constant", "name", "value", "unit"),
+        ("section", "constant", "name", "value", "unit", "derived in"),
         [
-            (f"[{at}]({DERIVED_IN[at]})", meaning, f"`{name}`", _said(value), unit)
+            (str(at), meaning, f"`{name}`", _said(value), unit, derived_in(name, at))
             for at, meaning, name, value, unit in sorted(rows, key=lambda row: row[0])
         ],
     )
+
+
+def derived_in(name: str, section: int) -> str:
+    """The page that derives a constant, as a link."""
+    where = (
+        "explanation/fault-types.md#from-a-position-to-a-type" if name in OF_TYPES else DERIVED_IN[section]
+    )
+    return f"[{where.split('/')[1].split('.')[0]}]({where})"
 
 
 def _said(value: float | tuple[float, ...] | np.ndarray) -> str:

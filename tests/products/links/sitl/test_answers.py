@@ -71,9 +71,9 @@ def test_an_answer_is_one_line_between_newlines():
 
 def test_the_page_has_the_packet_and_every_key_of_the_answer():
     page = PAGE.read_text(encoding="utf-8")
-    packed = re.search(r"`(struct\.pack\(.*?\))`", page)[1]
-    datagram = eval(packed, {"struct": struct}, {"frame": 7, "pulses": range(1100, 1116)})
-    assert decoded(datagram) == (400, 7, tuple(range(1100, 1116)))
+    packed = re.search(r"packet = (struct\.pack\(.*?\))  #", page)[1]
+    datagram = eval(packed, {"struct": struct}, {"frame": 7, "pulses": (1100, 1101, 1102, 1103)})
+    assert decoded(datagram) == (100, 7, (1100, 1101, 1102, 1103, *[0] * 12))
     rows = page.partition("|`timestamp`|")[1] + page.partition("|`timestamp`|")[2].partition("\n\n")[0]
     answered = {
         f"{key}.{below}" if isinstance(of, dict) else key

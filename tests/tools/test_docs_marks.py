@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tools.docs import refresh
 from tools.docs.commands import Output
 from tools.docs.marks import Number, parsed
-from tools.docs.refresh import Refreshed, Wanted, digest_of, dressed
+from tools.docs.refresh import Refreshed, Wanted, digest_of, dressed, linked
 from tools.docs.values import at, printed
 
 from beaver_ftc.documents.errors import BadInput
@@ -242,3 +242,11 @@ def test_every_value_of_a_document_has_a_path(rows):
     for index, row in enumerate(rows):
         for key, value in row.items():
             assert at(rows, f"{index}.{key}") == value
+
+
+@pytest.mark.parametrize(("page", "up"), [("docs/how-to/a.md", "../"), ("README.md", "docs/")])
+def test_links_of_what_is_printed_lead_from_its_page_and_code_stays(page, up):
+    text = "a [link](b.md), [heading](#c), [site](https://d.e), `always[1:2](q <= 1)`\n\n{block}\n[f](g.md)"
+    block = '```yaml\nformula: "always[12.5:29](abs(q_rad_s) <= 0.1)"\n```\n'
+    moved = text.replace("](b", f"]({up}b").replace("](g", f"]({up}g").format(block=block)
+    assert linked(text.format(block=block), page) == moved

@@ -22,6 +22,11 @@ from tools.docs.pages import ROOT, Finding
 DECIDES = ("src", "aircraft", "scenarios")  # what a number of a flight depends on
 _FENCE = re.compile(r"(`{3,})(\w*)\n((?:\$ .*\n)*)")
 _MARKDOWN = re.compile(r"python -m tools\.docs (?:table|reference) [\w-]+")
+# a block in a fence, code in a line, or the start of a link to a file
+_CODE_OR_LINK = re.compile(
+    r"(?P<code>^(?P<mark>`{3,}).*?^(?P=mark)`*$|(?P<ticks>`+)[^\n]*?(?P=ticks))|\]\((?!\w+:|[#/])",
+    re.M | re.S,
+)
 _LONGEST = 90  # of what is quoted in a finding
 
 
@@ -102,7 +107,7 @@ class Refreshed:
         if output is None:
             return
         old = self.page.text[block.begin : block.end]
-        new = dressed(old, _linked(output.text, self.page.name), block.origin.command)
+        new = dressed(old, linked(output.text, self.page.name), block.origin.command)
         self._put(block.line, block.begin, block.end, new, block.origin.command)
         self._pictures(block, output)
 
@@ -209,12 +214,11 @@ def dressed(old: str, text: str, command: str) -> str:
     return f"```text\n{text}\n```\n"
 
 
-def _linked(text: str, page: str) -> str:
-    """Links of what is printed are as seen from docs/; README lies above it."""
+def linked(text: str, page: str) -> str:
+    """Links of what is printed are as seen from docs/; README lies above it. Code has no links."""
     below = len(Path(page).parts) - 2
-    if below < 0:
-        return re.sub(r"\]\((?!\w+:|[#/])", "](docs/", text)
-    return re.sub(r"\]\((?!\w+:|[#/])", "](" + "../" * below, text)
+    up = "docs/" if below < 0 else "../" * below
+    return _CODE_OR_LINK.sub(lambda found: found["code"] or f"]({up}", text)
 
 
 def _first_difference(old: str, new: str) -> tuple[int, str, str]:

@@ -132,8 +132,10 @@ class Bounds(Section, strict=True):
     inertia: largest relative error of Ix, Iy, Iz and Jxz
     sensors: largest measurement errors: a preset, or noise, bias, resolution and slope error of each sensor
     deflection_deg: largest difference between the position of a surface and the model of its actuator, deg
-    turbulence: strongest turbulence (Dryden model). The bound depends on the height. At no height is it
-    smaller than above 2000 ft. No instrument measures the rotation of turbulent air
+    turbulence: strongest turbulence (Dryden model). The bound is for the rotation of the air, and depends on
+    the height. Its smallest value is that above 2000 ft. The translation of the air needs no bound, because
+    airspeed and flow angles contain it. The statistical detector can subtract pitching and yawing gusts,
+    which the vanes measure. No instrument measures rolling gusts
     vertical_wind_mps: strongest steady vertical wind, up or down. The sensor monitor uses it when it compares
     altitude and climb, m/s
     """

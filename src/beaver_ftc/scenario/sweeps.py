@@ -149,13 +149,16 @@ class Level(Section):
 
 
 class QuantileLevel(Level):
-    """A limit for a quantile over the flights. With `confidence`, the one-sided confidence bound of the
-    quantile must meet the limit.
+    """A limit for a quantile over the flights. Without `confidence`, the estimate must meet the limit. With
+    `confidence`, its one-sided confidence bound must meet the limit: the lower bound for `at_least`, the
+    upper bound for `at_most`.
 
+    at_least: smallest allowed value
     at_most: largest allowed value
     confidence: confidence of the one-sided bound; left out: the estimate itself is compared with the limit
     """
 
+    at_least: Number | None = entry(None, range="any", examples=[0.01])
     at_most: Number | None = entry(None, range="any", examples=[1])
     confidence: Number | None = number(
         None, "share of 1", ge=0.5, lt=1, needs={"at_most": 1}, examples=[0.95]
@@ -206,7 +209,7 @@ class SweepExpect(Section):
     detection_delay_s: QuantileLevel | None = None
     isolation_delay_s: QuantileLevel | None = None
     post_fault_rms_deg_s: AxisLevels | None = None
-    tracking_ratio: AxisLevels | None = number(None, "share of 1")
+    tracking_ratio: AxisLevels | None = number(None, "1")
 
 
 class SweepFile(Section, title="beaver-ftc sweep"):
@@ -217,14 +220,16 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     base: scenario that is varied: a built-in name, a scenario file beside this file, or the keys of a
     scenario
     set: new values of keys of the base, the same in all flights. A key is written with dots, e.g.
-    `initial.airspeed_mps`
+    `initial.airspeed_mps`. An item of a list has its number from 0 in brackets: `faults[0].magnitude` is the
+    magnitude of the first fault
     runs: number of flights. If it is smaller than the grid, only the first points of the grid are flown. If
-    it is larger, the grid is flown again; left out: one flight for each point of the grid
+    it is larger, the grid is flown again; left out: one flight for each point of the grid. Without a key with
+    `linspace` and without `sampling: grid`, `runs` is required
     seed: seed of all random values of the sweep
     sampling: how the values are chosen. `random`: each flight independently. `lhs`: Latin hypercube. `sobol`:
     Sobol sequence. Both fill the ranges more evenly than `random`. `grid`: all combinations, only for
-    `linspace` and `choice`. The values of `linspace` are always taken in order
-    vary: keys of the base that vary, and how each key varies. A key is written with dots
+    `linspace` and `choice`. With each kind of sampling, the values of `linspace` are flown in their order
+    vary: keys of the base that vary, and how each key varies. A key is written as in `set`
     expect: conditions that the statistics must meet
     """
 

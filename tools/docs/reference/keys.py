@@ -136,6 +136,7 @@ def _called_file(section: Section) -> str:
     return "the top of the file" if heading == "The file" else heading
 
 
+_TYPES_OF = {"OfHandling": "handling_qualities"}  # title of a section -> its type, if not its words
 _HEADINGS = {"QuantityColumn": "A column (`rates.p`, `commands[]`, `labels.NAME`, ...)"}
 
 
@@ -236,8 +237,8 @@ def _type(key: Key) -> str:
 
 
 def _called(title: str) -> str:
-    """The title of a section as words."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title).lower().removeprefix("of ")
+    """The title of a section as words, or the name of its type."""
+    return _TYPES_OF.get(title) or re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title).lower().removeprefix("of ")
 
 
 def _type_of(form: Node) -> str:
@@ -432,7 +433,10 @@ KINDS = {
         "This plan has one requirement of each kind. JAM-1 has expectations, RATE-1 has a formula, and "
         "STAT-1 has a limit for the result of a study.",
         "[Write evidence](how-to/evidence.md) explains the verdicts of a plan with an example.",
-        links={"requirements[]": "[tests of a requirement, operators of a formula](how-to/evidence.md)"},
+        links={
+            "requirements[]": "[tests of a requirement, operators of a formula]"
+            "(how-to/evidence.md#what-a-requirement-tests)"
+        },
     ),
     "aircraft-keys": Kind(
         AircraftFile.model_json_schema,

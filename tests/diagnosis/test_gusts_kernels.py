@@ -128,7 +128,7 @@ def test_the_fastest_swing_decides(share):
     record["memory"]["gust_axes_rate"] = np.eye(3)
     record["memory"]["gust_axes_rate"][1, 2] = share * most * DT
     record["memory"]["gust_axes_rate"][0, 0] += 0.5 * most * DT
-    gusts.update_gust_axes_rate(record, DT, 45.0)
+    gusts.fill_turn_rate_of_gust_axes(record, DT, 45.0)
     assert record["memory"]["gust_axes_rate"][1, 2] == pytest.approx(-share * most)
     assert record["memory"]["has_fast_axes_turn"] == (share > 1.0)
 

@@ -228,7 +228,7 @@ def update_gust_axes(gust, sin_heading_change, cos_heading_change):
 
 
 @kernel
-def update_gust_axes_rate(gust, dt, V):
+def fill_turn_rate_of_gust_axes(gust, dt, V):
     """Fill `gust_axes_rate`, 1/s: how fast the axes of the gusts turn in the body; dt s since the instant
     before.
 
@@ -236,15 +236,15 @@ def update_gust_axes_rate(gust, dt, V):
     rate sigma gust_axes_rate. Over its lag this equals a random walk of (gust_axes_rate lag)^2 / 2 times its
     intensity.
     """
-    max_axes_rate = 0.0
+    max_turn_rate_component = 0.0
     for i in range(3):
         for gust_axis in range(3):
             gust.memory.gust_axes_rate[i, gust_axis] = (
                 gust.output.gust_axes_in_body[i, gust_axis] - gust.memory.gust_axes_rate[i, gust_axis]
             ) / dt
-            max_axes_rate = max(max_axes_rate, abs(gust.memory.gust_axes_rate[i, gust_axis]))
+            max_turn_rate_component = max(max_turn_rate_component, abs(gust.memory.gust_axes_rate[i, gust_axis]))
     gust.memory.has_fast_axes_turn = (
-        0.5 * (max_axes_rate * gust.config.rolling_gust_correlation_length / V) ** 2
+        0.5 * (max_turn_rate_component * gust.config.rolling_gust_correlation_length / V) ** 2
         > MIN_GUST_AXES_TURN_INTENSITY_SHARE
     )
 
@@ -311,7 +311,7 @@ def update_gust_rotation(gust, y, attitude, dt):
     )
     V = gust.output.speed_relative_to_mean_air
     update_gust_axes(gust, sin_heading_change, cos_heading_change)
-    update_gust_axes_rate(gust, dt, V)
+    fill_turn_rate_of_gust_axes(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
     unmeasured_yawing_share_before = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(

@@ -272,7 +272,7 @@ class DiagnosisReadout:
         bound_record = self._fdi["bound"]
         declared_errors = bound_record["declared_errors"]
         has_declared_errors = bool(declared_errors["has_declared_errors"])
-        gyro_error_offset, gyro_constant_error, gyro_error_per_rate = (
+        gyro_error_bound_at_rest, gyro_constant_error, gyro_error_per_rate = (
             declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
             for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
         )
@@ -282,7 +282,7 @@ class DiagnosisReadout:
             inertia_coupling_share=bound_record["inertia_coupling"].copy(),
             constant_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
             earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
-            gyro_error_offset_rad_s=gyro_error_offset,
+            gyro_error_offset_rad_s=gyro_error_bound_at_rest,
             gyro_constant_error_rad_s=gyro_constant_error, gyro_error_per_rate=gyro_error_per_rate,
         )  # fmt: skip
 

@@ -411,14 +411,14 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi["types"]["config"]["frames_per_block"] = length
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert on(held_surface.min_runaway_distance, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.min_runaway_up_deflection, fdi, surface, frame) == pytest.approx(0.1 + way)
-        assert on(held_surface.max_runaway_down_deflection, fdi, surface, frame) == pytest.approx(0.2 - way)
-    assert on(held_surface.min_runaway_up_deflection, fdi, surface, 99) == HIGH
-    assert on(held_surface.max_runaway_down_deflection, fdi, surface, 99) == LOW
+        assert on(held_surface.runaway_up_lower_limit, fdi, surface, frame) == pytest.approx(0.1 + way)
+        assert on(held_surface.runaway_down_upper_limit, fdi, surface, frame) == pytest.approx(0.2 - way)
+    assert on(held_surface.runaway_up_lower_limit, fdi, surface, 99) == HIGH
+    assert on(held_surface.runaway_down_upper_limit, fdi, surface, 99) == LOW
     surface["evidence"]["first_anomalous_frame"] = -1
     assert (
-        on(held_surface.min_runaway_up_deflection, fdi, surface, 9),
-        on(held_surface.max_runaway_down_deflection, fdi, surface, 9),
+        on(held_surface.runaway_up_lower_limit, fdi, surface, 9),
+        on(held_surface.runaway_down_upper_limit, fdi, surface, 9),
     ) == (
         LOW,
         HIGH,

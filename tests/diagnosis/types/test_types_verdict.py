@@ -751,7 +751,7 @@ def test_alarms_are_noted_by_plane():
     for axis, planes in ((ROLL, [0, 1]), (PITCH, [1, 0]), (YAW, [0, 1])):
         fdi = new_case()
         fdi["bank"]["output"]["threshold"], fdi["bank"]["output"]["residual"][2, axis] = 0.1, -0.11
-        on(pairs.record_group_alarms, fdi)
+        on(pairs.latch_group_alarms, fdi)
         assert fdi["types"]["pair"]["group_has_alarm"].tolist() == planes
 
 

@@ -406,7 +406,7 @@ MAX_REMAINING_TRANSIENT_SHARE = 0.003  # of a jump of the attitude within a fram
 RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
 
 # Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign
-MAX_HIDDEN_ERROR_PER_BOUND = 2.0
+MAX_HIDDEN_ERROR_PER_TEST_BOUND = 2.0
 # Margin on the bound of the flow's test, for the gyro that turns the flow by all of its error
 FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
@@ -770,7 +770,7 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
     )
     # of the reading, if it is the broken one
     min_reading_error = abs(duplicate_test_record.residual) - duplicate_test_record.filtered_bound[0]
-    error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_BOUND * max(
+    error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_TEST_BOUND * max(
         reading_test_record.filtered_bound[0], redundancy.memory.reading_error_bound[reading_index]
     )
     reading_is_frozen = is_frozen(monitor, reading_index)
@@ -852,7 +852,7 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
             else flow_test_record.filtered_bound[m]
         )
         max_hidden_turn = (
-            MAX_HIDDEN_ERROR_PER_BOUND
+            MAX_HIDDEN_ERROR_PER_TEST_BOUND
             * (1.0 if acts_fully_on_flow else acting_share)
             * turn_test.filtered_bound[m]
         )
@@ -875,7 +875,7 @@ def airspeed_error_would_exceed_own_test(monitor):
         airspeed_error_mps = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained_residual
         if (
             airspeed_error_mps
-            > MAX_HIDDEN_ERROR_PER_BOUND * max_reading_over_truth * speed_test.filtered_bound[m]
+            > MAX_HIDDEN_ERROR_PER_TEST_BOUND * max_reading_over_truth * speed_test.filtered_bound[m]
         ):
             return True
     return False

@@ -534,12 +534,12 @@ def update_verdict(fdi, prediction, measured, t):
 def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    engine_asymmetry_bound, conclusion_record = (
+    yawing_moment_bound, conclusion_record = (
         fdi.bound.model_error_map.engine_asymmetry_bound_now,
         fdi.verdict,
     )
     if not conclusion_record.detected and monitors.detect_engine_failure(
-        fdi.engine_monitor, engine_asymmetry_bound, y
+        fdi.engine_monitor, yawing_moment_bound, y
     ):
         conclusion.replace_isolated_estimator(conclusion_record, UNANTICIPATED, t)
         return YAW

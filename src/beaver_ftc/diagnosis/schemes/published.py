@@ -120,13 +120,13 @@ def fill_input_basis(network, i, input_index, n_centres, input_value):
         ),
         n_centres - 1.0,
     )
-    norm = np.sqrt(
+    basis_norm = np.sqrt(
         fill_gaussians_and_sum_squares(
             position_in_centre_spacings, n_centres, 0, network.memory.input_basis[input_index]
         )
     )
     for k in range(n_centres):
-        network.memory.input_basis[input_index, k] /= norm
+        network.memory.input_basis[input_index, k] /= basis_norm
 
 
 @kernel

@@ -46,7 +46,7 @@ from beaver_ftc.diagnosis.types.verdict import (
 
 
 @kernel
-def record_group_alarms(pair_record, filter_bank):
+def latch_group_alarms(pair_record, filter_bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for axis in range(3):
         group_index = PITCH_GROUP if axis == PITCH else LATERAL_GROUP
@@ -172,7 +172,7 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
 def observe_and_judge_frame_for_pairs(types, layout, estimators, filter_bank, innovation_bound):
     """Observe the elapsed frame, plane by plane, and judge the one before; innovation_bound (3,): bound on
     it."""
-    record_group_alarms(types.pair, filter_bank)
+    latch_group_alarms(types.pair, filter_bank)
     registry.infer_surface_positions(
         types, layout, estimators, filter_bank.output.innovation, innovation_bound
     )

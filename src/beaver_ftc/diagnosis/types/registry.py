@@ -363,12 +363,12 @@ def configure_fault_types(
     types_config["abrupt"] = config.fault_profile == "abrupt"
     types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
     surfaces, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
-    for s, (surface_name, surface, travel_low, travel_high) in enumerate(
+    for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
         zip(surfaces, types["surface"], *travel, strict=True)
     ):
         rate_limit_deg_s, actuator = (
             getattr(scenario.actuators, surface_name).rate_limit_deg_s,
-            surface["actuator"],
+            surface_record["actuator"],
         )
         actuator["travel_low"], actuator["travel_high"] = travel_low, travel_high
         actuator["reachable_low"], actuator["reachable_high"] = min(travel_low, 0.0), max(travel_high, 0.0)
@@ -380,8 +380,8 @@ def configure_fault_types(
         actuator["min_rate_limited_motion_per_substep"] = min(
             radians(config.slowest_rate_deg_s) * substep_s, actuator["max_motion_per_substep"]
         )
-        surface["status"]["may_be_sole_fault"] = not config.pairs or layout["group"][s] == PITCH_GROUP
-        surface["accommodation"]["mode"] = surface["status"]["fault_type"] = -1
+        surface_record["status"]["may_be_sole_fault"] = not config.pairs or layout["group"][s] == PITCH_GROUP
+        surface_record["accommodation"]["mode"] = surface_record["status"]["fault_type"] = -1
 
 
 @kernel

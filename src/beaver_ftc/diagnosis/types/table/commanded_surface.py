@@ -39,7 +39,7 @@ from beaver_ftc.diagnosis.types import (
 
 
 @kernel
-def consistent_effectiveness_interval(surface):
+def effectiveness_interval_of_judged_frame(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
     position_low, position_high = (
         surface.judged_observation.position_low,
@@ -63,7 +63,7 @@ def effectiveness_range(surface):
 @kernel
 def consistent_loss_interval(config, surface, type_index, k):
     """The effectiveness that explains this frame."""
-    return consistent_effectiveness_interval(surface)
+    return effectiveness_interval_of_judged_frame(surface)
 
 
 @kernel
@@ -82,7 +82,7 @@ def loss_deflection_range(config, surface, type_index, k):
 @kernel
 def consistent_varying_loss_interval(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
-    effectiveness_low, effectiveness_high = consistent_effectiveness_interval(surface)
+    effectiveness_low, effectiveness_high = effectiveness_interval_of_judged_frame(surface)
     command_changed_sign = (
         config.frames_per_block > 1
         and surface.commands.min_healthy_position[1] < 0.0 < surface.commands.max_healthy_position[1]

@@ -45,7 +45,7 @@ from beaver_ftc.diagnosis.types import (
 EARLIER_RELEASE, LATER_RELEASE = 0, 1
 STATUS_HELD, STATUS_RETURNING, STATUS_REFUTED = range(3)
 # A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.
-RETURN_TOLERANCE_RAD = 1e-14
+HEALTHY_POSITION_TOLERANCE_RAD = 1e-14
 
 
 @kernel
@@ -176,7 +176,7 @@ def narrow_return_interval(config, surface, release_slot, type_index):
             abs(mean_from_low - mean_tolerance - healthy_position),
             abs(mean_from_high + mean_tolerance - healthy_position),
         )
-        <= RETURN_TOLERANCE_RAD
+        <= HEALTHY_POSITION_TOLERANCE_RAD
     ):
         return False
     if (
@@ -496,24 +496,24 @@ def min_runaway_distance(config, surface, k):
 
 
 @kernel
-def min_runaway_up_deflection(config, surface, k):
+def runaway_up_lower_limit(config, surface, frame_index):
     """Return the least upward deflection of a runaway by a frame, rad; the stop at most."""
     if surface.evidence.first_anomalous_frame < 0:
         return surface.actuator.travel_low
     return min(
         surface.actuator.travel_high,
-        surface.evidence.first_anomalous_position_low + min_runaway_distance(config, surface, k),
+        surface.evidence.first_anomalous_position_low + min_runaway_distance(config, surface, frame_index),
     )
 
 
 @kernel
-def max_runaway_down_deflection(config, surface, k):
+def runaway_down_upper_limit(config, surface, frame_index):
     """Return the least downward deflection of a runaway by a frame, rad; the stop at most."""
     if surface.evidence.first_anomalous_frame < 0:
         return surface.actuator.travel_high
     return max(
         surface.actuator.travel_low,
-        surface.evidence.first_anomalous_position_high - min_runaway_distance(config, surface, k),
+        surface.evidence.first_anomalous_position_high - min_runaway_distance(config, surface, frame_index),
     )
 
 
@@ -524,7 +524,7 @@ def consistent_hardover_up_interval(config, surface, type_index, k):
         config,
         surface,
         type_index,
-        min_runaway_up_deflection(config, surface, k),
+        runaway_up_lower_limit(config, surface, k),
         surface.actuator.travel_high,
     )
 
@@ -537,7 +537,7 @@ def consistent_hardover_down_interval(config, surface, type_index, k):
         surface,
         type_index,
         surface.actuator.travel_low,
-        max_runaway_down_deflection(config, surface, k),
+        runaway_down_upper_limit(config, surface, k),
     )
 
 
@@ -545,7 +545,7 @@ def consistent_hardover_down_interval(config, surface, type_index, k):
 def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
     start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
-    start_position_low = max(start_position_low, min_runaway_up_deflection(config, surface, observed_frame))
+    start_position_low = max(start_position_low, runaway_up_lower_limit(config, surface, observed_frame))
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_high = surface.actuator.travel_high
     add_release(surface, type_index, start_position_low, start_position_high)
@@ -556,7 +556,7 @@ def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
     start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
     start_position_high = min(
-        start_position_high, max_runaway_down_deflection(config, surface, observed_frame)
+        start_position_high, runaway_down_upper_limit(config, surface, observed_frame)
     )
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_low = surface.actuator.travel_low
@@ -566,13 +566,13 @@ def add_hardover_down_release(config, surface, type_index, k):
 @kernel
 def hardover_up_deflection_range(config, surface, type_index, k):
     """Between its least way and the stop."""
-    return min_runaway_up_deflection(config, surface, k), surface.actuator.travel_high
+    return runaway_up_lower_limit(config, surface, k), surface.actuator.travel_high
 
 
 @kernel
 def hardover_down_deflection_range(config, surface, type_index, k):
     """The same downwards."""
-    return surface.actuator.travel_low, max_runaway_down_deflection(config, surface, k)
+    return surface.actuator.travel_low, runaway_down_upper_limit(config, surface, k)
 
 
 def upper_stop_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | None:

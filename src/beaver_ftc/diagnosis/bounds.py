@@ -204,10 +204,10 @@ def reading_error_bound(declared_errors, signal_index, reading):
 def changing_gyro_error_bound(declared_errors, axis, reading):
     """Bound the changing error of the gyro of an axis, rad/s: noise, resolution, slope times the true
     rate."""
-    changing_error_offset = (
+    changing_error_bound_at_rest = (
         declared_errors.signal_error_offset[axis] - declared_errors.constant_gyro_error_bound[axis]
     )
-    return changing_error_offset + declared_errors.signal_error_slope[axis] * (
+    return changing_error_bound_at_rest + declared_errors.signal_error_slope[axis] * (
         abs(reading) + reading_error_bound(declared_errors, axis, reading)
     )
 
@@ -277,10 +277,10 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
     max_dynamic_pressure = declared_errors.magnitude_bound_y[QDYN]
     moment_table = design.moments
     for i in range(3):
-        coefficient_magnitude, max_coefficient_magnitude = 0.0, 0.0
+        term_magnitude_sum, max_term_magnitude_sum = 0.0, 0.0
         for k in range(moment_table.free_from[i], moment_table.surface_to[i]):
             term_value_magnitude, s = abs(moment_table.value[k]), moment_table.surface[k]
-            coefficient_magnitude += (
+            term_magnitude_sum += (
                 term_value_magnitude
                 * declared_errors.monomial_magnitude[moment_table.monomial[k]]
                 * (declared_errors.magnitude_u[s] if s >= 0 else 1.0)
@@ -288,16 +288,15 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
             max_factor_magnitude = declared_errors.max_monomial_magnitude[moment_table.monomial[k]] * (
                 declared_errors.max_magnitude_u[s] if s >= 0 else 1.0
             )
-            max_coefficient_magnitude += (
+            max_term_magnitude_sum += (
                 term_value_magnitude + declared_errors.coefficient_tolerance[k]
             ) * max_factor_magnitude
         wing_area_times_length = design.S * (design.c if i == 1 else design.b)
         declared_errors.moment_magnitude[i] = (
-            wing_area_times_length * measured_dynamic_pressure * coefficient_magnitude
+            wing_area_times_length * measured_dynamic_pressure * term_magnitude_sum
         )
         declared_errors.moment_error_bound[i] = wing_area_times_length * (
-            max_dynamic_pressure * max_coefficient_magnitude
-            - measured_dynamic_pressure * coefficient_magnitude
+            max_dynamic_pressure * max_term_magnitude_sum - measured_dynamic_pressure * term_magnitude_sum
         )
 
 
@@ -319,12 +318,12 @@ def inertia_times_moment_error_bound(declared_errors, axis, coefficient, toleran
 @kernel
 def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, tolerance):
     """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
-    rate_magnitude, max_rate_magnitude = declared_errors.magnitude_x, declared_errors.max_magnitude_x
+    rate_magnitudes, max_rate_magnitudes = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
         coefficient,
         tolerance,
-        rate_magnitude[i] * rate_magnitude[j],
-        max_rate_magnitude[i] * max_rate_magnitude[j],
+        rate_magnitudes[i] * rate_magnitudes[j],
+        max_rate_magnitudes[i] * max_rate_magnitudes[j],
     )
 
 
@@ -332,23 +331,23 @@ def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, toleranc
 def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
     """Return the part of surface s in the moment about an axis per rad: its magnitude, and with all errors; N
     m."""
-    coefficient_magnitude_per_rad, max_coefficient_magnitude_per_rad = 0.0, 0.0
+    term_magnitude_sum_per_rad, max_term_magnitude_sum_per_rad = 0.0, 0.0
     moment_table = design.moments
     for k in range(moment_table.free_to[axis], moment_table.surface_to[axis]):
         if moment_table.surface[k] == s:
             term_value_magnitude = abs(moment_table.value[k])
-            coefficient_magnitude_per_rad += (
+            term_magnitude_sum_per_rad += (
                 term_value_magnitude * declared_errors.monomial_magnitude[moment_table.monomial[k]]
             )
-            max_coefficient_magnitude_per_rad += (
+            max_term_magnitude_sum_per_rad += (
                 term_value_magnitude + declared_errors.coefficient_tolerance[k]
             ) * declared_errors.max_monomial_magnitude[moment_table.monomial[k]]
     wing_area_times_length = design.S * (design.c if axis == 1 else design.b)
     force_times_length = wing_area_times_length * declared_errors.magnitude_y[QDYN]
     max_force_times_length = wing_area_times_length * declared_errors.magnitude_bound_y[QDYN]
     return (
-        force_times_length * coefficient_magnitude_per_rad,
-        max_force_times_length * max_coefficient_magnitude_per_rad,
+        force_times_length * term_magnitude_sum_per_rad,
+        max_force_times_length * max_term_magnitude_sum_per_rad,
     )
 
 
@@ -360,30 +359,30 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
     the scratch fields.
     """
     inertia_tolerance = declared_errors.inertia_tolerance
-    error_bound_per_rad = declared_errors.acceleration_error_per_rad
-    roll_moment_per_rad, max_roll_moment_per_rad = surface_moment_magnitudes_per_rad(
+    error_bounds_per_rad = declared_errors.acceleration_error_per_rad
+    roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 0, s
     )
-    pitch_moment_per_rad, max_pitch_moment_per_rad = surface_moment_magnitudes_per_rad(
+    pitch_moment_magnitude_per_rad, max_pitch_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 1, s
     )
-    yaw_moment_per_rad, max_yaw_moment_per_rad = surface_moment_magnitudes_per_rad(
+    yaw_moment_magnitude_per_rad, max_yaw_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 2, s
     )
-    error_bound_per_rad[0, s] = product_error_bound(
-        design.Pl, inertia_tolerance[2], roll_moment_per_rad, max_roll_moment_per_rad
+    error_bounds_per_rad[0, s] = product_error_bound(
+        design.Pl, inertia_tolerance[2], roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad
     )
-    error_bound_per_rad[0, s] += product_error_bound(
-        design.Pn, inertia_tolerance[3], yaw_moment_per_rad, max_yaw_moment_per_rad
+    error_bounds_per_rad[0, s] += product_error_bound(
+        design.Pn, inertia_tolerance[3], yaw_moment_magnitude_per_rad, max_yaw_moment_magnitude_per_rad
     )
-    error_bound_per_rad[1, s] = product_error_bound(
-        design.Qm, inertia_tolerance[7], pitch_moment_per_rad, max_pitch_moment_per_rad
+    error_bounds_per_rad[1, s] = product_error_bound(
+        design.Qm, inertia_tolerance[7], pitch_moment_magnitude_per_rad, max_pitch_moment_magnitude_per_rad
     )
-    error_bound_per_rad[2, s] = product_error_bound(
-        design.Rl, inertia_tolerance[10], roll_moment_per_rad, max_roll_moment_per_rad
+    error_bounds_per_rad[2, s] = product_error_bound(
+        design.Rl, inertia_tolerance[10], roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad
     )
-    error_bound_per_rad[2, s] += product_error_bound(
-        design.Rn, inertia_tolerance[11], yaw_moment_per_rad, max_yaw_moment_per_rad
+    error_bounds_per_rad[2, s] += product_error_bound(
+        design.Rn, inertia_tolerance[11], yaw_moment_magnitude_per_rad, max_yaw_moment_magnitude_per_rad
     )
 
 
@@ -461,12 +460,12 @@ def map_travel_level_index_for_positions(error_map, u):
     travel may be used."""
     if error_map.several_surfaces_may_be_anywhere:
         return error_map.n_travel_levels - 1
-    travel_share = 0.0
+    max_travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
             travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
-            travel_share = max(travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return map_travel_level_index_for_share(error_map, travel_share)
+            max_travel_share = max(max_travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
+    return map_travel_level_index_for_share(error_map, max_travel_share)
 
 
 @kernel

@@ -242,7 +242,9 @@ def fill_turn_rate_of_gust_axes(gust, dt, V):
             gust.memory.gust_axes_rate[i, gust_axis] = (
                 gust.output.gust_axes_in_body[i, gust_axis] - gust.memory.gust_axes_rate[i, gust_axis]
             ) / dt
-            max_turn_rate_component = max(max_turn_rate_component, abs(gust.memory.gust_axes_rate[i, gust_axis]))
+            max_turn_rate_component = max(
+                max_turn_rate_component, abs(gust.memory.gust_axes_rate[i, gust_axis])
+            )
     gust.memory.has_fast_axes_turn = (
         0.5 * (max_turn_rate_component * gust.config.rolling_gust_correlation_length / V) ** 2
         > MIN_GUST_AXES_TURN_INTENSITY_SHARE

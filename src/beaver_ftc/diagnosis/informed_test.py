@@ -99,11 +99,15 @@ class WhiteningFilter:
             self.whitened_response(regressors).reshape(whitened_fault.size, constant_std.size) * constant_std
         )
         regressor_fault_correlation = whitened_regressors.T @ whitened_fault
-        squared_deflection = whitened_fault @ whitened_fault - regressor_fault_correlation @ np.linalg.solve(
-            whitened_regressors.T @ whitened_regressors + np.eye(constant_std.size),
-            regressor_fault_correlation,
+        squared_deflection_coefficient = (
+            whitened_fault @ whitened_fault
+            - regressor_fault_correlation
+            @ np.linalg.solve(
+                whitened_regressors.T @ whitened_regressors + np.eye(constant_std.size),
+                regressor_fault_correlation,
+            )
         )
-        return float(np.sqrt(max(squared_deflection, 0.0)))
+        return float(np.sqrt(max(squared_deflection_coefficient, 0.0)))
 
 
 def context_with_measured_gust(context: Context, gust_estimate_noise_rad_s2: np.ndarray) -> Context:
@@ -133,16 +137,16 @@ def detection_probability(
     )
 
 
-def healthy_surface_positions(context: Context, log_columns: FlightColumns, surface: str) -> np.ndarray:
+def healthy_surface_positions(context: Context, log_columns: FlightColumns, surface_name: str) -> np.ndarray:
     """Return the positions of a healthy surface under the commands of a flight, (frames,) rad."""
-    s, command_rad = context.surfaces.index(surface), log_columns[f"{surface}_cmd_rad"]
+    s, commands_rad = context.surfaces.index(surface_name), log_columns[f"{surface_name}_cmd_rad"]
     bandwidth_rad_s = context.declared.bandwidth_rad_s[s]
     rate_limit_rad_s = context.declared.rate_limit_rad_s[s]
     step_share_of_difference = 1.0 - np.exp(-bandwidth_rad_s * context.dt_s) if bandwidth_rad_s else 1.0
     max_step_rad = rate_limit_rad_s * context.dt_s if rate_limit_rad_s else np.inf
     travel_min_rad, travel_max_rad = context.travel_rad[:, s]
-    position_rad, positions_rad = log_columns[f"{surface}_effective_rad"][0], np.empty_like(command_rad)
-    for k, limited_command_rad in enumerate(np.clip(command_rad, travel_min_rad, travel_max_rad)):
+    position_rad, positions_rad = log_columns[f"{surface_name}_effective_rad"][0], np.empty_like(commands_rad)
+    for k, limited_command_rad in enumerate(np.clip(commands_rad, travel_min_rad, travel_max_rad)):
         position_rad += min(
             max((limited_command_rad - position_rad) * step_share_of_difference, -max_step_rad), max_step_rad
         )

@@ -339,17 +339,17 @@ def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[Est
     published: a loss of the surface that leads each axis, and of what turns with it. all: a loss and a
     position of every surface.
     """
-    surface_index = {name: s for s, name in enumerate(aircraft.surfaces)}
-    loss_entries = tuple((name, LOSS, surface_index[name]) for name in aircraft.class_of_losses)
+    surface_index_by_name = {name: s for s, name in enumerate(aircraft.surfaces)}
+    loss_entries = tuple((name, LOSS, surface_index_by_name[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
         return loss_entries
     further_loss_entries = tuple(
-        (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index[name]]
+        (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index_by_name[name]]
     )
     return (
         *loss_entries,
         *further_loss_entries,
-        *((f"{name}_position", POSITION, s) for name, s in surface_index.items()),
+        *((f"{name}_position", POSITION, s) for name, s in surface_index_by_name.items()),
     )
 
 

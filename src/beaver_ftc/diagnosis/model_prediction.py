@@ -74,8 +74,8 @@ def configure_prediction(prediction: np.void, scenario: Scenario, travel: np.nda
     actuators, instant_interval_s = prediction["actuators"], 1.0 / scenario.rate_hz / scenario.substeps
     actuators["real"] = not scenario.actuators.is_ideal
     actuators["low"], actuators["high"] = travel
-    for s, surface in enumerate(scenario.airframe.surfaces):
-        actuator = getattr(scenario.actuators, surface)
+    for s, surface_name in enumerate(scenario.airframe.surfaces):
+        actuator = getattr(scenario.actuators, surface_name)
         bandwidth_rad_s, rate_limit_rad_s = actuator.bandwidth_rad_s, radians(actuator.rate_limit_deg_s)
         actuators["approach"][s] = (
             1.0 - exp(-bandwidth_rad_s * instant_interval_s) if bandwidth_rad_s else 1.0

@@ -272,7 +272,7 @@ class DiagnosisReadout:
         bound_record = self._fdi["bound"]
         declared_errors = bound_record["declared_errors"]
         has_declared_errors = bool(declared_errors["has_declared_errors"])
-        gyro_error_bound_at_rest, gyro_constant_error, gyro_error_per_rate = (
+        gyro_error_bound_at_rest, constant_gyro_error_bound, gyro_error_bound_per_rate = (
             declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
             for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
         )
@@ -283,7 +283,8 @@ class DiagnosisReadout:
             constant_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
             earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
             gyro_error_offset_rad_s=gyro_error_bound_at_rest,
-            gyro_constant_error_rad_s=gyro_constant_error, gyro_error_per_rate=gyro_error_per_rate,
+            gyro_constant_error_rad_s=constant_gyro_error_bound,
+            gyro_error_per_rate=gyro_error_bound_per_rate,
         )  # fmt: skip
 
     @cached_property
@@ -429,7 +430,7 @@ def _read_estimator(fie: np.void) -> IsolationEstimator:
     )
 
 
-def _read_surface(surface: np.void) -> SurfaceFaultTypes:
+def _read_surface(surface_record: np.void) -> SurfaceFaultTypes:
     actuator_field_names = (
         "travel_low",
         "travel_high",
@@ -437,28 +438,33 @@ def _read_surface(surface: np.void) -> SurfaceFaultTypes:
         "min_rate_limited_motion_per_substep",
         "approach_share_per_substep",
     )
-    actuator = Actuator(*(float(surface["actuator"][name]) for name in actuator_field_names))
-    return SurfaceFaultTypes(actuator, surface["feasible_sets"]["excluded"].astype(bool))
+    actuator = Actuator(*(float(surface_record["actuator"][name]) for name in actuator_field_names))
+    return SurfaceFaultTypes(actuator, surface_record["feasible_sets"]["excluded"].astype(bool))
 
 
-def _read_block(block: np.void) -> StatisticalBlock:
-    hypotheses = tuple(map(_read_hypothesis, block["hypothesis"][: block["n_hypotheses"]]))
+def _read_block(block_record: np.void) -> StatisticalBlock:
+    hypotheses = tuple(map(_read_hypothesis, block_record["hypothesis"][: block_record["n_hypotheses"]]))
     n_hypotheses = len(hypotheses)
     onset_tests = (
-        block["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
+        block_record["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
         for name in OnsetTests._fields
     )
     return StatisticalBlock(
-        tuple(block["axes"][: block["n_axes"]].tolist()),
-        float(block["drift_correlation_length_m"]), float(block["drift_intensity_scale"]),
-        block["regressor_tolerance"][: block["n_regressors"]].copy(), hypotheses, OnsetTests(*onset_tests),
+        tuple(block_record["axes"][: block_record["n_axes"]].tolist()),
+        float(block_record["drift_correlation_length_m"]), float(block_record["drift_intensity_scale"]),
+        block_record["regressor_tolerance"][: block_record["n_regressors"]].copy(),
+        hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip
 
 
-def _read_hypothesis(hypothesis: np.void) -> StatisticalHypothesis:
-    kind_surface_axis = int(hypothesis["kind"]), int(hypothesis["surface"]), int(hypothesis["axis"])
+def _read_hypothesis(hypothesis_record: np.void) -> StatisticalHypothesis:
+    kind_surface_axis = (
+        int(hypothesis_record["kind"]),
+        int(hypothesis_record["surface"]),
+        int(hypothesis_record["axis"]),
+    )
     return StatisticalHypothesis(
-        *kind_surface_axis, bool(hypothesis["raises_alarm"]), float(hypothesis["score"])
+        *kind_surface_axis, bool(hypothesis_record["raises_alarm"]), float(hypothesis_record["score"])
     )
 
 

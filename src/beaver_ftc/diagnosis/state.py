@@ -76,29 +76,31 @@ def configure_layout(
     layout: np.void, estimator_entries: Sequence[tuple[str, int, int]], aircraft: Aircraft
 ) -> None:
     """Fill in axes, groups and estimators of the surfaces; estimator_entries: of isolation.py."""
-    surface_index = {name: s for s, name in enumerate(aircraft.surfaces)}
+    surface_index_by_name = {name: s for s, name in enumerate(aircraft.surfaces)}
     layout["main"] = main_surface_index_by_axis(aircraft)
     layout["dominant_axis"] = aircraft.dominant_axis
     layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
     for group_surfaces in aircraft.groups.values():
         if len(group_surfaces) == 2:
-            first_surface, second_surface = (surface_index[name] for name in group_surfaces)
-            layout["partner"][first_surface] = second_surface
-            layout["partner"][second_surface] = first_surface
-    for estimator_index, (_, kind, surface) in enumerate(estimator_entries):
-        layout["loss_estimator" if kind == LOSS else "position_estimator"][surface] = estimator_index
+            first_surface_index, second_surface_index = (
+                surface_index_by_name[name] for name in group_surfaces
+            )
+            layout["partner"][first_surface_index] = second_surface_index
+            layout["partner"][second_surface_index] = first_surface_index
+    for estimator_index, (_, kind, surface_index) in enumerate(estimator_entries):
+        layout["loss_estimator" if kind == LOSS else "position_estimator"][surface_index] = estimator_index
 
 
 def main_surface_index_by_axis(aircraft: Aircraft) -> list[int]:
     """Index of the surface that leads each of roll, pitch and yaw. Raises BadInput where none does."""
-    main_surface_of_axis = {
+    main_surface_index_of_axis = {
         aircraft.dominant_axis[s]: s for s, name in enumerate(aircraft.surfaces) if name in aircraft.primary
     }
     for axis, name in enumerate(("roll", "pitch", "yaw")):
-        if axis not in main_surface_of_axis:
+        if axis not in main_surface_index_of_axis:
             raise BadInput(f"{aircraft.name}: no surface turns it most in {name}, allowed: one for each axis")
-    return [main_surface_of_axis[axis] for axis in range(3)]
+    return [main_surface_index_of_axis[axis] for axis in range(3)]
 
 
 _DETECTOR_ROWS = compiled_rows(DETECTORS)

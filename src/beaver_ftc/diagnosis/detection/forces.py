@@ -90,10 +90,13 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
     evaluate(gust.memory.force_table, measured.x, measured.y)
     forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
     for force_index in range(2):
-        scaled_force_before = forces.component[force_index].predicted_scaled_force
+        previous_predicted_scaled_force = forces.component[force_index].predicted_scaled_force
         update_force_innovation(forces, gust, force_index, measured, u)
         fill_force_flow_lag_error_bound(
-            forces.component[force_index], scaled_force_before, forces.n_updates_capped_at_minimum, dt
+            forces.component[force_index],
+            previous_predicted_scaled_force,
+            forces.n_updates_capped_at_minimum,
+            dt,
         )
         integrate_inertial_flow_angle(forces, forces.component[force_index], force_index, measured.y, dt)
     fill_flow_angle_rates(forces, measured)
@@ -101,11 +104,11 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
 
 
 @kernel
-def fill_force_flow_lag_error_bound(force_record, scaled_force_before, has_earlier_update, dt):
-    """Fill `force_flow_lag_error_bound` from the change of the model's e since `scaled_force_before`: force
-    and flow differ in time."""
+def fill_force_flow_lag_error_bound(force_record, previous_predicted_scaled_force, has_earlier_update, dt):
+    """Fill `force_flow_lag_error_bound` from the change of the model's e since
+    `previous_predicted_scaled_force`: force and flow differ in time."""
     force_record.force_flow_lag_error_bound = (
-        MAX_FORCE_FLOW_LAG_S * abs(force_record.predicted_scaled_force - scaled_force_before) / dt
+        MAX_FORCE_FLOW_LAG_S * abs(force_record.predicted_scaled_force - previous_predicted_scaled_force) / dt
         if has_earlier_update
         else 0.0
     )
@@ -380,20 +383,20 @@ def _configure_force_tolerances(
 ) -> None:
     """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
     pressure do; of the accelerometer's bias, m/s2; of the whole."""
-    coefficient_tolerance, sensor_errors = declared.coefficients.largest, declared.sensors
+    relative_coefficient_tolerance, sensor_errors = declared.coefficients.largest, declared.sensors
     vane_errors = sensor_errors["alpha" if force_index == NORMAL_COMPONENT else "beta"]
     accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
     relative_pressure_error_bound = sensor_errors["qdyn"].steady / y[QDYN] + sensor_errors["qdyn"].slope
     for k, term in enumerate(terms):
         force_record["regressor_tolerance"][k] = (
-            coefficient_tolerance + relative_pressure_error_bound + vane_errors.slope
+            relative_coefficient_tolerance + relative_pressure_error_bound + vane_errors.slope
         ) * abs(term.value)
         if term.is_constant:
             force_record["regressor_tolerance"][k] += vane_errors.steady * abs(coefficient_per_vane_rad)
     n_regressors = len(terms)
     if force_index == SIDE_COMPONENT:
         force_record["regressor_tolerance"][n_regressors] = (
-            coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
+            relative_coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
         )
         n_regressors = n_regressors + 1
     if accelerometer_errors.steady:

@@ -337,16 +337,16 @@ def fill_predictable_innovation(block, dt):
     """
     no_gust_filter = block.no_gust_filter
     predictable_innovation = block.predictable_innovation_in_calm_air
-    innovation = block.whitened_innovation
+    whitened_innovation = block.whitened_innovation
     sum_decay_factor = np.exp(-dt / CALM_AIR_SHARE_MEMORY_S)
     block.calm_air_cross_correlation *= sum_decay_factor
     block.calm_air_information *= sum_decay_factor
     for i in range(block.n_axes):
-        predictable_innovation[i] = innovation[i] - no_gust_filter.whitened_innovation[i]
+        predictable_innovation[i] = whitened_innovation[i] - no_gust_filter.whitened_innovation[i]
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             block.calm_air_cross_correlation += (
-                predictable_innovation[i] * block.S_inverse[i, j] * innovation[j]
+                predictable_innovation[i] * block.S_inverse[i, j] * whitened_innovation[j]
             )
             block.calm_air_information += (
                 predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
@@ -474,8 +474,8 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
     K_d00, K_d01, K_d10, K_d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
     S_inv00, S_inv01, S_inv10, S_inv11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 0], S_inverse[1, 1]
     drift_decay_factor = block.drift_decay_factor
-    innovation_0 = block.whitened_innovation[0]
-    innovation_1 = block.whitened_innovation[1]
+    whitened_innovation_0 = block.whitened_innovation[0]
+    whitened_innovation_1 = block.whitened_innovation[1]
     predictable_0 = block.predictable_innovation_in_calm_air[0]
     predictable_1 = block.predictable_innovation_in_calm_air[1]
     transient_response_0 = block.transient_uncertainty_response[0]
@@ -485,29 +485,35 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
     signature_filter_state = onset_tests.signature_filter_state
     signature_for_onset = onset_tests.signature_for_onset
     correlation_weight = onset_tests.correlation_weight
-    uncertainty_change_over_bound = block.uncertainty_change_over_bound_per_frame
+    uncertainty_change_over_bound_per_frame = block.uncertainty_change_over_bound_per_frame
     for k in range(n_tests):
-        response_0 = signature_filter_state[0, k] + dt * (
+        signature_response_0 = signature_filter_state[0, k] + dt * (
             signature_for_onset[0, k] - signature_filter_state[2, k]
         )
-        response_1 = signature_filter_state[1, k] + dt * (
+        signature_response_1 = signature_filter_state[1, k] + dt * (
             signature_for_onset[1, k] - signature_filter_state[3, k]
         )
-        signature_filter_state[0, k] = response_0 - K_x00 * response_0 - K_x01 * response_1
-        signature_filter_state[1, k] = response_1 - K_x10 * response_0 - K_x11 * response_1
+        signature_filter_state[0, k] = (
+            signature_response_0 - K_x00 * signature_response_0 - K_x01 * signature_response_1
+        )
+        signature_filter_state[1, k] = (
+            signature_response_1 - K_x10 * signature_response_0 - K_x11 * signature_response_1
+        )
         signature_filter_state[2, k] = drift_decay_factor * signature_filter_state[2, k] + (
-            K_d00 * response_0 + K_d01 * response_1
+            K_d00 * signature_response_0 + K_d01 * signature_response_1
         )
         signature_filter_state[3, k] = drift_decay_factor * signature_filter_state[3, k] + (
-            K_d10 * response_0 + K_d11 * response_1
+            K_d10 * signature_response_0 + K_d11 * signature_response_1
         )
-        weight_0 = S_inv00 * response_0 + S_inv01 * response_1
-        weight_1 = S_inv10 * response_0 + S_inv11 * response_1
+        weight_0 = S_inv00 * signature_response_0 + S_inv01 * signature_response_1
+        weight_1 = S_inv10 * signature_response_0 + S_inv11 * signature_response_1
         onset_tests.correlation[k] = evidence_decay_factor * onset_tests.correlation[k] + (
-            weight_0 * innovation_0 + weight_1 * innovation_1
+            weight_0 * whitened_innovation_0 + weight_1 * whitened_innovation_1
         )
         onset_tests.information[k] = (
-            evidence_decay_factor * onset_tests.information[k] + weight_0 * response_0 + weight_1 * response_1
+            evidence_decay_factor * onset_tests.information[k]
+            + weight_0 * signature_response_0
+            + weight_1 * signature_response_1
         )
         onset_tests.correlation_by_calm_air[k] = (
             evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
@@ -526,7 +532,7 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
         )
         onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = (
             evidence_decay_factor * onset_tests.correlation_bound_by_rate_limited_uncertainty[k]
-            + uncertainty_change_over_bound
+            + uncertainty_change_over_bound_per_frame
             * (transient_response_0 * abs(weight_0) + transient_response_1 * abs(weight_1))
         )
         correlation_weight[0, k], correlation_weight[1, k] = weight_0, weight_1

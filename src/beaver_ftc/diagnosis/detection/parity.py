@@ -232,7 +232,7 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
     for frequency_index in range(tone_tests.correlation_bound_by_uncertainty.size):
         cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
         sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
-        filtered_bound = uncertainty_bound_sum * tone_whitening_gain(
+        filtered_bound_since_update = uncertainty_bound_sum * tone_whitening_gain(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
         double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
@@ -240,14 +240,14 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
         tone_tests.filtered_bound_double_frequency_sum[0, frequency_index] = (
             decayed_double_rotation[0, frequency_index] * double_frequency_real
             - decayed_double_rotation[1, frequency_index] * double_frequency_imaginary
-            + filtered_bound
+            + filtered_bound_since_update
         )
         tone_tests.filtered_bound_double_frequency_sum[1, frequency_index] = (
             decayed_double_rotation[1, frequency_index] * double_frequency_real
             + decayed_double_rotation[0, frequency_index] * double_frequency_imaginary
         )
         tone_tests.filtered_bound_sum[frequency_index] = (
-            sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound
+            sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound_since_update
         )
         tone_tests.correlation_bound_by_uncertainty[frequency_index] = (
             tone_config.max_tone_mean_of_unit_uncertainty[frequency_index]
@@ -476,12 +476,12 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
         abs(view.direction[first_component]) * first_error_bound
         + abs(view.direction[second_component]) * second_error_bound
     )
-    length_error_bound = (
+    column_length_error_bound = (
         abs(view.direction[second_component]) * first_error_bound
         + abs(view.direction[first_component]) * second_error_bound
     )
     return error_bound_along_direction / max(
-        column_length - length_error_bound, MIN_COLUMN_LENGTH_SHARE * column_length
+        column_length - column_length_error_bound, MIN_COLUMN_LENGTH_SHARE * column_length
     )
 
 
@@ -837,55 +837,63 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
     With accelerometers also, in the plane of a rate and its force, across the column of each surface that
     moves both and across that of the vane; and the force at the flow angle from inertial motion.
     """
-    pitch_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
-    lateral_surfaces = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
+    pitch_surface_indices = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
+    lateral_surface_indices = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
     yield ParityDirection(
         AXIS_VIEW,
         _sum_of_unit_vectors((PITCH,)),
         PITCH_PLANE,
-        pitch_surfaces,
+        pitch_surface_indices,
         may_use_vane_gust_estimate=True,
     )
-    yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, lateral_surfaces)
+    yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, lateral_surface_indices)
     yield ParityDirection(
         AXIS_VIEW,
         _sum_of_unit_vectors((YAW,)),
         LATERAL_PLANE,
-        lateral_surfaces,
+        lateral_surface_indices,
         may_use_vane_gust_estimate=True,
     )
-    for s in lateral_surfaces:
+    for s in lateral_surface_indices:
         is_roll_surface = aircraft.dominant_axis[s] == ROLL
-        other_surfaces = [other_surface for other_surface in lateral_surfaces if other_surface != s]
+        other_surface_indices = [
+            other_surface_index for other_surface_index in lateral_surface_indices if other_surface_index != s
+        ]
         yield ParityDirection(
             s,
             _sum_of_unit_vectors((ROLL,)),
             LATERAL_PLANE,
-            other_surfaces,
+            other_surface_indices,
             may_use_vane_gust_estimate=is_roll_surface,
         )
     if not with_forces:
         return
-    for force_index, plane_axes, moving_surfaces in (
-        (NORMAL_COMPONENT, PITCH_PLANE, pitch_surfaces),
-        (SIDE_COMPONENT, YAW_PLANE, lateral_surfaces),
+    for force_index, plane_axes, moving_surface_indices in (
+        (NORMAL_COMPONENT, PITCH_PLANE, pitch_surface_indices),
+        (SIDE_COMPONENT, YAW_PLANE, lateral_surface_indices),
     ):
-        surfaces_separated_by_force = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
-        for s in surfaces_separated_by_force:
+        separated_surface_indices = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+        for s in separated_surface_indices:
             column_components = aircraft.dominant_axis[s], plane_axes[1]
             yield ParityDirection(
                 s,
                 _sum_of_unit_vectors(column_components),
                 column_components,
-                [other_surface for other_surface in moving_surfaces if other_surface != s],
+                [
+                    other_surface_index
+                    for other_surface_index in moving_surface_indices
+                    if other_surface_index != s
+                ],
             )
-        if surfaces_separated_by_force:
-            yield ParityDirection(VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, moving_surfaces)
+        if separated_surface_indices:
+            yield ParityDirection(
+                VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, moving_surface_indices
+            )
             yield ParityDirection(
                 AXIS_VIEW,
                 _sum_of_unit_vectors(plane_axes[1:]),
                 plane_axes,
-                moving_surfaces,
+                moving_surface_indices,
                 uses_inertial_flow_angle=True,
             )
 
@@ -906,7 +914,10 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
         + forces.MAX_FORCE_REGRESSORS
         - MAX_TERMS_OF_ONE
     )
-    axis_of_loss = [aircraft.dominant_axis[aircraft.surfaces.index(s)] for s in aircraft.class_of_losses]
+    axis_of_loss = [
+        aircraft.dominant_axis[aircraft.surfaces.index(surface_name)]
+        for surface_name in aircraft.class_of_losses
+    ]
     max_losses_per_rate_block = max(
         axis_of_loss.count(PITCH), axis_of_loss.count(ROLL) + axis_of_loss.count(YAW)
     )
@@ -926,14 +937,14 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
 def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    surfaces_separated_by_force = [
+    separated_surface_indices_by_force = [
         aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
         for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT)
     ]
     subtracts_gust_estimate_from_rates = (
         forces["in_use"]
         and statistical["gust"]["output"]["accounts_for_gusts"]
-        and all(surfaces_separated_by_force)
+        and all(separated_surface_indices_by_force)
     )
     parity_directions = list(parity_directions_of(aircraft, bool(forces["in_use"])))[
         : len(statistical["views"])
@@ -962,8 +973,10 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
         law_reacts_to_gust = statistical["gust"]["output"]["accounts_for_gusts"] and direction[PITCH]
-        loss_surfaces = [] if law_reacts_to_gust else surfaces_tested_for_loss[: len(block["hypothesis"]) - 1]
-        hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surfaces)]
+        loss_surface_indices = (
+            [] if law_reacts_to_gust else surfaces_tested_for_loss[: len(block["hypothesis"]) - 1]
+        )
+        hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surface_indices)]
         n_regressors = int(rate_block["n_regressors"])
         block["n_axes"], block["n_hypotheses"], block["drift_decay_factor"] = 1, len(hypothesis_kinds), 1.0
         block["P_xx"][0, 0] = rate_block["gyro_noise_variance"].max()
@@ -993,7 +1006,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             orthogonal_to_surface != AXIS_VIEW
         )  # of the leak, which is worked out in flight
         hypotheses = block["hypothesis"][: len(hypothesis_kinds)]
-        hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surfaces]
+        hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surface_indices]
         view["is_orthogonal_to_rolling_gust"] = (
             orthogonal_to_surface == VANE_VIEW
             and plane_axes == YAW_PLANE

@@ -133,16 +133,18 @@ def axes_and_hypotheses_by_block(
 
 
 def _loss_hypotheses(aircraft: Aircraft, axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
-    for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
-        if surface in aircraft.class_of_losses and axis in axes:
+    for s, (surface_name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
+        if surface_name in aircraft.class_of_losses and axis in axes:
             yield LOSS, s, axis, 1
 
 
 def _growing_and_ending_hypotheses(hypotheses: tuple[HypothesisEntry, ...]) -> Iterator[HypothesisEntry]:
-    surface_and_axis_of_losses = [(surface, axis) for kind, surface, axis, _ in hypotheses if kind == LOSS]
+    surface_index_and_axis_of_losses = [
+        (surface_index, axis) for kind, surface_index, axis, _ in hypotheses if kind == LOSS
+    ]
     return (
-        (kind, surface, axis, 0)
-        for surface, axis in surface_and_axis_of_losses
+        (kind, surface_index, axis, 0)
+        for surface_index, axis in surface_index_and_axis_of_losses
         for kind in (GROWING_LOSS, LOSS_END)
     )
 
@@ -298,8 +300,10 @@ def configure_statistical_detector(
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
     blocks = axes_and_hypotheses_by_block(aircraft)
-    loss_surfaces = [aircraft.surfaces.index(surface) for surface in aircraft.class_of_losses]
-    statistical["test_config"]["n_score_columns"] = len(loss_surfaces) + len(AXES)
+    loss_surface_indices = [
+        aircraft.surfaces.index(surface_name) for surface_name in aircraft.class_of_losses
+    ]
+    statistical["test_config"]["n_score_columns"] = len(loss_surface_indices) + len(AXES)
     for block, (axes, hypothesis_entries) in zip(statistical["block"], blocks, strict=True):
         block["n_axes"], block["n_hypotheses"] = len(axes), len(hypothesis_entries)
         block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
@@ -310,13 +314,15 @@ def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraf
             block["gyro_noise_variance"][i] = block["P_xx"][i, i] = gyro_noise_variance
             block["P_dd"][i, i] = likelihood.PRIOR_DRIFT_STD_RAD_S2**2
         likelihood.set_supporting_correlation_signs(block, [kind for kind, *_ in hypothesis_entries])
-        for hypothesis, (kind, surface, axis, raises_alarm) in zip(
+        for hypothesis, (kind, surface_index, axis, raises_alarm) in zip(
             block["hypothesis"], hypothesis_entries, strict=False
         ):
-            hypothesis["kind"], hypothesis["surface"] = kind, surface
+            hypothesis["kind"], hypothesis["surface"] = kind, surface_index
             hypothesis["axis"], hypothesis["raises_alarm"] = axis, raises_alarm
             hypothesis["score_column_index"] = (
-                loss_surfaces.index(surface) if kind == LOSS else len(loss_surfaces) + axis
+                loss_surface_indices.index(surface_index)
+                if kind == LOSS
+                else len(loss_surface_indices) + axis
             )
 
 
@@ -768,14 +774,17 @@ def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
 
 
 @kernel
-def is_loss_not_excluded(estimators, loss_estimator, surface):
+def is_loss_not_excluded(estimators, loss_estimator_indices, surface_index):
     """True if a loss of this surface has not been excluded."""
-    return loss_estimator[surface] < 0 or not estimators[loss_estimator[surface]].excluded
+    return (
+        loss_estimator_indices[surface_index] < 0
+        or not estimators[loss_estimator_indices[surface_index]].excluded
+    )
 
 
 @kernel
 def best_alternative_llr_lower_bound(
-    block, estimators, loss_estimator, surface, includes_excluded_losses=False
+    block, estimators, loss_estimator_indices, surface_index, includes_excluded_losses=False
 ):
     """The largest lower bound on the log-likelihood ratio of all alternatives to the loss of a surface.
 
@@ -786,12 +795,12 @@ def best_alternative_llr_lower_bound(
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
         if hypothesis.kind in (GROWING_LOSS, LOSS_END):
             continue
-        alternative_surface = hypothesis.surface
+        alternative_surface_index = hypothesis.surface
         if hypothesis.kind != LOSS or (
-            alternative_surface != surface
+            alternative_surface_index != surface_index
             and (
                 includes_excluded_losses
-                or is_loss_not_excluded(estimators, loss_estimator, alternative_surface)
+                or is_loss_not_excluded(estimators, loss_estimator_indices, alternative_surface_index)
             )
         ):
             largest_lower_bound = max(largest_lower_bound, hypothesis.llr_lower_bound)
@@ -799,40 +808,41 @@ def best_alternative_llr_lower_bound(
 
 
 @kernel
-def loss_llr_upper_bound(block, surface, is_loss_end):
+def loss_llr_upper_bound(block, surface_index, is_loss_end):
     """Upper bound on the log-likelihood ratio of a loss of this surface, or, if `is_loss_end`, of its end.
 
     It is 0 if the block has no such hypothesis.
     """
     largest_upper_bound = 0.0
     for hypothesis in block.hypothesis[: block.n_hypotheses]:
-        if hypothesis.surface == surface and (hypothesis.kind == LOSS_END) == is_loss_end:
+        if hypothesis.surface == surface_index and (hypothesis.kind == LOSS_END) == is_loss_end:
             largest_upper_bound = max(largest_upper_bound, hypothesis.llr_upper_bound)
     return largest_upper_bound
 
 
 @kernel
-def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
+def confirms_loss(test_config, blocks, estimators, loss_estimator_indices, surface_index):
     """True if a loss of this surface explains the data better than all alternatives.
 
     Its log-likelihood ratio must be larger by more than `isolation_llr_margin`.
 
-    estimators: of the isolation; loss_estimator (n,): that of each surface's loss, or -1. If the estimator
+    estimators: of the isolation; loss_estimator_indices (n,): of each surface's loss, or -1. If the estimator
     is weakly excluded by WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED, excluded losses are alternatives as well.
     """
     includes_excluded_losses = (
-        loss_estimator[surface] >= 0
-        and estimators[loss_estimator[surface]].weakly_excluded == WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
+        loss_estimator_indices[surface_index] >= 0
+        and estimators[loss_estimator_indices[surface_index]].weakly_excluded
+        == WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
     )
     for block in blocks:
         loss_llr_lower_bound = 0.0
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
-            if hypothesis.surface == surface and hypothesis.kind in (LOSS, GROWING_LOSS):
+            if hypothesis.surface == surface_index and hypothesis.kind in (LOSS, GROWING_LOSS):
                 loss_llr_lower_bound = max(loss_llr_lower_bound, hypothesis.llr_lower_bound)
         if (
             loss_llr_lower_bound
             - best_alternative_llr_lower_bound(
-                block, estimators, loss_estimator, surface, includes_excluded_losses
+                block, estimators, loss_estimator_indices, surface_index, includes_excluded_losses
             )
             > test_config.isolation_llr_margin
         ):
@@ -841,7 +851,9 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator, surface):
 
 
 @kernel
-def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_loss_end_in_pitch, is_abrupt):
+def excludes_loss(
+    test_config, blocks, estimators, loss_estimator_indices, surface_index, may_loss_end_in_pitch, is_abrupt
+):
     """True if an alternative explains the data better than a loss of this surface.
 
     Its log-likelihood ratio must be larger by more than `isolation_llr_margin`.
@@ -859,20 +871,22 @@ def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_
     loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
     for lateral_block in blocks[LATERAL_BLOCK:]:
         alternative_llr_lower_bound = best_alternative_llr_lower_bound(
-            pitch_block, estimators, loss_estimator, surface
+            pitch_block, estimators, loss_estimator_indices, surface_index
         )
         alternative_llr_lower_bound = max(
             alternative_llr_lower_bound,
-            best_alternative_llr_lower_bound(lateral_block, estimators, loss_estimator, surface),
+            best_alternative_llr_lower_bound(
+                lateral_block, estimators, loss_estimator_indices, surface_index
+            ),
         )
         upper_bound_of_loss_llr = max(
-            loss_llr_upper_bound(pitch_block, surface, False),
-            loss_llr_upper_bound(lateral_block, surface, False),
+            loss_llr_upper_bound(pitch_block, surface_index, False),
+            loss_llr_upper_bound(lateral_block, surface_index, False),
         )
-        upper_bound_of_loss_end_llr = loss_llr_upper_bound(lateral_block, surface, True)
+        upper_bound_of_loss_end_llr = loss_llr_upper_bound(lateral_block, surface_index, True)
         if may_loss_end_in_pitch:
             upper_bound_of_loss_end_llr = max(
-                upper_bound_of_loss_end_llr, loss_llr_upper_bound(pitch_block, surface, True)
+                upper_bound_of_loss_end_llr, loss_llr_upper_bound(pitch_block, surface_index, True)
             )
         is_loss_unlikely = (
             upper_bound_of_loss_llr < loss_llr_share_limit * alternative_llr_lower_bound
@@ -888,14 +902,14 @@ def excludes_loss(test_config, blocks, estimators, loss_estimator, surface, may_
 
 
 @kernel
-def estimate_loss(blocks, surface):
+def estimate_loss(blocks, surface_index):
     """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
     theta, information = 0.0, 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if (
                 hypothesis.kind == LOSS
-                and hypothesis.surface == surface
+                and hypothesis.surface == surface_index
                 and hypothesis.theta_information > information
             ):
                 theta, information = hypothesis.theta_estimate, hypothesis.theta_information
@@ -936,9 +950,9 @@ def update_uncertainty_change(noise_model, blocks, error_map, u):
     surfaces."""
     max_travel_share_moved = 0.0
     for s in range(u.size):
-        travel_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
+        travel_width_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
         max_travel_share_moved = max(
-            max_travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel_rad
+            max_travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel_width_rad
         )
         error_map.surface_positions_before[s] = u[s]
     for block in blocks:

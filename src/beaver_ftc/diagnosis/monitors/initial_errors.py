@@ -292,7 +292,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     # rad/s: rates about the flow's projection on the plane of symmetry, and across it
     flow_roll_rate, flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
     widened_step_s = h * (1.0 + h * (max_acceleration / V + abs(p) + abs(q) + abs(r)))
-    roll_yaw_rate, predicted_climb_m = (
+    roll_yaw_rate_magnitude, predicted_climb_m = (
         np.hypot(p, r),
         memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE],
     )
@@ -302,11 +302,11 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     )
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
     max_effect[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        widened_step_s * beta_secant * (max_acceleration / V + roll_yaw_rate * abs(sin_beta))
+        widened_step_s * beta_secant * (max_acceleration / V + roll_yaw_rate_magnitude * abs(sin_beta))
     )
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
     max_effect[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
-        roll_yaw_rate + max_acceleration * abs(sin_beta) / V
+        roll_yaw_rate_magnitude + max_acceleration * abs(sin_beta) / V
     )
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
     max_effect[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (

@@ -266,7 +266,7 @@ def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Sc
 
 def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_s: float) -> None:
     """Fill the declared errors of the readings; a sample is a JSBSim frame."""
-    redundancy_config, config, sensor_errors = (
+    redundancy_config, monitor_config, sensor_errors = (
         monitor["redundancy"]["config"],
         monitor["config"],
         declared.sensors,
@@ -282,7 +282,7 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
             sensor_error.slope,
             sensor_error.steady,
         )
-        config["min_frozen_samples"][i] = min_frozen_samples(
+        monitor_config["min_frozen_samples"][i] = min_frozen_samples(
             sensor_error.noise, sensor_error.resolution
         ) * frames_apart(i, sample_time_s)
         drift_rad_s = getattr(getattr(sensor_errors.declared, name), "drift_rad_s", 0.0)
@@ -290,12 +290,14 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
             redundancy_config["attitude_drift_rad_s"], abs(drift_rad_s)
         )
     attitude_indices = slice(PHI, PHI + 3)
-    config["attitude_is_noisy"] = np.any(
+    monitor_config["attitude_is_noisy"] = np.any(
         redundancy_config["error_offset"][attitude_indices]
         > redundancy_config["constant_error"][attitude_indices]
     )
-    config["replaced_rate_correction_share"] = (
-        min(1.0, sample_time_s * REPLACED_RATE_CORRECTION_PER_S) if config["attitude_is_noisy"] else 1.0
+    monitor_config["replaced_rate_correction_share"] = (
+        min(1.0, sample_time_s * REPLACED_RATE_CORRECTION_PER_S)
+        if monitor_config["attitude_is_noisy"]
+        else 1.0
     )
 
 
@@ -388,16 +390,16 @@ def advance_quaternion(quaternion, rates, duration_s, out):
         0.5 * duration_s * rates[1],
         0.5 * duration_s * rates[2],
     )
-    q, norm = (
+    q, length_after_step = (
         quaternion,
         np.sqrt(
             1.0 + half_angle_x * half_angle_x + half_angle_y * half_angle_y + half_angle_z * half_angle_z
         ),
     )
-    out[0] = (q[0] - q[1] * half_angle_x - q[2] * half_angle_y - q[3] * half_angle_z) / norm
-    out[1] = (q[1] + q[0] * half_angle_x + q[2] * half_angle_z - q[3] * half_angle_y) / norm
-    out[2] = (q[2] + q[0] * half_angle_y + q[3] * half_angle_x - q[1] * half_angle_z) / norm
-    out[3] = (q[3] + q[0] * half_angle_z + q[1] * half_angle_y - q[2] * half_angle_x) / norm
+    out[0] = (q[0] - q[1] * half_angle_x - q[2] * half_angle_y - q[3] * half_angle_z) / length_after_step
+    out[1] = (q[1] + q[0] * half_angle_x + q[2] * half_angle_z - q[3] * half_angle_y) / length_after_step
+    out[2] = (q[2] + q[0] * half_angle_y + q[3] * half_angle_x - q[1] * half_angle_z) / length_after_step
+    out[3] = (q[3] + q[0] * half_angle_z + q[1] * half_angle_y - q[2] * half_angle_x) / length_after_step
 
 
 @kernel
@@ -596,20 +598,20 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
     config, memory = redundancy.config, redundancy.memory
     tilt_error_bound = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
     gravity = config.gravity_m_s2
-    force_error_bound_squared = 0.0
-    constant_acceleration_error = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
+    squared_force_error_bound_sum = 0.0
+    constant_acceleration_error_bound = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
     for i in range(AX, AX + 3):
-        force_error_bound_squared += extrapolated_error_bound(redundancy, i) ** 2
-        constant_acceleration_error += config.constant_error[i]
+        squared_force_error_bound_sum += extrapolated_error_bound(redundancy, i) ** 2
+        constant_acceleration_error_bound += config.constant_error[i]
     axis_turning_error_bound = config.sample_time_s * (
-        max_turn_rate * constant_acceleration_error
+        max_turn_rate * constant_acceleration_error_bound
         + PREVIOUS_INTEGRATION_WEIGHT * gyro_error_bound_sum * memory.previous_acceleration_magnitude
     )
     return (
         EARTH_ACCELERATION_BOUND_M_S2
         + memory.first_acceleration_error_bound
         + gravity * tilt_error_bound
-        + np.sqrt(force_error_bound_squared)
+        + np.sqrt(squared_force_error_bound_sum)
         + axis_turning_error_bound
     )
 
@@ -624,8 +626,10 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
     tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
     previous_error_bound, error_change_bound = memory.previous_error_bound, memory.reading_error_change_bound
     max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, readings), MAX_PITCH_RAD))
-    attitude_error_bound = previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
-    max_turn = config.sample_time_s * max_turn_rate
+    attitude_error_bound_sum = (
+        previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
+    )
+    max_turn_angle = config.sample_time_s * max_turn_rate
     tilt_reading_change = abs(readings[PHI] - memory.previous_reading[PHI]) + abs(
         readings[THETA] - memory.previous_reading[THETA]
     )
@@ -638,24 +642,24 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
         + error_change_bound[PSI]
     )
     for i in range(3):
-        rate_error_by_attitude = (
-            max_turn_rate * (attitude_error_bound + max_pitch_secant * previous_error_bound[THETA])
+        rate_error_bound_by_attitude = (
+            max_turn_rate * (attitude_error_bound_sum + max_pitch_secant * previous_error_bound[THETA])
             + tilt_reading_change * momentary_error_bound / config.sample_time_s
         )
         tests[FIRST_TURN_TEST + i].bound_per_s = (
             EARTH_RATE_BOUND_RAD_S
             + 2.0 * config.attitude_drift_rad_s
             + previous_error_bound[P + i]
-            + max_turn * gyro_error_bound_sum
-            + rate_error_by_attitude
+            + max_turn_angle * gyro_error_bound_sum
+            + rate_error_bound_by_attitude
         )
-        rate_error_by_attitude = (
+        rate_error_bound_by_attitude = (
             2.0 * max_pitch_secant * max_turn_rate * (previous_error_bound[PHI] + previous_error_bound[THETA])
         )
         rate_error_bound = (
             EARTH_RATE_BOUND_RAD_S
-            + (1.0 + max_pitch_secant * max_turn) * gyro_error_bound_sum
-            + rate_error_by_attitude
+            + (1.0 + max_pitch_secant * max_turn_angle) * gyro_error_bound_sum
+            + rate_error_bound_by_attitude
         )
         tests[FIRST_ANGLE_TEST + i].bound_per_s, tests[FIRST_ANGLE_TEST + i].bound_per_sample = (
             max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
@@ -690,20 +694,21 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
     kinematics with respect to each reading, times the bound on the reading's error."""
     tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
-    error_bound, previous_error_bound = memory.reading_error_bound, memory.previous_error_bound
+    reading_error_bound, previous_error_bound = memory.reading_error_bound, memory.previous_error_bound
     error_change_bound, previous_reading = memory.reading_error_change_bound, memory.previous_reading
     min_airspeed = max(
         min(
-            readings[AIRSPEED] - error_bound[AIRSPEED],
+            readings[AIRSPEED] - reading_error_bound[AIRSPEED],
             previous_reading[AIRSPEED] - previous_error_bound[AIRSPEED],
         ),
         MIN_AIRSPEED_MPS,
     )
     max_sideslip = max(
-        abs(readings[BETA]) + error_bound[BETA], abs(previous_reading[BETA]) + previous_error_bound[BETA]
+        abs(readings[BETA]) + reading_error_bound[BETA],
+        abs(previous_reading[BETA]) + previous_error_bound[BETA],
     )
     max_sideslip_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
-    vane_error_bound = previous_error_bound[ALPHA] + previous_error_bound[BETA]
+    previous_vane_error_bound_sum = previous_error_bound[ALPHA] + previous_error_bound[BETA]
     max_acceleration_error = acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum)
     max_acceleration = memory.acceleration_magnitude + max_acceleration_error
     second_order_factor = 1.0 + config.sample_time_s * (
@@ -718,10 +723,11 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         * (
             (
                 max_acceleration_error
-                + max_acceleration * (vane_error_bound + previous_error_bound[AIRSPEED] / min_airspeed)
+                + max_acceleration
+                * (previous_vane_error_bound_sum + previous_error_bound[AIRSPEED] / min_airspeed)
             )
             / min_airspeed
-            + max_turn_rate * vane_error_bound
+            + max_turn_rate * previous_vane_error_bound_sum
         )
         + max_sideslip_secant * gyro_error_bound_sum
     )
@@ -731,7 +737,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     )
     tests[SPEED_TEST].bound_per_s = (
         max_acceleration_error
-        + second_order_factor * max_acceleration * vane_error_bound
+        + second_order_factor * max_acceleration * previous_vane_error_bound_sum
         + config.sample_time_s * (max_acceleration / min_airspeed) ** 2 * previous_error_bound[AIRSPEED]
     )
     for test_index, vane_index in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
@@ -753,7 +759,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         ),
     )
     climb_rate_error_bound = (previous_reading[AIRSPEED] + previous_error_bound[AIRSPEED]) * (
-        tilt_error_bound + vane_error_bound
+        tilt_error_bound + previous_vane_error_bound_sum
     ) + previous_error_bound[AIRSPEED]
     tests[CLIMB_TEST].bound_per_s = (
         config.max_vertical_wind_mps
@@ -785,7 +791,7 @@ def log_change_error_bound(redundancy, readings, sensor):
 def bound_density_test(redundancy, readings):
     """Fill the bounds of `bound_residuals` for the logarithm of the density."""
     test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
-    error_bound, error_change_bound = memory.reading_error_bound, memory.reading_error_change_bound
+    reading_error_bound, error_change_bound = memory.reading_error_bound, memory.reading_error_change_bound
     max_climb_rate = (
         memory.previous_reading[AIRSPEED]
         + memory.previous_error_bound[AIRSPEED]
@@ -799,10 +805,12 @@ def bound_density_test(redundancy, readings):
         max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_log_change_bound / config.sample_time_s
     )
     test.bound_per_sample = error_change_bound[QDYN] / max(
-        readings[QDYN] - error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
+        readings[QDYN] - reading_error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
     )
     test.bound_per_sample += (
-        2.0 * error_change_bound[AIRSPEED] / max(readings[AIRSPEED] - error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
+        2.0
+        * error_change_bound[AIRSPEED]
+        / max(readings[AIRSPEED] - reading_error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
     )
 
 
@@ -815,8 +823,11 @@ def bound_residuals(redundancy, readings):
     through the reading that is compared with it. gyro_error_bound_sum: sum of the bounds of the three gyros;
     max_turn_rate: bound on |p| + |q| + |r|; rad/s.
     """
-    error_bound, previous_reading = redundancy.memory.previous_error_bound, redundancy.memory.previous_reading
-    gyro_error_bound_sum = error_bound[P] + error_bound[Q] + error_bound[R]
+    previous_error_bound, previous_reading = (
+        redundancy.memory.previous_error_bound,
+        redundancy.memory.previous_reading,
+    )
+    gyro_error_bound_sum = previous_error_bound[P] + previous_error_bound[Q] + previous_error_bound[R]
     max_turn_rate = (
         abs(previous_reading[P]) + abs(previous_reading[Q]) + abs(previous_reading[R]) + gyro_error_bound_sum
     )

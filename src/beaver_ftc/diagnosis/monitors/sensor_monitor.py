@@ -349,7 +349,7 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
         V * np.cos(beta) * flow_residual_sum_since_alarm[1],
         V * flow_residual_sum_since_alarm[2],
     )
-    spurious_velocity, largest_component, velocity_ahead = (
+    spurious_velocity, largest_component_magnitude, velocity_ahead = (
         memory.spurious_velocity,
         0.0,
         np.cos(beta) * velocity_along_flow - np.sin(beta) * velocity_sideways,
@@ -362,13 +362,13 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     )  # m/s, of sound sensors
     frozen_sensor = NO_SENSOR
     for i in range(3):
-        largest_component = max(largest_component, abs(spurious_velocity[i]))
+        largest_component_magnitude = max(largest_component_magnitude, abs(spurious_velocity[i]))
         frozen_sensor = AX + i if is_frozen(monitor, AX + i) else frozen_sensor
     for i in range(AX, N_IN_EQUATIONS):
         may_be_cause = frozen_sensor == i or (
             frozen_sensor < 0
             and abs(spurious_velocity[i - AX]) + velocity_bound_if_healthy
-            >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest_component
+            >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest_component_magnitude
         )
         is_suspect[i] = may_be_cause and not gyro_explains_residual and not memory.is_cleared[i]
 
@@ -636,9 +636,9 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
             * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
         )
-        max_innovation = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
+        innovation_bound = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
         dynamics_show_error = (
-            abs(innovation[i]) > max_innovation
+            abs(innovation[i]) > innovation_bound
             or alarm_axis >= 0
             or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
         )
@@ -654,7 +654,7 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         )
         innovation_fits = (
             abs(innovation[i] - jump_acceleration)
-            <= max_innovation + jump_acceleration_tolerance + attitude_noise_bound / dt
+            <= innovation_bound + jump_acceleration_tolerance + attitude_noise_bound / dt
         )
         W_follows_error = (
             MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_error)
@@ -814,14 +814,21 @@ def find_suspects_of_flow_test(monitor, vane_index, flow_test_index, fully_actin
     of fully_acting_gyro_index's error turns the flow. No flow sensor moves the attitude's tests."""
     if monitor.output.alarm_test_index != flow_test_index:
         return
-    is_exceeded, is_suspect = monitor.memory.tests_exceeded_since_alarm, monitor.output.is_suspect
+    tests_exceeded_since_alarm, is_suspect = (
+        monitor.memory.tests_exceeded_since_alarm,
+        monitor.output.is_suspect,
+    )
     n_exceeded_turn_tests = (
-        is_exceeded[FIRST_TURN_TEST] + is_exceeded[FIRST_TURN_TEST + 1] + is_exceeded[FIRST_TURN_TEST + 2]
+        tests_exceeded_since_alarm[FIRST_TURN_TEST]
+        + tests_exceeded_since_alarm[FIRST_TURN_TEST + 1]
+        + tests_exceeded_since_alarm[FIRST_TURN_TEST + 2]
     )
     suspect_accelerometers(monitor, n_exceeded_turn_tests > 0)
     is_suspect[vane_index] = not (n_exceeded_turn_tests > 0 or monitor.memory.is_cleared[vane_index])
     for i in range(3):
-        turn_test_shows_gyro = n_exceeded_turn_tests == 1 and is_exceeded[FIRST_TURN_TEST + i] == 1
+        turn_test_shows_gyro = (
+            n_exceeded_turn_tests == 1 and tests_exceeded_since_alarm[FIRST_TURN_TEST + i] == 1
+        )
         is_suspect[i] = turn_test_shows_gyro or (
             n_exceeded_turn_tests == 0
             and gyro_error_may_be_hidden(monitor, flow_test_index, i, i == fully_acting_gyro_index)
@@ -886,21 +893,24 @@ def suspect_gyros_and_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    is_exceeded, gyro_error_verdict = memory.tests_exceeded_since_alarm, memory.gyro_error_verdict
+    tests_exceeded_since_alarm, gyro_error_verdict = (
+        memory.tests_exceeded_since_alarm,
+        memory.gyro_error_verdict,
+    )
     n_exceeded_turn_tests, angle_is_frozen = 0, False
     for i in range(3):
-        n_exceeded_turn_tests += is_exceeded[FIRST_TURN_TEST + i]
+        n_exceeded_turn_tests += tests_exceeded_since_alarm[FIRST_TURN_TEST + i]
         angle_is_frozen = angle_is_frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
         no_other_axis_exceeded = n_exceeded_turn_tests == 0 or (
-            is_exceeded[FIRST_TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
+            tests_exceeded_since_alarm[FIRST_TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
         )
         is_suspect[i] = (
             no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
         )
         angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
         may_be_only_this_angle = no_other_angle_test_exceeded(monitor, i) and (
-            is_exceeded[FIRST_ANGLE_TEST + i] == 1 or angle_explains_turning
+            tests_exceeded_since_alarm[FIRST_ANGLE_TEST + i] == 1 or angle_explains_turning
         )
         angle_may_be_wrong = (
             may_be_only_this_angle

@@ -101,10 +101,12 @@ def record_isolated_surfaces(fdi, t):
     surface_conclusion_is_void = (
         sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_isolated_surface
     )
-    sole_isolated_surface = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
+    sole_isolated_surface_index = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):
         is_isolated = (
-            fdi.types.surface[s].status.is_isolated if fdi.types.pair.enabled else s == sole_isolated_surface
+            fdi.types.surface[s].status.is_isolated
+            if fdi.types.pair.enabled
+            else s == sole_isolated_surface_index
         )
         conclusions.update_isolation_interval(
             conclusion, s, is_isolated and not surface_conclusion_is_void, t

@@ -352,7 +352,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         measured.y,
         fdi.statistical.noise.uncertainty_bound,
     )
-    test_config, blocks, gust, force_record = (
+    test_config, blocks, gust, forces_record = (
         statistical_detector.test_config,
         statistical_detector.block,
         statistical_detector.gust,
@@ -376,14 +376,14 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
     )
     parity.update_view_directions_and_signatures(
-        parity_views, force_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
+        parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
     )
     parity.project_innovation(
         parity_views,
         test_config.has_regressors,
         statistical_detector.noise,
         blocks,
-        force_record,
+        forces_record,
         gust,
         inertial_gust,
         innovation,
@@ -394,7 +394,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     )
     is_error_mapped = fdi.bound.model_error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
-        statistical_detector.alarm, test_config, blocks, parity_views, force_record, gust, t, is_error_mapped
+        statistical_detector.alarm, test_config, blocks, parity_views, forces_record, gust, t, is_error_mapped
     )
     form_innovation_after_known_faults(prediction, measured.x, dt)
     statistical.filter_innovation_after_known_faults(
@@ -453,36 +453,36 @@ def add_instant_to_statistical_tests(fdi, prediction, measured):
 
 
 @kernel
-def update_gusts_and_forces(gust, inertial_gust, force_record, prediction, measured, k, dt):
+def update_gusts_and_forces(gust, inertial_gust, forces_record, prediction, measured, k, dt):
     """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
     if gust.output.accounts_for_gusts:
         gusts.set_gust_rotation_intensity(gust, measured.altitude)
         gusts.update_gust_estimate(
             gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
         )
-    if (force_record.in_use or gust.output.uses_accelerometers) and not measured.inertial:
-        forces.stop_using_forces(force_record, gust, inertial_gust)
-    if force_record.in_use or gust.output.uses_accelerometers:
+    if (forces_record.in_use or gust.output.uses_accelerometers) and not measured.inertial:
+        forces.stop_using_forces(forces_record, gust, inertial_gust)
+    if forces_record.in_use or gust.output.uses_accelerometers:
         gusts.store_accelerometer_reading(gust, measured.force)
-    if force_record.in_use:
-        update_forces_and_inertial_gust(gust, inertial_gust, force_record, prediction, measured, k, dt)
+    if forces_record.in_use:
+        update_forces_and_inertial_gust(gust, inertial_gust, forces_record, prediction, measured, k, dt)
 
 
 @kernel
-def update_forces_and_inertial_gust(gust, inertial_gust, force_record, prediction, measured, k, dt):
+def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, prediction, measured, k, dt):
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
-    forces.update_all_force_innovations(force_record, gust, measured, prediction.u, dt)
+    forces.update_all_force_innovations(forces_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.accounts_for_gusts:
         forces.fill_readings_without_vanes(
-            force_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
+            forces_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
         )
         gusts.store_accelerometer_reading(inertial_gust, measured.force)
         gusts.set_gust_rotation_intensity(inertial_gust, measured.altitude)
-        gusts.update_gust_estimate(inertial_gust, force_record.y_without_vanes, measured.attitude, dt, k)
+        gusts.update_gust_estimate(inertial_gust, forces_record.y_without_vanes, measured.attitude, dt, k)
         gusts.fill_gust_effect(
-            inertial_gust, prediction.design, measured.x, force_record.y_without_vanes, prediction.u
+            inertial_gust, prediction.design, measured.x, forces_record.y_without_vanes, prediction.u
         )
-        gusts.begin_gust_sums(inertial_gust, force_record.y_without_vanes[AIRSPEED], dt)
+        gusts.begin_gust_sums(inertial_gust, forces_record.y_without_vanes[AIRSPEED], dt)
 
 
 @apart

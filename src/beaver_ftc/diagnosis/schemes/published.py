@@ -140,13 +140,13 @@ def evaluate_state_network(network, main_surfaces, x, y, u):
         fill_input_basis(network, i, 1, N_CENTRES_PER_INPUT[1], x[i])
         fill_input_basis(network, i, 2, N_CENTRES_PER_INPUT[2], u[main_surfaces[i]])
         node_index, weighted_sum = 0, 0.0
-        for angle_centre in range(N_CENTRES_PER_INPUT[0]):
-            for rate_centre in range(N_CENTRES_PER_INPUT[1]):
-                for deflection_centre in range(N_CENTRES_PER_INPUT[2]):
+        for angle_centre_index in range(N_CENTRES_PER_INPUT[0]):
+            for rate_centre_index in range(N_CENTRES_PER_INPUT[1]):
+                for deflection_centre_index in range(N_CENTRES_PER_INPUT[2]):
                     basis_value = (
-                        network.memory.input_basis[0, angle_centre]
-                        * network.memory.input_basis[1, rate_centre]
-                        * network.memory.input_basis[2, deflection_centre]
+                        network.memory.input_basis[0, angle_centre_index]
+                        * network.memory.input_basis[1, rate_centre_index]
+                        * network.memory.input_basis[2, deflection_centre_index]
                     )
                     network.memory.basis[i, node_index] = basis_value
                     weighted_sum += network.memory.weights[i, node_index] * basis_value

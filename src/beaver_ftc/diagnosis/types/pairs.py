@@ -145,11 +145,11 @@ def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bou
 @kernel
 def locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound):
     """Find the position of the second surface, given the sets of the first."""
-    first_index = types.pair.first_pitch_fault_surface
-    second_index = layout.partner[first_index]
-    first_effect = estimators[layout.position_estimator[first_index]].frame_mean_effect
-    second_effect = estimators[layout.position_estimator[second_index]].frame_mean_effect
-    first_surface = types.surface[first_index]
+    first_surface_index = types.pair.first_pitch_fault_surface
+    second_surface_index = layout.partner[first_surface_index]
+    first_effect = estimators[layout.position_estimator[first_surface_index]].frame_mean_effect
+    second_effect = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
+    first_surface = types.surface[first_surface_index]
     min_first_deflection, max_first_deflection = possible_deflection_range_of_constant_types(
         types.config, first_surface, types.frame_index
     )
@@ -161,11 +161,11 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
         innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
     )
     if not set_observed_deflection_error(
-        types.surface[second_index],
+        types.surface[second_surface_index],
         (innovation[PITCH] - first_fault_acceleration) / second_regressor,
         acceleration_tolerance / abs(second_regressor),
     ):
-        types.surface[second_index].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
+        types.surface[second_surface_index].status.can_be_at_fault_basis = verdict.DEDUCED_HEALTHY
 
 
 @kernel
@@ -320,11 +320,11 @@ def pitch_fault_type(config, surface):
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
     if detect_second_pitch_fault(types, layout):
-        first_surface, second_index = (
+        first_surface, second_surface_index = (
             types.surface[types.pair.first_pitch_fault_surface],
             layout.partner[types.pair.first_pitch_fault_surface],
         )
-        second_surface = types.surface[second_index]
+        second_surface = types.surface[second_surface_index]
         set_isolation_status(first_surface, 1, first_surface.status.fault_type, t)
         second_shows_fault = (
             second_surface.evidence.n_anomalous_frames > 0
@@ -368,15 +368,15 @@ def decide_pair_isolation(types, conclusion, layout, t):
     all. conclusion: that of the frame before."""
     lateral_fault_outside_class = decide_roll_and_yaw_isolation(types, layout, t)
     decide_pitch_isolation(types, layout, t)
-    first_isolated_surface = NO_SURFACE
+    first_isolated_surface_index = NO_SURFACE
     for s, surface in enumerate(types.surface):
-        status, first_status = surface.status, types.surface[max(first_isolated_surface, 0)].status
+        status, first_status = surface.status, types.surface[max(first_isolated_surface_index, 0)].status
         if status.is_isolated and (
-            first_isolated_surface < 0 or status.isolated_at_s < first_status.isolated_at_s
+            first_isolated_surface_index < 0 or status.isolated_at_s < first_status.isolated_at_s
         ):
-            first_isolated_surface = s
+            first_isolated_surface_index = s
     isolated_estimator, isolated_at_s, fault_type, type_decided_at_s = first_fault_finding(
-        types, conclusion, layout, first_isolated_surface, lateral_fault_outside_class, t
+        types, conclusion, layout, first_isolated_surface_index, lateral_fault_outside_class, t
     )
     accommodated_surface, accommodation_mode = choose_pair_accommodation(types, layout)
     return (
@@ -422,8 +422,8 @@ def should_be_accommodated(types, layout, s):
         or not types.pair.group_has_alarm[PITCH_GROUP]
     ):
         return False
-    most_likely_surface = verdict.sole_possible_surface(types.surface, True)
-    return s == (most_likely_surface if most_likely_surface >= 0 else layout.main[PITCH])
+    most_likely_surface_index = verdict.sole_possible_surface(types.surface, True)
+    return s == (most_likely_surface_index if most_likely_surface_index >= 0 else layout.main[PITCH])
 
 
 @kernel

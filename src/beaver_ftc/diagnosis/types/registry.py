@@ -362,9 +362,9 @@ def configure_fault_types(
     )
     types_config["abrupt"] = config.fault_profile == "abrupt"
     types["pair"]["first_pitch_fault_surface"], types["pair"]["enabled"] = -1, config.pairs
-    surfaces, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
+    surface_names, substep_s = scenario.airframe.surfaces, dt / scenario.substeps
     for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
-        zip(surfaces, types["surface"], *travel, strict=True)
+        zip(surface_names, types["surface"], *travel, strict=True)
     ):
         rate_limit_deg_s, actuator = (
             getattr(scenario.actuators, surface_name).rate_limit_deg_s,

@@ -221,7 +221,7 @@ def find_surface_at_fault(types, layout):
 
 
 @kernel
-def other_surfaces_refuted(types, candidate_surface):
+def other_surfaces_refuted(types, candidate_surface_index):
     """Whether every other surface can only have a fault that depends on the command of the chosen one.
 
     A type that must show itself is given the time to. Where errors are declared that a course can hide in,
@@ -229,7 +229,7 @@ def other_surfaces_refuted(types, candidate_surface):
     """
     config, required_half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
-        if s != candidate_surface and surface.status.may_be_sole_fault and can_be_at_fault(surface):
+        if s != candidate_surface_index and surface.status.may_be_sole_fault and can_be_at_fault(surface):
             if config.has_declared_surface_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
@@ -242,7 +242,7 @@ def other_surfaces_refuted(types, candidate_surface):
                         required_half_cycles, HALF_CYCLES_BEFORE_ISOLATING_OTHERS[type_index]
                     )
     return (
-        types.surface[candidate_surface].evidence.n_anomalous_frames
+        types.surface[candidate_surface_index].evidence.n_anomalous_frames
         >= required_half_cycles * config.slowest_half_cycle_frames
     )
 
@@ -307,9 +307,14 @@ def decide_surface_and_type(types, conclusion, layout, estimators, t):
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
-    surface_index, previous_estimator = find_surface_at_fault(types, layout), conclusion.isolated_estimator
+    surface_index, previous_estimator_index = (
+        find_surface_at_fault(types, layout),
+        conclusion.isolated_estimator,
+    )
     previous_surface_index = (
-        estimators[previous_estimator].surface if previous_estimator >= 0 else previous_estimator
+        estimators[previous_estimator_index].surface
+        if previous_estimator_index >= 0
+        else previous_estimator_index
     )
     fault_type = (
         fault_type_on_surface(types.config, types.surface[surface_index]) if surface_index >= 0 else -1

@@ -142,7 +142,7 @@ def consistent_offset_interval(surface):
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    position_low, position_high, healthy_position, commands = (
+    position_low, position_high, healthy_position, command_record = (
         surface.judged_observation.position_low,
         surface.judged_observation.position_high,
         surface.judged_observation.healthy_position,
@@ -151,8 +151,8 @@ def consistent_offset_interval(surface):
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
         return isolation.EMPTY_THETA_INTERVAL
     min_instant_position, max_instant_position = (
-        position_low - max(healthy_position - commands.min_healthy_position[1], 0.0),
-        position_high + max(commands.max_healthy_position[1] - healthy_position, 0.0),
+        position_low - max(healthy_position - command_record.min_healthy_position[1], 0.0),
+        position_high + max(command_record.max_healthy_position[1] - healthy_position, 0.0),
     )
     offset_low = (
         position_low - healthy_position if min_instant_position > surface.actuator.travel_low else -np.inf
@@ -191,14 +191,14 @@ def bias_deflection_range(config, surface, type_index, k):
 def mean_deflection_with_offset(surface, offset_rad, extreme_healthy_position):
     """Return the mean deflection with an offset (rad); if a stop is met at an instant, that at
     `extreme_healthy_position`."""
-    commands, actuator, mean_deflection = (
+    command_record, actuator, mean_deflection = (
         surface.commands,
         surface.actuator,
         surface.last_observation.healthy_position + offset_rad,
     )
     meets_stop = (
-        commands.min_healthy_position[0] + offset_rad < actuator.travel_low
-        or commands.max_healthy_position[0] + offset_rad > actuator.travel_high
+        command_record.min_healthy_position[0] + offset_rad < actuator.travel_low
+        or command_record.max_healthy_position[0] + offset_rad > actuator.travel_high
     )
     return limit_to_travel(surface, extreme_healthy_position + offset_rad) if meets_stop else mean_deflection
 
@@ -357,11 +357,11 @@ def consistent_oscillation_interval(config, surface, type_index, k):
     keeps its sign.
     """
     memory = surface.oscillatory
-    error_low, error_high = (
+    deflection_error_low, deflection_error_high = (
         surface.judged_observation.position_low - surface.judged_observation.healthy_position,
         surface.judged_observation.position_high - surface.judged_observation.healthy_position,
     )
-    error_sign = 1 if error_low > 0.0 else (-1 if error_high < 0.0 else 0)
+    error_sign = 1 if deflection_error_low > 0.0 else (-1 if deflection_error_high < 0.0 else 0)
     if error_sign == 0 or (
         not config.frame_shows_single_instant
         and surface.judged_observation.stop_can_hide_deflection[0 if error_sign > 0 else 1]
@@ -502,10 +502,10 @@ def narrow_position_by_min_rate(config, surface, memory, side_of_command):
 @kernel
 def command_range(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
-    commands = surface.commands
+    command_record = surface.commands
     newest_blocks_ago = 2 if config.frame_shows_single_instant else 1
-    return min(commands.min_command[2], commands.min_command[newest_blocks_ago]), max(
-        commands.max_command[2], commands.max_command[newest_blocks_ago]
+    return min(command_record.min_command[2], command_record.min_command[newest_blocks_ago]), max(
+        command_record.max_command[2], command_record.max_command[newest_blocks_ago]
     )
 
 

@@ -555,9 +555,7 @@ def add_hardover_up_release(config, surface, type_index, k):
 def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
     start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
-    start_position_high = min(
-        start_position_high, runaway_down_upper_limit(config, surface, observed_frame)
-    )
+    start_position_high = min(start_position_high, runaway_down_upper_limit(config, surface, observed_frame))
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_low = surface.actuator.travel_low
     add_release(surface, type_index, start_position_low, start_position_high)

@@ -315,17 +315,17 @@ def update_gust_rotation(gust, y, attitude, dt):
     update_gust_axes(gust, sin_heading_change, cos_heading_change)
     fill_turn_rate_of_gust_axes(gust, dt, V)
     pitching_lag_s, yawing_lag_s = gust_lag_s(gust, 1, V), gust_lag_s(gust, 2, V)
-    unmeasured_yawing_share_before = gust.memory.unmeasured_yawing_share_by_turn_now
+    unmeasured_yawing_share_by_turn_before = gust.memory.unmeasured_yawing_share_by_turn_now
     gust.memory.unmeasured_yawing_share_by_turn_now = unmeasured_yawing_share_by_heading_rate(
         gust, V, heading_change / dt
     )
-    unmeasured_yawing_share = max(
-        unmeasured_yawing_share_before, gust.memory.unmeasured_yawing_share_by_turn_now
+    unmeasured_yawing_share_by_turn = max(
+        unmeasured_yawing_share_by_turn_before, gust.memory.unmeasured_yawing_share_by_turn_now
     )
     gust.memory.unmeasured_yawing_share_by_past_turns = min(
         max(
             np.exp(-dt / yawing_lag_s) * gust.memory.unmeasured_yawing_share_by_past_turns,
-            unmeasured_yawing_share,
+            unmeasured_yawing_share_by_turn,
         ),
         1.0,
     )
@@ -338,7 +338,7 @@ def update_gust_rotation(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
-    if unmeasured_yawing_share < 1.0:
+    if unmeasured_yawing_share_by_turn < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
             predicted_velocity_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
@@ -433,12 +433,12 @@ def fill_gust_effect(gust, design, x, y, u):
         fill_specific_force(gust, x, y, u, gust.memory.specific_force)
     rate_damping(design, x, y, u, gust.memory.scratch, gust.output.rate_damping)
     for i in range(3):
-        air_rotation_in_body_axis = (
+        air_rotation_about_body_axis = (
             gust.output.gust_axes_in_body[i, 1] * gust.memory.air_rotation_in_level_axes[1]
             + gust.output.gust_axes_in_body[i, 2] * gust.memory.air_rotation_in_level_axes[2]
         )
         gust.memory.air_rotation_in_body_axes[i] = (
-            air_rotation_in_body_axis
+            air_rotation_about_body_axis
             if gust.output.is_gust_measured or gust.config.has_only_coarse_estimate
             else 0.0
         )
@@ -647,11 +647,11 @@ def full_gust_drift_intensity(gust, V, rate_gust_sensitivity, force_gust_sensiti
     """
     drift_intensity_per_airspeed, rolling_lag_s = 0.0, gust_lag_s(gust, 0, V)
     for gust_axis in range(3):
-        total_sensitivity = abs(
+        sensitivity_magnitude_sum = abs(
             project_on_gust_axis(rate_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis)
         ) + abs(project_on_gust_axis(force_gust_sensitivity, gust.output.gust_axes_in_body, gust_axis))
         drift_intensity_per_airspeed += (
-            total_sensitivity**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
+            sensitivity_magnitude_sum**2 * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
         )
         if gust.memory.has_fast_axes_turn:
             drift_intensity_per_airspeed += (

@@ -129,13 +129,13 @@ def fill_frame_means(prediction, bound_record):
     sums = prediction.sums
     frame_means = prediction.frame_means
     for i in range(3):
-        acceleration = frame_share_per_instant * sums.f[i]
+        mean_acceleration = frame_share_per_instant * sums.f[i]
         for s in range(prediction.u.size):
             frame_means.previous_G[i, s] = frame_means.G[i, s]
             frame_means.G[i, s] = frame_share_per_instant * sums.G[i, s]
             frame_means.Gu[i, s] = frame_share_per_instant * sums.Gu[i, s]
-            acceleration += frame_means.Gu[i, s]
-        frame_means.acceleration[i] = acceleration
+            mean_acceleration += frame_means.Gu[i, s]
+        frame_means.acceleration[i] = mean_acceleration
         bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
     frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
     frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max

@@ -132,7 +132,7 @@ def looks(signal, h):
             monitor["redundancy"], monitor["initial_errors"], signal[k]
         )
         fired |= monitor["redundancy"]["test"]["residual_bound_ratio"] > 1.0
-        initial_errors.record_refuted_hypotheses(monitor["redundancy"], monitor["initial_errors"], fired)
+        initial_errors.latch_refuted_hypotheses(monitor["redundancy"], monitor["initial_errors"], fired)
         yield k, monitor, fired
         redundancy.store_sample(monitor["redundancy"], signal[k], signal[k, AX:])
 

@@ -110,7 +110,7 @@ def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     monitor = with_shares(shares, **fields)
     monitor["output"]["alarm_test_index"] = max(shares, key=shares.get) if lead is None else lead
-    watching.record_exceeded_tests(monitor)
+    watching.latch_exceeded_tests(monitor)
     watching.find_suspects(monitor)
     return set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist())
 
@@ -803,7 +803,7 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 def test_suspicions_of_the_frame_before_are_gone():
     monitor = with_shares({CLIMB_TEST: 2.0}, alarm_test_index=CLIMB_TEST)
     monitor["output"]["is_suspect"] = 1
-    watching.record_exceeded_tests(monitor)
+    watching.latch_exceeded_tests(monitor)
     watching.find_suspects(monitor)
     assert np.flatnonzero(monitor["output"]["is_suspect"]).tolist() == [ALTITUDE]
 

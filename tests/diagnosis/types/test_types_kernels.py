@@ -177,11 +177,11 @@ def test_a_surface_stands_nowhere_once_where_it_was_contradicts_itself(interval,
 
 def test_an_offset_is_unlimited_at_a_stop():
     _, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    assert commanded_surface.consistent_offset_interval(surface) == pytest.approx((-0.2, -0.15))
+    assert commanded_surface.offset_interval_of_judged_frame(surface) == pytest.approx((-0.2, -0.15))
     surface["judged_observation"]["position_high"] = HIGH
-    assert commanded_surface.consistent_offset_interval(surface) == (pytest.approx(-0.2), np.inf)
+    assert commanded_surface.offset_interval_of_judged_frame(surface) == (pytest.approx(-0.2), np.inf)
     surface["judged_observation"]["position_low"] = LOW
-    assert commanded_surface.consistent_offset_interval(surface)[0] == -np.inf
+    assert commanded_surface.offset_interval_of_judged_frame(surface)[0] == -np.inf
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 0.09), (0.51, 0.6)])
@@ -205,11 +205,11 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
         0.34,
     )
     # the lowest it was: 0.2 - (0.1 + 0.4) = -0.3; the highest: 0.25 + 0.24 = 0.49, below 0.5
-    assert commanded_surface.consistent_offset_interval(surface) == pytest.approx((0.1, 0.15))
+    assert commanded_surface.offset_interval_of_judged_frame(surface) == pytest.approx((0.1, 0.15))
     surface["commands"]["max_healthy_position"][1] = 0.36
-    assert commanded_surface.consistent_offset_interval(surface)[1] == np.inf
+    assert commanded_surface.offset_interval_of_judged_frame(surface)[1] == np.inf
     surface["commands"]["min_healthy_position"][1] = -0.51
-    assert commanded_surface.consistent_offset_interval(surface)[0] == -np.inf
+    assert commanded_surface.offset_interval_of_judged_frame(surface)[0] == -np.inf
 
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():

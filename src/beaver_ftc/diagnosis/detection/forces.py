@@ -124,11 +124,11 @@ def fill_readings_without_vanes(forces, air_rotation, y):
     for force_index in range(2):
         force_record = forces.component[force_index]
         vane_index = BETA if force_index == SIDE_COMPONENT else ALPHA
-        air_rotation_effect = 0.0
+        innovation_by_air_rotation = 0.0
         for k in range(3):
-            air_rotation_effect += force_record.innovation_per_air_rotation[k] * air_rotation[k]
+            innovation_by_air_rotation += force_record.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
-            force_record.innovation / forces.dynamic_pressure_over_trim + air_rotation_effect
+            force_record.innovation / forces.dynamic_pressure_over_trim + innovation_by_air_rotation
         ) / force_record.axis_and_force_innovation_per_vane_error[1]
 
 
@@ -167,7 +167,7 @@ def update_force_innovation(forces, gust, force_index, measured, u):
     scaled_force_per_coefficient = (
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
-    scaled_force = 0.0
+    predicted_scaled_force = 0.0
     force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
     force_record.scaled_force_per_surface_rad[:] = 0.0
     force_record.scaled_force_per_surface_rad_error_bound[:] = 0.0
@@ -183,7 +183,7 @@ def update_force_innovation(forces, gust, force_index, measured, u):
             ] * abs(scaled_force_per_term_value)
             scaled_force_per_term_value *= u[s]
         force_record.regressor[k - first_term_index] = scaled_force_per_term_value
-        scaled_force += force_table.value[k] * scaled_force_per_term_value
+        predicted_scaled_force += force_table.value[k] * scaled_force_per_term_value
     if force_index == SIDE_COMPONENT:
         sideslip_rate_scaled_force = (
             scaled_force_per_coefficient
@@ -193,17 +193,21 @@ def update_force_innovation(forces, gust, force_index, measured, u):
             / (2.0 * measured.y[AIRSPEED])
         )
         force_record.regressor[end_term_index - first_term_index] = sideslip_rate_scaled_force
-        scaled_force += sideslip_rate_scaled_force
-    force_record.regressor[force_record.n_regressors - 1] = scaled_force
-    force_record.predicted_scaled_force = scaled_force
+        predicted_scaled_force += sideslip_rate_scaled_force
+    force_record.regressor[force_record.n_regressors - 1] = predicted_scaled_force
+    force_record.predicted_scaled_force = predicted_scaled_force
     if forces.n_updates_capped_at_minimum == 0:
         force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
     for s in range(u.size):
         force_record.scaled_force_of_surface_at_command[s] = (
             force_record.previous_scaled_force_per_surface_rad[s] * u[s]
         )
-    force_record.innovation = measured.force[1 + force_index] * forces.inverse_chord_per_m - scaled_force
-    pressure_noise_scaled_force_std = scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
+    force_record.innovation = (
+        measured.force[1 + force_index] * forces.inverse_chord_per_m - predicted_scaled_force
+    )
+    pressure_noise_scaled_force_std = (
+        predicted_scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
+    )
     for k in range(2):
         force_record.noise_variance[k] = (
             force_record.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
@@ -280,26 +284,29 @@ def configure_forces(
     )
     for force_index, (vane_index, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
         force_record, terms = forces["component"][force_index], force_terms(aircraft, force_index)
-        force_slopes_with_slipstream = scaled_force_per_coefficient * _force_coefficient_slopes(
+        scaled_force_slopes_with_slipstream = scaled_force_per_coefficient * _force_coefficient_slopes(
             aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim
         )
-        force_slopes = force_slopes_with_slipstream[:-1]
-        force_per_slipstream = force_slopes_with_slipstream[-1]
+        scaled_force_slopes = scaled_force_slopes_with_slipstream[:-1]
+        scaled_force_per_slipstream = scaled_force_slopes_with_slipstream[-1]
         force_record["axis_and_force_innovation_per_vane_error"] = (
             -acceleration_slopes_by_y[axis, vane_index],
-            -force_slopes[vane_index],
+            -scaled_force_slopes[vane_index],
         )
         force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
-        force_record["innovation_per_air_rotation"] = force_slopes[3:]
-        force_slopes_through_slipstream = force_slopes.copy()
-        force_slopes_through_slipstream[AIRSPEED] += force_per_slipstream * slipstream_per_airspeed
-        variance_by_reading = (force_slopes_through_slipstream * reading_noise_std) ** 2
+        force_record["innovation_per_air_rotation"] = scaled_force_slopes[3:]
+        scaled_force_slopes_through_slipstream = scaled_force_slopes.copy()
+        scaled_force_slopes_through_slipstream[AIRSPEED] += (
+            scaled_force_per_slipstream * slipstream_per_airspeed
+        )
+        innovation_variance_by_reading = (scaled_force_slopes_through_slipstream * reading_noise_std) ** 2
         innovation_noise_variance = (
-            variance_by_reading.sum() + force_per_slipstream**2 * slipstream_variance_by_other_readings
+            innovation_variance_by_reading.sum()
+            + scaled_force_per_slipstream**2 * slipstream_variance_by_other_readings
         )
         force_record["trim_noise_variance_with_without_vane"] = (
             innovation_noise_variance,
-            innovation_noise_variance - variance_by_reading[vane_index],
+            innovation_noise_variance - innovation_variance_by_reading[vane_index],
         )
         accelerometer_noise_std = sensor_errors[ACCELEROMETERS[1 + force_index]].random
         force_record["accelerometer_innovation_variance"] = (
@@ -310,15 +317,15 @@ def configure_forces(
             declared,
             terms,
             y,
-            force_slopes[vane_index] / scaled_force_per_coefficient,
+            scaled_force_slopes[vane_index] / scaled_force_per_coefficient,
             force_index,
             forces["inverse_chord_per_m"],
         )
-        surfaces_scaled_force_per_rad = scaled_force_per_coefficient * sum(
+        scaled_force_magnitude_sum_per_rad = scaled_force_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
         force_record["deflection_error_effect_bound"] = (
-            surfaces_scaled_force_per_rad * declared.actuators.deflection_rad
+            scaled_force_magnitude_sum_per_rad * declared.actuators.deflection_rad
         )
         force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
             sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
@@ -326,7 +333,7 @@ def configure_forces(
         flow_angle_drift_intensity = (
             FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force_record["inertial_innovation_drift_intensity"] = force_slopes[vane_index] ** 2 * (
+        force_record["inertial_innovation_drift_intensity"] = scaled_force_slopes[vane_index] ** 2 * (
             flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 

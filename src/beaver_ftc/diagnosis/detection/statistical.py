@@ -474,18 +474,18 @@ def configure_reading_regressors(
     statistical: np.void, sensor_errors: SensorErrors, declared_errors: np.void
 ) -> None:
     """Add the readings of the air data to the regressors of the blocks."""
-    steady_error_bound = np.zeros(N_INPUT_READINGS)
+    steady_error_bounds = np.zeros(N_INPUT_READINGS)
     reading_noise_std = statistical["noise"]["reading_noise_std"]
     for sensor_name, reading_index in _READING_INDEX_BY_SENSOR.items():
-        steady_error_bound[reading_index] = sensor_errors[sensor_name].steady
+        steady_error_bounds[reading_index] = sensor_errors[sensor_name].steady
         reading_noise_std[reading_index] = sensor_errors[sensor_name].random
-    steady_error_bound[_ENGINE_POWER_READING_INDEX] = declared_errors[
+    steady_error_bounds[_ENGINE_POWER_READING_INDEX] = declared_errors[
         "engine_power_error_kw"
     ]  # all of it: so many standard deviations are part of that
     reading_noise_std[_ENGINE_POWER_READING_INDEX] = (
         declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
     )
-    if not (steady_error_bound.any() or reading_noise_std.any()):
+    if not (steady_error_bounds.any() or reading_noise_std.any()):
         return
     statistical["noise"]["has_reading_errors"] = statistical["test_config"]["has_regressors"] = 1
     for block in statistical["block"]:
@@ -493,7 +493,7 @@ def configure_reading_regressors(
         block["n_regressors"] = first_reading_regressor_index + N_INPUT_READINGS
         block["regressor_tolerance"][
             first_reading_regressor_index : first_reading_regressor_index + N_INPUT_READINGS
-        ] = steady_error_bound
+        ] = steady_error_bounds
 
 
 @kernel
@@ -1064,10 +1064,12 @@ def add_coefficient_regressors(frame_share_per_instant, coefficient_regressor, b
     for lateral_block in blocks[LATERAL_BLOCK:]:
         n_roll_terms, first_term_index = moment_table.surface_to[0], moment_table.free_from[2]
         for j in range(n_roll_terms):
-            roll_moment = lateral_moment_per_coefficient * coefficient_regressor[j]
-            lateral_block.regressor[j, 0] += design.Pl * roll_moment
-            lateral_block.regressor[j, 1] += design.Rl * roll_moment
+            roll_moment_per_coefficient = lateral_moment_per_coefficient * coefficient_regressor[j]
+            lateral_block.regressor[j, 0] += design.Pl * roll_moment_per_coefficient
+            lateral_block.regressor[j, 1] += design.Rl * roll_moment_per_coefficient
         for j in range(moment_table.surface_to[2] - first_term_index):
-            yaw_moment = lateral_moment_per_coefficient * coefficient_regressor[first_term_index + j]
-            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment
-            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment
+            yaw_moment_per_coefficient = (
+                lateral_moment_per_coefficient * coefficient_regressor[first_term_index + j]
+            )
+            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment_per_coefficient
+            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment_per_coefficient

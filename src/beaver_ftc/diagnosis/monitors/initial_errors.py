@@ -141,9 +141,9 @@ def standard_air_density(altitude_m):
 @kernel
 def set_error_bounds_at_start(initial_errors, readings):
     """Bound each error at the first sample of the readings (N_SENSORS,): an aircraft can fly at the truth."""
-    bound_at_start = initial_errors.error_bound_at_start
-    bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
-    bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
+    error_bound_at_start = initial_errors.error_bound_at_start
+    error_bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
+    error_bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
     V = max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
     standard_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
         2.0 * max(readings[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(readings[ALTITUDE])
@@ -155,11 +155,13 @@ def set_error_bounds_at_start(initial_errors, readings):
         V / standard_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
         V / standard_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
     )
-    bound_at_start[AIRSPEED_HYPOTHESIS] = min(
+    error_bound_at_start[AIRSPEED_HYPOTHESIS] = min(
         max(max_reading_over_truth - 1.0, 1.0 - min_reading_over_truth), MAX_AIRSPEED_READING_RATIO - 1.0
     )
-    bound_at_start[PHI_HYPOTHESIS] = bound_at_start[THETA_HYPOTHESIS] = MAX_CHORD_OF_ATTITUDE_ERROR
-    initial_errors.error_bound[:] = bound_at_start
+    error_bound_at_start[PHI_HYPOTHESIS] = error_bound_at_start[THETA_HYPOTHESIS] = (
+        MAX_CHORD_OF_ATTITUDE_ERROR
+    )
+    initial_errors.error_bound[:] = error_bound_at_start
 
 
 @kernel
@@ -174,9 +176,9 @@ def index_of_test_showing_error_change(hypothesis_index):
 def update_error_change_bounds(redundancy, initial_errors):
     """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
     part of it that this filter forgets in a sample."""
-    forgotten_share = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
+    share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        test_index, bound_at_start = (
+        test_index, error_bound_at_start = (
             index_of_test_showing_error_change(i),
             initial_errors.error_bound_at_start[i],
         )
@@ -189,9 +191,11 @@ def update_error_change_bounds(redundancy, initial_errors):
             change_bound *= (1.0 + initial_errors.error_bound[i]) / max(
                 redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS
             )
-        initial_errors.error_change_bound[i] = min(change_bound, bound_at_start)
-        widened_bound = initial_errors.error_bound[i] + forgotten_share * initial_errors.error_change_bound[i]
-        initial_errors.error_bound[i] = min(widened_bound, bound_at_start)
+        initial_errors.error_change_bound[i] = min(change_bound, error_bound_at_start)
+        widened_bound = (
+            initial_errors.error_bound[i] + share_forgotten_per_sample * initial_errors.error_change_bound[i]
+        )
+        initial_errors.error_bound[i] = min(widened_bound, error_bound_at_start)
 
 
 @kernel
@@ -208,11 +212,11 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
         previous_reading[PHI],
         previous_reading[THETA],
     )
-    max_effect, coupling_effect = (
+    max_effect_per_unit, coupling_effect_per_unit = (
         initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
     )
-    max_effect[:] = 0.0
+    max_effect_per_unit[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     theta_secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
     max_theta_secant = 1.0 / np.cos(
@@ -225,24 +229,24 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
-        max_effect[PHI_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + (
+        max_effect_per_unit[PHI_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + (
             pitch_yaw_turn if i > 0 else 0.0
         )
-        max_effect[THETA_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
+        max_effect_per_unit[THETA_HYPOTHESIS, FIRST_TURN_TEST + i] = second_order_turn_rad2 + max_heading_turn
         # Angles. phi off: no Euler angle changes by more than the body turns over cos(theta). theta off by e:
         # phi' = p + m tan(theta), psi' = m / cos(theta), with m = q sin(phi) + r cos(phi). The tangents, or
         # secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
         # theta' = q cos(phi) - r sin(phi) there is no theta.
-        max_effect[PHI_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
+        max_effect_per_unit[PHI_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
             pitch_yaw_turn + theta_secant * second_order_turn_rad2
         )
-        max_effect[THETA_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
+        max_effect_per_unit[THETA_HYPOTHESIS, FIRST_ANGLE_TEST + i] = theta_secant * (
             (max_heading_turn if i != 1 else 0.0) + max_theta_secant * second_order_turn_rad2
         )
     (
-        coupling_effect[PHI_PITCH_RATE_COUPLING_INDEX],
-        coupling_effect[PHI_YAW_RATE_COUPLING_INDEX],
-        coupling_effect[THETA_HEADING_RATE_COUPLING_INDEX],
+        coupling_effect_per_unit[PHI_PITCH_RATE_COUPLING_INDEX],
+        coupling_effect_per_unit[PHI_YAW_RATE_COUPLING_INDEX],
+        coupling_effect_per_unit[THETA_HEADING_RATE_COUPLING_INDEX],
     ) = (
         h * q,
         h * r,
@@ -252,8 +256,8 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
     log_airspeed_change = np.log(max(readings[AIRSPEED], MIN_AIRSPEED_MPS) / V)
-    max_effect[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
-    coupling_effect[AIRSPEED_DENSITY_COUPLING_INDEX] = 2.0 * log_airspeed_change
+    max_effect_per_unit[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
+    coupling_effect_per_unit[AIRSPEED_DENSITY_COUPLING_INDEX] = 2.0 * log_airspeed_change
 
 
 @kernel
@@ -266,7 +270,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
     previous_reading, body_acceleration = memory.previous_reading, memory.body_acceleration
-    max_effect, coupling_effect = (
+    max_effect_per_unit, coupling_effect_per_unit = (
         initial_errors.max_effect_per_unit_error,
         initial_errors.coupling_effect_per_unit_error,
     )
@@ -297,64 +301,68 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
         memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE],
     )
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    max_effect[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect[BETA_HYPOTHESIS, SPEED_TEST] = (
+    max_effect_per_unit[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect_per_unit[BETA_HYPOTHESIS, SPEED_TEST] = (
         widened_step_s * max_acceleration
     )
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    max_effect[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+    max_effect_per_unit[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
         widened_step_s * beta_secant * (max_acceleration / V + roll_yaw_rate_magnitude * abs(sin_beta))
     )
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    max_effect[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
+    max_effect_per_unit[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
         roll_yaw_rate_magnitude + max_acceleration * abs(sin_beta) / V
     )
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    max_effect[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+    max_effect_per_unit[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
         widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + max_acceleration / V)
     )
     # beta' with beta off: a turned by beta
-    max_effect[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * max_acceleration / V
+    max_effect_per_unit[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * max_acceleration / V
     # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    max_effect[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * beta_secant * max_acceleration / V
-    )
+    max_effect_per_unit[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
+        AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST
+    ] = widened_step_s * beta_secant * max_acceleration / V
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
     # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    max_effect[PHI_HYPOTHESIS, SPEED_TEST] = (
+    max_effect_per_unit[PHI_HYPOTHESIS, SPEED_TEST] = (
         widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
     )
-    max_effect[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * g * cos_theta * beta_secant / V
-    )
+    max_effect_per_unit[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
+        PHI_HYPOTHESIS, BETA_FLOW_TEST
+    ] = widened_step_s * g * cos_theta * beta_secant / V
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
     # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    max_effect[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
-    max_effect[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
-    max_effect[THETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    max_effect_per_unit[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
+    max_effect_per_unit[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
+    max_effect_per_unit[THETA_HYPOTHESIS, BETA_FLOW_TEST] = (
+        widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    )
     # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
     # (sin(theta), -cos(phi) cos(theta))
     vertical_projection_length = np.hypot(sin_theta, cos_phi * cos_theta)
-    max_effect[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
+    max_effect_per_unit[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
     # with beta off: (cos(beta), -sin(beta)) turned, times V
-    max_effect[BETA_HYPOTHESIS, CLIMB_TEST] = (
+    max_effect_per_unit[BETA_HYPOTHESIS, CLIMB_TEST] = (
         h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
     )
     # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    max_effect[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
+    max_effect_per_unit[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
         1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
     )
     # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    max_effect[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    max_effect_per_unit[PHI_HYPOTHESIS, CLIMB_TEST] = (
+        h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    )
     # with theta off: the vertical is turned, against v
-    max_effect[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
+    max_effect_per_unit[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
     # is turned by the error
-    coupling_effect[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
-    coupling_effect[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
+    coupling_effect_per_unit[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
+    coupling_effect_per_unit[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch_magnitude = abs(previous_reading[THETA])
-    coupling_effect[THETA_GRAVITY_COUPLING_INDEX] = (
+    coupling_effect_per_unit[THETA_GRAVITY_COUPLING_INDEX] = (
         h
         * g
         * np.cos(
@@ -369,18 +377,21 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    coupling_effect[ALPHA_CLIMB_COUPLING_INDEX] = (
+    coupling_effect_per_unit[ALPHA_CLIMB_COUPLING_INDEX] = (
         h * V * cos_beta * vertical_projection_length * np.cos(min(max_mean_angle, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + flow_yaw_rate sin(e / 2)). beta off by
     # e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of either
     # sign, is an uncertainty of both
-    coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX], coupling_effect[VANE_YAW_RATE_COUPLING_INDEX] = (
+    (
+        coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX],
+        coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX],
+    ) = (
         h * flow_roll_rate,
         h * flow_yaw_rate,
     )
-    coupling_effect[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * max_acceleration / V
-    coupling_effect[BETA_FORCE_UNCERTAINTY_INDEX] = (
+    coupling_effect_per_unit[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * max_acceleration / V
+    coupling_effect_per_unit[BETA_FORCE_UNCERTAINTY_INDEX] = (
         h
         * np.sin(min(max_sideslip, 0.5 * np.pi))
         * beta_secant
@@ -389,8 +400,8 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
         / V
     )
     # V: a across the flow, over the airspeed
-    coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * normal_acceleration * beta_secant / V
-    coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * side_acceleration / V
+    coupling_effect_per_unit[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * normal_acceleration * beta_secant / V
+    coupling_effect_per_unit[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * side_acceleration / V
 
 
 @kernel
@@ -473,14 +484,14 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_in
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
+        filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect[PHI_PITCH_RATE_COUPLING_INDEX],
-                filtered_coupling_effect[PHI_YAW_RATE_COUPLING_INDEX],
+                filtered_coupling_effect_per_unit[PHI_PITCH_RATE_COUPLING_INDEX],
+                filtered_coupling_effect_per_unit[PHI_YAW_RATE_COUPLING_INDEX],
             ),
         )
         tighten_error_bound(
@@ -488,15 +499,15 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             PHI_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect[PHI_GRAVITY_DOWN_COUPLING_INDEX],
-                filtered_coupling_effect[PHI_GRAVITY_SIDE_COUPLING_INDEX],
+                filtered_coupling_effect_per_unit[PHI_GRAVITY_DOWN_COUPLING_INDEX],
+                filtered_coupling_effect_per_unit[PHI_GRAVITY_SIDE_COUPLING_INDEX],
             ),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            filtered_coupling_effect[THETA_GRAVITY_COUPLING_INDEX],
+            filtered_coupling_effect_per_unit[THETA_GRAVITY_COUPLING_INDEX],
         )
         max_rotation_effect = np.hypot(
             max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
@@ -506,7 +517,7 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             initial_errors,
             THETA_HYPOTHESIS,
             max_rotation_effect,
-            abs(filtered_coupling_effect[THETA_HEADING_RATE_COUPLING_INDEX]),
+            abs(filtered_coupling_effect_per_unit[THETA_HEADING_RATE_COUPLING_INDEX]),
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -515,18 +526,18 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
     max_half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
-        np.cos(max_half_error) * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX])
-        - np.sin(max_half_error) * abs(filtered_coupling_effect[VANE_YAW_RATE_COUPLING_INDEX])
-        - filtered_coupling_effect[ALPHA_FORCE_UNCERTAINTY_INDEX]
+        np.cos(max_half_error) * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
+        - np.sin(max_half_error) * abs(filtered_coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX])
+        - filtered_coupling_effect_per_unit[ALPHA_FORCE_UNCERTAINTY_INDEX]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        filtered_coupling_effect[ALPHA_CLIMB_COUPLING_INDEX],
+        filtered_coupling_effect_per_unit[ALPHA_CLIMB_COUPLING_INDEX],
     )
     tighten_error_bound(
         initial_errors,
@@ -536,8 +547,8 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_coupling_effect[VANE_ROLL_RATE_COUPLING_INDEX])
-        - filtered_coupling_effect[BETA_FORCE_UNCERTAINTY_INDEX]
+        * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
+        - filtered_coupling_effect_per_unit[BETA_FORCE_UNCERTAINTY_INDEX]
     )
     tighten_error_bound(
         initial_errors,
@@ -554,7 +565,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    filtered_coupling_effect = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
     max_reading_over_truth = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]
     tighten_error_bound(
         initial_errors,
@@ -563,7 +574,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX]),
+        abs(filtered_coupling_effect_per_unit[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX]),
     )
     tighten_error_bound(
         initial_errors,
@@ -572,7 +583,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect[AIRSPEED_SIDE_FORCE_COUPLING_INDEX]),
+        abs(filtered_coupling_effect_per_unit[AIRSPEED_SIDE_FORCE_COUPLING_INDEX]),
     )
     max_change_effect = (
         2.0
@@ -585,7 +596,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
         + max_change_effect,
-        abs(filtered_coupling_effect[AIRSPEED_DENSITY_COUPLING_INDEX]),
+        abs(filtered_coupling_effect_per_unit[AIRSPEED_DENSITY_COUPLING_INDEX]),
     )
 
 
@@ -640,7 +651,7 @@ def max_error_effect_at_alarm(initial_errors, hypothesis_index, test_index, pole
 
 
 @kernel
-def record_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
+def latch_refuted_hypotheses(redundancy, initial_errors, tests_exceeded_since_alarm):
     """Record by which of `tests_exceeded_since_alarm` (N_TESTS,) each hypothesis is refuted."""
     is_refuted_by_test = initial_errors.is_refuted_by_test
     for i in range(N_INITIAL_ERROR_HYPOTHESES):

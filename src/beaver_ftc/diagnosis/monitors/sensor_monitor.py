@@ -54,8 +54,8 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import advance_residual_bound, bank_alarm_axis
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     initial_error_explains_alarm,
+    latch_refuted_hypotheses,
     max_error_effect_at_alarm,
-    record_refuted_hypotheses,
     set_error_bounds_at_start,
     store_error_bounds_at_alarm,
     update_initial_error_bounds,
@@ -428,7 +428,7 @@ def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, boun
     run_redundancy_tests(redundancy, readings, monitor.config.has_engine_sensors)
     if N_TESTS > N_COMPUTED_TESTS:
         compare_duplicate_sensors(redundancy, readings, measured.fresh)
-        record_agreeing_duplicates(monitor, measured.fresh)
+        latch_agreeing_duplicates(monitor, measured.fresh)
     update_initial_error_bounds(redundancy, initial_errors, readings)
     count_identical_samples_and_find_jump(monitor, readings)
     if memory.substep == 0:
@@ -557,7 +557,7 @@ def isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_reco
     if output.alarmed:
         if memory.substep == 0 and memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
             judge_gyro_errors(monitor, filter_bank, bound_record, dt)
-        record_exceeded_tests(monitor)
+        latch_exceeded_tests(monitor)
         update_cleared_sensors(monitor, measured.signal)
         find_suspects(monitor)
         n_suspects, last_suspect = 0, NO_SENSOR
@@ -683,7 +683,7 @@ def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_index):
 
 
 @kernel
-def record_exceeded_tests(monitor):
+def latch_exceeded_tests(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
     redundancy, tests_exceeded_since_alarm = monitor.redundancy, monitor.memory.tests_exceeded_since_alarm
     for test_index in range(N_TESTS):
@@ -695,7 +695,7 @@ def record_exceeded_tests(monitor):
         )
         if is_exceeded:
             tests_exceeded_since_alarm[test_index] = 1
-    record_refuted_hypotheses(redundancy, monitor.initial_errors, tests_exceeded_since_alarm)
+    latch_refuted_hypotheses(redundancy, monitor.initial_errors, tests_exceeded_since_alarm)
 
 
 @kernel
@@ -736,7 +736,7 @@ def find_suspects(monitor):
 
 
 @kernel
-def record_agreeing_duplicates(monitor, is_fresh):
+def latch_agreeing_duplicates(monitor, is_fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
         agrees_with_duplicate = (

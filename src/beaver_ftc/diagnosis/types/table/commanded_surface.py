@@ -136,7 +136,7 @@ MAX_BIAS_GROWTH_PER_MIN_RUNAWAY_RATE = 1.8
 
 
 @kernel
-def consistent_offset_interval(surface):
+def offset_interval_of_judged_frame(surface):
     """Return the deflection error of the surface in the judged frame, (low, high) rad: unlimited at a stop.
 
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
@@ -166,7 +166,7 @@ def consistent_offset_interval(surface):
 @kernel
 def consistent_bias_interval(config, surface, type_index, k):
     """The offsets that explain this frame."""
-    return consistent_offset_interval(surface)
+    return offset_interval_of_judged_frame(surface)
 
 
 @kernel
@@ -245,43 +245,44 @@ def forget_bias_offset_interval(config, surface, type_index, k):
 
 
 @kernel
-def detect_run_to_stop_and_narrow_offset(config, surface, min_offset, max_offset):
-    """Hold an offset between min_offset and max_offset (rad) against what a slower one can be. A mean over
-    several instants may be that of the last of them."""
+def detect_run_to_stop_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high):
+    """Hold an offset between judged_offset_low and judged_offset_high (rad) against what a slower one can be.
+
+    A mean over several instants may be that of the last of them."""
     memory = surface.growing_bias
-    if max_offset < memory.offset_low:
+    if judged_offset_high < memory.offset_low:
         memory.has_run_towards_stop[0] = 1
-    if min_offset > memory.offset_high:
+    if judged_offset_low > memory.offset_high:
         memory.has_run_towards_stop[1] = 1
-    max_growth_per_frame = (
+    growth_tolerance_within_frame = (
         0.0 if config.frame_shows_single_instant else max_bias_growth_per_frame(config, surface)
     )
     memory.offset_low, memory.offset_high = (
-        max(memory.offset_low, min_offset - max_growth_per_frame),
-        min(memory.offset_high, max_offset + max_growth_per_frame),
+        max(memory.offset_low, judged_offset_low - growth_tolerance_within_frame),
+        min(memory.offset_high, judged_offset_high + growth_tolerance_within_frame),
     )
 
 
 @kernel
 def consistent_growing_bias_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
-    min_offset, max_offset = consistent_offset_interval(surface)
-    if min_offset <= max_offset:
-        detect_run_to_stop_and_narrow_offset(config, surface, min_offset, max_offset)
-    if np.isinf(min_offset) or np.isinf(max_offset):
+    judged_offset_low, judged_offset_high = offset_interval_of_judged_frame(surface)
+    if judged_offset_low <= judged_offset_high:
+        detect_run_to_stop_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high)
+    if np.isinf(judged_offset_low) or np.isinf(judged_offset_high):
         return UNLIMITED_SET
     memory = surface.growing_bias
     memory.min_growth_up, memory.min_growth_down = (
-        max(memory.min_growth_up, min_offset),
-        min(memory.min_growth_down, max_offset),
+        max(memory.min_growth_up, judged_offset_low),
+        min(memory.min_growth_down, judged_offset_high),
     )
     has_grown_up, has_grown_down = memory.min_growth_up > 0.0, memory.min_growth_down < 0.0
-    offset_shrinks = (has_grown_up and max_offset < memory.min_growth_up) or (
-        has_grown_down and min_offset > memory.min_growth_down
+    offset_shrinks = (has_grown_up and judged_offset_high < memory.min_growth_up) or (
+        has_grown_down and judged_offset_low > memory.min_growth_down
     )
     return (
         EMPTY_SET
-        if min_offset > max_offset or (has_grown_up and has_grown_down) or offset_shrinks
+        if judged_offset_low > judged_offset_high or (has_grown_up and has_grown_down) or offset_shrinks
         else UNLIMITED_SET
     )
 

@@ -665,18 +665,18 @@ def max_inertia_coefficient_errors(inertia_tolerance: float, mass: MassPropertie
     corner.
     """
     nominal_coefficients = np.array(inertia_coefficients(mass))
-    max_coefficient_change = np.zeros(12)
+    max_coefficient_changes = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
         changed_inertias = {
             inertia_name: getattr(mass, inertia_name) * (1 + inertia_tolerance * sign)
             for inertia_name, sign in zip(_INERTIA_NAMES, signs, strict=True)
         }
         changed_coefficients = np.array(inertia_coefficients(replace(mass, **changed_inertias)))
-        max_coefficient_change = np.maximum(
-            max_coefficient_change, np.abs(changed_coefficients - nominal_coefficients)
+        max_coefficient_changes = np.maximum(
+            max_coefficient_changes, np.abs(changed_coefficients - nominal_coefficients)
         )
-    max_coefficient_change.flags.writeable = False  # kept: the same for every flight of a design
-    return max_coefficient_change
+    max_coefficient_changes.flags.writeable = False  # kept: the same for every flight of a design
+    return max_coefficient_changes
 
 
 def configure_uncertainty_bound(
@@ -705,10 +705,10 @@ def fill_declared_errors(
     declared_errors: np.void, declared: Declared, design: np.void, mass: MassProperties
 ) -> None:
     """Fill the declared errors; design, mass: record and mass properties of the design model."""
-    coefficient_tolerance = declared.coefficients.absolute(
+    coefficient_tolerances = declared.coefficients.absolute(
         declared.aircraft.moments, design["moments"]["value"]
     )
-    declared_errors["coefficient_tolerance"][: coefficient_tolerance.size] = coefficient_tolerance
+    declared_errors["coefficient_tolerance"][: coefficient_tolerances.size] = coefficient_tolerances
     declared_errors["inertia_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
     declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
     sensor_errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
@@ -846,8 +846,8 @@ def model_error_std(
     nominal_acceleration = _design_acceleration_at_zero_rates(design, y, u)
     air_data_error_vectors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
     acceleration_deviations = [
-        _design_acceleration_at_zero_rates(design, y + error, u) - nominal_acceleration
-        for error in air_data_error_vectors
+        _design_acceleration_at_zero_rates(design, y + air_data_error_vector, u) - nominal_acceleration
+        for air_data_error_vector in air_data_error_vectors
     ]
     acceleration_deviations += [
         _design_acceleration_at_zero_rates(design, y, u + deflection_rad * e) - nominal_acceleration

@@ -560,21 +560,21 @@ def decide_isolation(isolation, t):
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
     one that has been the only one left for less than `isolation_hold_off_s`.
     """
-    n_not_excluded, remaining_estimator, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
+    n_not_excluded, remaining_estimator_index, last_exclusion_s = 0, NOT_ISOLATED, -np.inf
     for estimator_index, fie in enumerate(isolation.estimator[: isolation.config.n_estimators]):
         if fie.excluded:
             last_exclusion_s = max(last_exclusion_s, fie.excluded_at_s)
         else:
             n_not_excluded += 1
-            remaining_estimator = (
+            remaining_estimator_index = (
                 NOT_ISOLATED if fie.weakly_excluded and not fie.confirmed_by_likelihood else estimator_index
             )
     if t - last_exclusion_s < isolation.config.isolation_hold_off_s:
-        remaining_estimator = NOT_ISOLATED
+        remaining_estimator_index = NOT_ISOLATED
     return (
         NOT_ISOLATED
         if n_not_excluded > 1
-        else (remaining_estimator if n_not_excluded == 1 else UNANTICIPATED)
+        else (remaining_estimator_index if n_not_excluded == 1 else UNANTICIPATED)
     )
 
 

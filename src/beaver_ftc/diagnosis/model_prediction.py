@@ -229,24 +229,27 @@ def add_instant_to_frame(prediction, bound_record, layout, diagnoses_all_types, 
 
 @kernel
 def predict_acceleration(prediction, include_known_faults, effectiveness, deflection_bias, include_biases):
-    """Fill `acceleration` (3,) rad/s2: mean of f + G u over the elapsed frame, with the faults if
-    `include_known_faults`.
+    """Fill `acceleration_with_known_faults` (3,) rad/s2: mean of f + G u over the elapsed frame, with the
+    faults if `include_known_faults`.
 
     effectiveness (n,): estimate for each surface; deflection_bias (n,) rad: its bias, used if
     `include_biases`.
     """
-    acceleration, frame_means = prediction.acceleration_with_known_faults, prediction.frame_means
-    acceleration[:] = frame_means.acceleration
+    acceleration_with_known_faults, frame_means = (
+        prediction.acceleration_with_known_faults,
+        prediction.frame_means,
+    )
+    acceleration_with_known_faults[:] = frame_means.acceleration
     if not include_known_faults:
         return
     for s in range(effectiveness.size):
         lost_effectiveness_share = 1.0 - effectiveness[s]
         for i in range(3):
-            acceleration[i] -= lost_effectiveness_share * frame_means.Gu[i, s]
+            acceleration_with_known_faults[i] -= lost_effectiveness_share * frame_means.Gu[i, s]
     if include_biases:
         for s in range(deflection_bias.size):
             for i in range(3):
-                acceleration[i] += frame_means.G[i, s] * deflection_bias[s]
+                acceleration_with_known_faults[i] += frame_means.G[i, s] * deflection_bias[s]
 
 
 @kernel

@@ -550,30 +550,38 @@ def accumulate_regressor_correlation(
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
     correlation_weight = onset_tests.correlation_weight
-    correlation_bound = onset_tests.correlation_bound_by_coefficient_errors
+    correlation_bound_by_coefficient_errors = onset_tests.correlation_bound_by_coefficient_errors
     regressor_response, regressor_tolerance = block.regressor_response, block.regressor_tolerance
     n_regressors = block.n_regressors
-    correlation_bound[:n_tests] = 0.0
+    correlation_bound_by_coefficient_errors[:n_tests] = 0.0
     for j in range(0, n_regressors - 1, 2):
         response_a0 = regressor_response[j, 0]
         response_a1 = regressor_response[j, 1]
         response_b0 = regressor_response[j + 1, 0]
         response_b1 = regressor_response[j + 1, 1]
-        correlation_a, correlation_b = regressor_correlation[j], regressor_correlation[j + 1]
+        correlations_a, correlations_b = regressor_correlation[j], regressor_correlation[j + 1]
         tolerance_a, tolerance_b = regressor_tolerance[j], regressor_tolerance[j + 1]
         for k in range(n_tests):
             weight_0, weight_1 = correlation_weight[0, k], correlation_weight[1, k]
-            R_a = evidence_decay_factor * correlation_a[k] + (weight_0 * response_a0 + weight_1 * response_a1)
-            R_b = evidence_decay_factor * correlation_b[k] + (weight_0 * response_b0 + weight_1 * response_b1)
-            correlation_a[k], correlation_b[k] = R_a, R_b
-            correlation_bound[k] = correlation_bound[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+            R_a = evidence_decay_factor * correlations_a[k] + (
+                weight_0 * response_a0 + weight_1 * response_a1
+            )
+            R_b = evidence_decay_factor * correlations_b[k] + (
+                weight_0 * response_b0 + weight_1 * response_b1
+            )
+            correlations_a[k], correlations_b[k] = R_a, R_b
+            correlation_bound_by_coefficient_errors[k] = (
+                correlation_bound_by_coefficient_errors[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+            )
     for j in range(n_regressors - n_regressors % 2, n_regressors):
         response_0, response_1 = regressor_response[j, 0], regressor_response[j, 1]
         for k in range(n_tests):
             regressor_correlation[j, k] = evidence_decay_factor * regressor_correlation[j, k] + (
                 correlation_weight[0, k] * response_0 + correlation_weight[1, k] * response_1
             )
-            correlation_bound[k] += regressor_tolerance[j] * abs(regressor_correlation[j, k])
+            correlation_bound_by_coefficient_errors[k] += regressor_tolerance[j] * abs(
+                regressor_correlation[j, k]
+            )
 
 
 @kernel
@@ -735,16 +743,16 @@ def evaluate_hypotheses(block, upper_bound_decay_factor=0.0, has_error_map=False
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]
         first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
-        score, best_llr, likeliest_test_index = 0.0, -1.0, -1
-        llr_lower_bound, llr_upper_bound = 0.0, upper_bound_decay_factor * hypothesis.llr_upper_bound
+        max_score, best_llr, likeliest_test_index = 0.0, -1.0, -1
+        max_llr_lower_bound, max_llr_upper_bound = 0.0, upper_bound_decay_factor * hypothesis.llr_upper_bound
         for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
-            score = max(score, onset_tests.score[k])
-            llr_lower_bound = max(llr_lower_bound, onset_tests.llr_lower_bound[k])
-            llr_upper_bound = max(llr_upper_bound, onset_tests.llr_upper_bound[k])
+            max_score = max(max_score, onset_tests.score[k])
+            max_llr_lower_bound = max(max_llr_lower_bound, onset_tests.llr_lower_bound[k])
+            max_llr_upper_bound = max(max_llr_upper_bound, onset_tests.llr_upper_bound[k])
             if onset_tests.llr[k] > best_llr:
                 best_llr, likeliest_test_index = onset_tests.llr[k], k
-        hypothesis.score = score
-        hypothesis.llr_lower_bound, hypothesis.llr_upper_bound = llr_lower_bound, llr_upper_bound
+        hypothesis.score = max_score
+        hypothesis.llr_lower_bound, hypothesis.llr_upper_bound = max_llr_lower_bound, max_llr_upper_bound
         if likeliest_test_index >= 0:
             N = onset_tests.correlation[likeliest_test_index]
             D = onset_tests.information[likeliest_test_index]

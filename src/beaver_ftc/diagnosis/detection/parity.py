@@ -421,12 +421,12 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
 def innovation_component(view, forces, gust, inertial_gust, innovation, component):
     """One component of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if component < SIDE_FORCE:
-        gust_acceleration = 0.0
+        mean_gust_acceleration = 0.0
         if subtracts_gust_estimate(view, gust):
-            gust_acceleration = gust_estimate_of_view(
+            mean_gust_acceleration = gust_estimate_of_view(
                 view, gust, inertial_gust
             ).output.mean_gust_acceleration[component]
-        return innovation[component] - gust_acceleration
+        return innovation[component] - mean_gust_acceleration
     force_record = forces.component[component - SIDE_FORCE]
     return (
         force_record.innovation_at_inertial_flow_angle
@@ -769,13 +769,13 @@ def vane_confirmed_score(view, views, test_config, forces, gust):
         return 0.0
     if view.is_immune_to_vane_error or not (uses_force(view) or subtracts_gust_estimate(view, gust)):
         return max_test_score_of_view(view)
-    confirming_score = 0.0
+    max_confirming_peak_score = 0.0
     for other_view in views:
         if other_view.is_immune_to_vane_error and other_view.plane_axes[1] == view.confirming_force_component:
-            confirming_score = max(confirming_score, other_view.decaying_peak_score)
+            max_confirming_peak_score = max(max_confirming_peak_score, other_view.decaying_peak_score)
     return min(
         view.decaying_peak_score,
-        confirming_score * test_config.alarm_level / np.sqrt(2.0 * test_config.isolation_llr_margin),
+        max_confirming_peak_score * test_config.alarm_level / np.sqrt(2.0 * test_config.isolation_llr_margin),
     )
 
 

@@ -320,11 +320,11 @@ def gust_speed_and_change_bounds(
         turbulence.sigma_mps,
         turbulence.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
     )
-    variance_per_intensity_s = [
+    variances_per_intensity_s = [
         sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S
     ]
     return GUST_LIMIT_SIGMA * sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(
-        velocity_walk_intensity * np.array(variance_per_intensity_s)
+        velocity_walk_intensity * np.array(variances_per_intensity_s)
     )
 
 
@@ -750,7 +750,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
             error_change_bound[vane_index],
             second_order_factor * flow_rate_error_bound,
         )
-    tilt_error_bound, max_recent_acceleration = (
+    previous_tilt_error_bound_sum, max_recent_acceleration = (
         previous_error_bound[PHI] + previous_error_bound[THETA],
         max(
             max_acceleration,
@@ -759,7 +759,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         ),
     )
     climb_rate_error_bound = (previous_reading[AIRSPEED] + previous_error_bound[AIRSPEED]) * (
-        tilt_error_bound + previous_vane_error_bound_sum
+        previous_tilt_error_bound_sum + previous_vane_error_bound_sum
     ) + previous_error_bound[AIRSPEED]
     tests[CLIMB_TEST].bound_per_s = (
         config.max_vertical_wind_mps

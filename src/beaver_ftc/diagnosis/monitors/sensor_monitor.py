@@ -623,15 +623,15 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
     for i in range(3):
         if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
-        apparent_error, previous_apparent_error = (
+        apparent_gyro_error, previous_apparent_gyro_error = (
             memory.apparent_gyro_error[i],
             memory.previous_apparent_gyro_error[i],
         )
-        jump_acceleration = (apparent_error - previous_apparent_error) / dt  # rad/s2
+        jump_acceleration = (apparent_gyro_error - previous_apparent_gyro_error) / dt  # rad/s2
         jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
-            abs(apparent_error), abs(previous_apparent_error)
+            abs(apparent_gyro_error), abs(previous_apparent_gyro_error)
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
-        attitude_noise_bound = (  # of apparent_error, rad/s, by the attitude's noise
+        attitude_noise_bound = (  # of apparent_gyro_error, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
@@ -645,7 +645,9 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         transient_peak, remaining_peak = (
             memory.earlier_substep_gyro_error_peak[i],
             max(
-                abs(previous_apparent_error), memory.previous_substep_gyro_error_peak[i], abs(apparent_error)
+                abs(previous_apparent_gyro_error),
+                memory.previous_substep_gyro_error_peak[i],
+                abs(apparent_gyro_error),
             ),
         )
         is_transient = (
@@ -657,7 +659,7 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
             <= innovation_bound + jump_acceleration_tolerance + attitude_noise_bound / dt
         )
         W_follows_error = (
-            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_error)
+            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_gyro_error)
             <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + attitude_noise_bound
         )
         if not innovation_fits or (not dynamics_show_error and (is_transient or not W_follows_error)):

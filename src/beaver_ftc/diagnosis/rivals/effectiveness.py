@@ -197,13 +197,13 @@ class AugmentedUkf(EffectivenessFilter):
         dt, f = self.context.dt_s, self.context.model.f
         propagated_points = state_points.copy()
         f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
-        loss_acceleration = np.array(
+        loss_accelerations = np.array(
             [
                 measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES_WITHOUT_GUSTS]
                 for point in state_points
             ]
         )
-        propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_acceleration)
+        propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_accelerations)
         if self.gust_states.n_states:
             propagated_points[:, :3] += (
                 state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T

@@ -75,8 +75,8 @@ def sigma_points(z: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.
     dimension.
     """
     n_states = len(z)
-    scaled_root = _matrix_root(point_spread * P).T
-    state_points = np.concatenate((z[None], z + scaled_root, z - scaled_root))
+    point_offsets = _matrix_root(point_spread * P).T
+    state_points = np.concatenate((z[None], z + point_offsets, z - point_offsets))
     point_weights = np.full(2 * n_states + 1, 0.5 / point_spread)
     point_weights[0] = 1.0 - n_states / point_spread
     return state_points, point_weights

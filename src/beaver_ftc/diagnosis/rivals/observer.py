@@ -47,27 +47,27 @@ class SurfaceFit:
         theta_by_surface = np.clip(
             self.cross_sums / np.maximum(self.regressor_square_sums, 1e-300), -1.0, 0.0
         )
-        misfit_by_surface = (
+        misfit_square_sum_by_surface = (
             self.residual_square_sum
             - 2.0 * theta_by_surface * self.cross_sums
             + theta_by_surface**2 * self.regressor_square_sums
         )
-        best_surface_index = int(np.argmin(misfit_by_surface))
+        best_surface_index = int(np.argmin(misfit_square_sum_by_surface))
         return (
             best_surface_index,
             float(theta_by_surface[best_surface_index]),
-            float(misfit_by_surface[best_surface_index] / (3.0 * self.weight_sum)),
+            float(misfit_square_sum_by_surface[best_surface_index] / (3.0 * self.weight_sum)),
         )
 
 
 def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
     declared, dt = context.declared, context.dt_s
-    model_error_std = (
+    residual_std_by_model_error = (
         np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - decay_factor)
     )
     gust_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
-    gust_std = (
+    residual_std_by_gust = (
         dt
         * declared.turbulence_rad_s2
         * np.sqrt(
@@ -75,8 +75,8 @@ def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
             / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * gust_correlation))
         )
     )
-    gyro_std = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
-    return np.sqrt(model_error_std**2 + gust_std**2 + gyro_std**2)
+    residual_std_by_gyro = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
+    return np.sqrt(residual_std_by_model_error**2 + residual_std_by_gust**2 + residual_std_by_gyro**2)
 
 
 class ConstantThresholdObserver:
@@ -132,7 +132,7 @@ class ConstantThresholdObserver:
         self.surface_fit.step(
             self.residual_since_alarm / self.threshold, self.filtered_effects / self.threshold[:, None]
         )
-        surface_index, theta, misfit = self.surface_fit.fit_best_surface()
-        if misfit > 1.0:
+        surface_index, theta, mean_misfit_square = self.surface_fit.fit_best_surface()
+        if mean_misfit_square > 1.0:
             return Verdict(True, self.alarm_axis, "unanticipated", "unanticipated")
         return Verdict(True, self.alarm_axis, self.leaders[surface_index], "loss_of_effectiveness", theta)

@@ -161,16 +161,18 @@ class Vehicle(Section):
     signals: list[QuantityColumnOrName] = Field(
         default=[],
         max_length=12,
-        description="columns of further measured quantities from which the model predicts the body rates",
+        description="columns of other measured quantities. With rates and commands, the model predicts the "
+        "next body rates from them",
         examples=[["roll_rad", "pitch_rad"]],
     )
     surfaces: dict[str, dict[str, Number]] = Field(
         min_length=1,
         max_length=20,
         description="mixer of the autopilot: the deflection of each healthy surface is a sum of commands, "
-        "each multiplied by a weight. The numbers are the weights",
+        "each multiplied by a weight. The numbers are the weights. The positive sense of each deflection "
+        "is your choice, for example that of its servo",
         json_schema_extra={"unit": "1", "range": "any"},
-        examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": 0.5}}],
+        examples=[{"left": {"roll_cmd": 0.5, "pitch_cmd": -0.5}}],
     )
     labels: dict[str, QuantityColumnOrName] = Field(
         default={},
@@ -217,9 +219,9 @@ class Vehicle(Section):
     reference_airspeed_mps: Number | None = Field(
         default=None,
         gt=0,
-        description="airspeed V0 at which a command has its full effect. Each command is multiplied by "
-        "(airspeed / V0)^n, with the exponent n from `airspeed_powers`; left out: `identify` chooses V0 "
-        "if this improves the fit",
+        description="airspeed V0 of the factor (airspeed / V0)^n on each command. The exponent n is in "
+        "`airspeed_powers`; left out: `identify` uses a factor, with a V0 of its own choice, only if this "
+        "improves the fit",
         json_schema_extra={"unit": "m/s"},
         examples=[20.0],
     )
@@ -242,7 +244,7 @@ class Vehicle(Section):
         le=MAX_SETTABLE_FALSE_ALARMS_PER_HOUR,
         unit="1/h",
         says="accepted number of false alarms in each hour of healthy flight; left out: 1 for logs without "
-        "labels",
+        "labels. For logs with labels no rate is set",
         examples=[2],
     )
     faults: list[FaultKind] = Field(

@@ -55,7 +55,7 @@ class OutputSection(Section):
 
     channel: Whole = Field(ge=1, le=MOST_CHANNELS, examples=[1])
     share: Annotated[Number, Field(ge=-1, le=1), AfterValidator(_not_nothing)] = number(
-        1.0, "share of 1", examples=[-1]
+        1.0, "1", examples=[-1]
     )
     reversed: Flag = False
     pwm_us: Annotated[tuple[_Pulse, _Pulse], AfterValidator(_in_order)] = number(
@@ -267,7 +267,7 @@ class EnvelopeSection(Section):
     altitude_m: Interval | None = entry(None, examples=[[0, 3000]])
 
 
-_Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "share of 1"})]
+_Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "1"})]
 
 
 class TrimSection(Section):
@@ -346,7 +346,7 @@ class ThrustSection(Section):
     force_n: tuple[_Forces, ...] = number(
         ...,
         "N",
-        range="not falling in a row",
+        range="one row for each airspeed, rising or equal in a row",
         max_length=MAX_THRUST,
         examples=[[[-100, 900, 2000], [-300, 500, 1500]]],
     )
@@ -428,8 +428,8 @@ class ErrorBox(Section):
     error_p_rad_s2: largest error of the roll acceleration, rad/s2
     error_q_rad_s2: largest error of the pitch acceleration, rad/s2
     error_r_rad_s2: largest error of the yaw acceleration, rad/s2
-    engines_apart: largest magnitude of the yawing moment coefficient Cn of running engines with equal levers.
-    The moment of their thrust is not included; left out: unknown
+    engines_apart: largest magnitude of Cn, the yawing moment coefficient, that the running engines
+    cause when all levers are equal. The moment of their thrust is not included; left out: unknown
     """
 
     airspeed_mps: Range = entry(..., examples=[[40, 50]])
@@ -470,8 +470,8 @@ class ErrorMapSection(Section):
     stand_ins: Number = number(
         1.0,
         unit="share of 1",
-        says="factor on `travel_share` for stand-ins, the surfaces that only replace other surfaces. The "
-        "last share has no factor",
+        says="factor for stand-ins, the surfaces that only replace other surfaces. For them, each part in "
+        "`travel_share` except the last is multiplied by this factor",
         gt=0,
         le=1,
     )
@@ -503,7 +503,9 @@ class ErrorMapSection(Section):
 
 
 class StartSection(Section):
-    """Flight condition at the start, if the scenario has no other."""
+    """Flight condition at the start, if the scenario has no other. Without an airspeed here, flights start at
+    45 m/s if `envelope` contains this airspeed, otherwise in the middle of the envelope. Without an altitude
+    here, they start at 1828.8 m."""
 
     airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
     altitude_m: Number | None = number(
@@ -543,7 +545,7 @@ class DamageSection(Section):
 
 
 class AircraftFile(Section):
-    """An aircraft.
+    """Name, JSBSim model and sections of one aircraft.
 
     jsbsim: file name of the JSBSim model, in the same folder
     groups: groups of surfaces that can replace each other. A surface is replaced by the next surface of its

@@ -149,7 +149,9 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 
 class Initial(Section):
-    """The flight condition at the start: trimmed straight flight with wings level."""
+    """The flight condition at the start: trimmed straight flight with wings level. The settings of the engine
+    and the deflections of surfaces are those of the Beaver. Another aircraft has the names in
+    `engine.settings` of its aircraft file, and the surfaces that its trim does not move."""
 
     airspeed_mps: Number = number(
         45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70
@@ -274,7 +276,8 @@ PRESETS: dict[str, dict[str, float]] = {
 
 class Actuators(Section, extra="allow"):
     """Dynamics of the actuators. A preset, or a key directly in this section, applies to all surfaces. A key
-    in the section of a surface applies only to this surface, and replaces the common value."""
+    in the section of a surface applies only to this surface, and replaces the common value. The surfaces
+    below are those of the Beaver. For another aircraft, use the names of its surfaces."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
 
@@ -383,6 +386,7 @@ class Environment(Section):
     ) = entry(
         None,
         "one gust, or a list of gusts that do not overlap",
+        examples=[[{"at_s": 10, "velocity_mps": [0, 0, -3]}]],
     )
 
     @property

@@ -140,11 +140,11 @@ class Bounds(Section, strict=True):
     altitude and climb, m/s
     """
 
-    inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1")
+    inertia_coupling: PerAxis = number(PerAxis(p=0.25, q=0.25, r=0.25), "share of 1", examples=[{"p": 0.1}])
     constant_rad_s2: PerAxis = entry(PerAxis(p=0.02, q=0.02, r=0.02))
     coefficients: Share | dict[str, Share] = number(0.0, "share of 1", examples=[0.05])
     inertia: Share = number(0.0, "share of 1", examples=[0.05])
-    sensors: BoundedSensors = entry(Sensors)
+    sensors: BoundedSensors = entry(Sensors, examples=["tactical-grade"])
     deflection_deg: Deflection = entry(0.0, examples=[0.2])
     turbulence: Severity = "none"
     vertical_wind_mps: float = entry(1.0, ge=0, le=100, examples=[3])
@@ -202,8 +202,8 @@ class Sharpen(Section, strict=True):
     )
     set_membership: bool = entry(
         True,
-        "with `fault_profile: abrupt`, a value of the parameter stays possible only if it explains every "
-        "frame",
+        "only with `fault_profile: abrupt`: a value of the parameter is excluded as soon as one frame "
+        "contradicts it",
     )
 
     @model_validator(mode="before")
@@ -246,10 +246,10 @@ class FdiConfig(Section, strict=True):
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant with which the estimates forget old data. It should be longer than one
     period of the reference, s
-    sharpen: steps beyond the published scheme. `all` and `none` switch all steps; the section switches each
-    step
-    pole_bank_per_s: poles of the further detection filters. With the default pole, a filter uses only the
-    last frame, 1/s
+    sharpen: steps beyond the published scheme. `all`: every step is on. `none`: every step is off. A section
+    switches single steps
+    pole_bank_per_s: poles of the detection filters after the first. The default is so large that the filter
+    uses only the last frame, 1/s
     fault_profile: assumption about the parameter of a fault, for example its size. `any`: the parameter can
     change with time. `abrupt`: the parameter is constant from the start of the fault
     """
@@ -263,15 +263,15 @@ class FdiConfig(Section, strict=True):
     sensor_monitor: Literal["auto", "always", "never"] = "auto"
     slowest_oscillation_rad_s: float = entry(1.0, gt=0, le=100)
     slowest_rate_deg_s: float = entry(0.5, gt=0, le=100)
-    probing: Probing | None = None
-    statistical: Statistical | None = None
+    probing: Probing | None = entry(None, examples=[{}])
+    statistical: Statistical | None = entry(None, examples=[{}])
     authority: Literal["either", "worst-case", "statistical"] = "either"
     thresholds: Literal["interval", "published"] = "interval"
     detection_pole_per_s: float = entry(10.0, gt=0, le=1000)
     isolation_pole_per_s: float = entry(10.0, gt=0, le=1000)
     forgetting_time_s: float = entry(5.0, gt=0, le=3600)
     bounds: Bounds = Bounds()
-    sharpen: Sharpen = entry(Sharpen())
+    sharpen: Sharpen = entry(Sharpen(), examples=["none"])
     pole_bank_per_s: Annotated[tuple[Pole, ...], Strict(False)] = entry(
         (DEADBEAT_PER_S,), max_length=MAX_POLES - 1, examples=[[20, 100]]
     )

@@ -275,7 +275,11 @@ class Change(Section):
     scheme: Scheme | None = entry(
         None, "new scheme, as in `fdi.scheme`. The diagnosis restarts", examples=["zhang2005"]
     )
-    sensors: Sensors | None = entry(None, "new sensor errors, as in `sensors`")
+    sensors: Sensors | None = entry(
+        None,
+        "new sensor errors, as in `sensors`. If sensor errors are declared, the diagnosis restarts",
+        examples=["tactical-grade"],
+    )
     declared_sensors: BoundedSensors | None = entry(
         None, "new declared sensor errors, as in `fdi.bounds.sensors`. The diagnosis restarts"
     )
@@ -410,7 +414,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
     faults: tuple[Fault, ...] = entry((), max_length=MOST_FAULTS)
     uncertainty: Uncertainty = entry(cache(Uncertainty))
     actuators: Actuators = entry(Actuators)
-    sensors: Sensors = entry(cache(Sensors))
+    sensors: Sensors = entry(cache(Sensors), examples=["tactical-grade"])
     environment: Environment = entry(cache(Environment))
     fdi: FdiConfig = entry(cache(FdiConfig))
     control: ControlConfig = entry(cache(ControlConfig))

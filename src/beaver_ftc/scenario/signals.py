@@ -366,7 +366,12 @@ class Reference(Section):
     """Commanded body rates. If an axis has several signals, they are added. If an axis has no signal, its
     command is 0."""
 
-    p: Signals = entry((), "signals of the roll rate", max_length=50)
+    p: Signals = entry(
+        (),
+        "signals of the roll rate",
+        max_length=50,
+        examples=[[{"sine": {"amplitude_deg_s": 3, "frequency_hz": 0.2}}]],
+    )
     q: Signals = entry((), "signals of the pitch rate", max_length=50)
     r: Signals = entry((), "signals of the yaw rate", max_length=50)
 
@@ -425,27 +430,40 @@ class _Leg(Section):
 class AltitudeLeg(_Leg):
     """A commanded altitude. The command moves to it at a constant rate of climb or descent."""
 
-    value: Number | None = number(None, "m", "altitude above sea level", ge=-300, le=6000, examples=[1900])
+    value: Number | None = number(
+        None,
+        "m",
+        "altitude above sea level. Required, unless `hold: true` is given",
+        ge=-300,
+        le=6000,
+        examples=[1900],
+    )
     climb_mps: Number = number(2.5, "m/s", "rate of climb or descent of the command", gt=0, le=10)
 
 
 class AirspeedLeg(_Leg):
     """A commanded airspeed. The command moves to it at a constant acceleration."""
 
-    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
+    value: Number | None = number(
+        None, "m/s", "true airspeed. Required, unless `hold: true` is given", ge=20, le=70, examples=[45]
+    )
     change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
 
 
 class HeadingLeg(_Leg):
     """A commanded true heading. The aircraft takes the shorter turn."""
 
-    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
+    value: Number | None = number(
+        None, "deg", "true heading. Required, unless `hold: true` is given", ge=-360, le=360, examples=[90]
+    )
 
 
 class BankLeg(_Leg):
     """A commanded bank angle, positive with the right wing down."""
 
-    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
+    value: Number | None = number(
+        None, "deg", "bank angle. Required, unless `hold: true` is given", ge=-45, le=45, examples=[20]
+    )
 
 
 @lru_cache

@@ -229,6 +229,7 @@ def _without_unit(says: str, units: list[str]) -> str:
 def _type(key: Key) -> str:
     if key.sections:
         kinds = [kind for form in key.forms if (kind := _type_of(form)) in ("choice", "text")]
+        kinds += ["choice"] * bool(key.words)
         names = [f"[{_called(title)}](#{_anchor(title)})" for title in key.sections]
         below = f"[section](#{_anchor(key.sections[0])})" if len(names) == 1 else "one of " + ", ".join(names)
         several = any(form.get("type") == "array" for form in key.forms)
@@ -278,7 +279,8 @@ def _range(key: Key) -> str:
         if f"max{of}" in form and "prefixItems" not in form:
             rows = any(one.get("type") == "array" for one in form.get("items", {}).get("anyOf", ()))
             what = "rows" if rows else "of them"
-            said.append(f"{form.get(f'min{of}', 0)} to {form[f'max{of}']} {what}")
+            least = form.get(f"min{of}")
+            said.append(f"{f'{least} to' if least else 'up to'} {form[f'max{of}']} {what}")
     return ", ".join(said)
 
 
@@ -455,7 +457,8 @@ KINDS = {
         "Vehicle file keys",
         "Which keys can a vehicle file have? The file states which column of a flight log contains which "
         "quantity ([prepare a log](how-to/flight-logs.md)). The command `identify --check` proposes a first "
-        "version. This page is for readers who complete this version.",
+        "version, and `beaver-ftc new NAME --log` writes an example. This page is for readers who "
+        "complete this version.",
         "The log of a small flying wing is a table with the columns `time_ms`, `gyro_x`, `gyro_y`, `gyro_z`, "
         "`roll_cmd`, `pitch_cmd`, `roll_deg`, `pitch_deg`, `airspeed_kmh` and `altitude_m`. The wing has two "
         "elevons, `right` and `left`. Its file can be:",

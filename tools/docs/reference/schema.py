@@ -63,7 +63,13 @@ class Key:
     def choices(self) -> tuple[Any, ...]:
         """The values that may stand here, where they are few."""
         each = (one.get("enum", [one["const"]] if "const" in one else []) for one in self.scalars)
-        return tuple(choice for choices in each for choice in choices)
+        return (*(choice for choices in each for choice in choices), *self.words)
+
+    @property
+    def words(self) -> tuple[Any, ...]:
+        """The words that may stand in place of a section."""
+        branches = (one for form in self.forms if "properties" in form for one in form.get("anyOf", ()))
+        return tuple(word for one in branches for word in one.get("enum", ()))
 
     def unit(self, place: Place) -> str:
         """Of its numbers: as declared, or as declared of the section, or read off the name."""

@@ -85,6 +85,12 @@ def beaver_mass() -> str:
     mass, geometry, envelope = aircraft.mass, aircraft.geometry, aircraft.envelope
     low, high = (math.degrees(angle) for angle in aircraft.alpha_rad)
     slow, fast = envelope.airspeed_mps
+    settings = aircraft.file.engine.settings
+    engine = [
+        (f"{setting.says}, {end}", f"{limit:g}", setting.unit)
+        for setting in settings.values()
+        for end, limit in zip(("least", "largest"), setting.range, strict=True)
+    ]
     rows = [
         ("mass", f"{mass.mass_kg:.0f}", "kg"),
         ("moment of inertia about roll, $I_x$", f"{mass.Ix_kg_m2:.0f}", "kg m²"),
@@ -94,6 +100,7 @@ def beaver_mass() -> str:
         ("wing area", f"{geometry.wing_area_m2:.2f}", "m²"),
         ("span", f"{geometry.span_m:.2f}", "m"),
         ("mean chord", f"{geometry.chord_m:.3f}", "m"),
+        *engine,
         ("validated airspeed, least", f"{slow:g}", "m/s"),
         ("validated airspeed, largest", f"{fast:g}", "m/s"),
         ("validated angle of attack, least", f"{low:.1f}", "deg"),

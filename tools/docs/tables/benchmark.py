@@ -70,11 +70,13 @@ def benchmark_gains() -> str:
     last = [row["again"][-1] for row in rows]
     kept = sum(again.get("gain") == 0.0 for again in last)
     none = [f"`{row['name']}` on `{row['grade']}`" for row in rows if "gain" not in row["again"][-1]]
+    other = len(rows) - kept - len(none)
     largest = max(again.get("gain", 0.0) for again in last)
     says = [
         f"The table does not contain searches that found no better values. There are {len(rows)} pairs of "
         f"method and grade. For {kept} of them, the last search found no values that cost at least 5 % less.",
         f"For {', '.join(none)}, no values were admissible.",
+        f'For the other {other}, the last search found other values (rows with "no").',
         f"The largest gain of a last search is {100.0 * largest:.1f} %.",
         'After each row with "yes", a further search followed.',
     ]

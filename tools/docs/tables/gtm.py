@@ -91,7 +91,8 @@ def gtm_flights() -> str:
         rows.append([name, *(f"{share:.2f}" for share in differ)])
     head = ("flight", "integrator 1 kHz, %", "integrator 200 Hz, %", "gravity, %")
     _draw()
-    return markdown_table(head, rows) + f"\n\n![Eight flights by both]({PICTURE})"
+    alt = "Airspeed and body rates of eight flights: specification and JSBSim at 1 kHz"
+    return markdown_table(head, rows) + f"\n\n![{alt}]({PICTURE})"
 
 
 def _draw() -> None:

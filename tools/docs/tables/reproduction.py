@@ -96,7 +96,8 @@ CAPTIONS = {  # of each figure: what it shows, what its axes are, and what to se
     ),
     SENSITIVITY: (
         "How far each number stays from its limit",
-        "One row for each statement. Horizontal: ratio of number and limit, logarithmic, no unit",
+        "One row for each of the 59 statements with a number. Horizontal: ratio of number and limit, "
+        "logarithmic, no unit",
         "Left of 1 the number keeps its limit",
     ),
 }

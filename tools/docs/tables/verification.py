@@ -19,7 +19,7 @@ def verification_map_probe() -> str:
     return _surveyed(speeds_mps=(44.0,), altitudes_m=(1000.0,))
 
 
-COUNTED = ("points", "best point, %", "worst point, %")
+COUNTED = ("conditions", "best condition, %", "worst condition, %")
 SCALES = (0.5, 2.0)  # of the references of `fault-free`
 
 
@@ -31,7 +31,7 @@ def _surveyed(**where: Any) -> str:
 
 def _map_of(rows: list[dict[str, Any]]) -> str:
     head = (
-        "loss of", "references times", "points",
+        "loss of", "references times", "conditions",
         *(f"{when}: {of}" for when in ("every instant", "half of the instants") for of in COUNTED),
     )  # fmt: skip
     faults = dict.fromkeys(row["fault"] for row in rows)

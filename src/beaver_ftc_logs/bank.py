@@ -84,27 +84,27 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     n_surfaces_with_hypotheses = sum(len(model.groups[group_index]) for group_index in groups_with_hypotheses)
     may_surfaces_be_stuck = "stuck" in model.vehicle.faults
     has_pair_hypotheses = len(groups_with_hypotheses) > 1
-    single_fault_share = (
+    single_fault_transition_share = (
         1.0
         - (_PAIR_LOSS_TRANSITION_SHARE if has_pair_hypotheses else 0.0)
         - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_surfaces_be_stuck else 0.0)
     )
     for group_index in groups_with_hypotheses:
         levels, level_shares = _effectiveness_levels_and_prior_shares(model, group_index)
-        group_fault_share = (
-            single_fault_share
+        group_transition_share_per_fault_kind = (
+            single_fault_transition_share
             * len(model.groups[group_index])
             / n_surfaces_with_hypotheses
             / len(model.vehicle.faults)
         )
-        for offset_variance in _rate_offset_variance_per_fault_kind(model, group_index):
+        for rate_offset_variance in _rate_offset_variance_per_fault_kind(model, group_index):
             for level, level_share in zip(levels, level_shares, strict=True):
                 hypothesis_rows.append(
                     (
                         _group_effectiveness_row(n_groups, {group_index: level}),
                         GROUP_LOSS,
-                        group_fault_share * level_share,
-                        offset_variance,
+                        group_transition_share_per_fault_kind * level_share,
+                        rate_offset_variance,
                     )
                 )
     hypothesis_rows += _pair_hypotheses(n_groups, groups_with_hypotheses)
@@ -116,7 +116,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
             (np.ones(n_groups), UNKNOWN_OFFSET, _UNKNOWN_OFFSET_TRANSITION_SHARE, unknown_offset_variance)
         )
     hypothesis_rows.append((np.zeros(n_groups), NO_RESPONSE, _NO_RESPONSE_TRANSITION_SHARE, np.zeros(3)))
-    effectiveness, hypothesis_kind, transition_share, offset_variance = (
+    effectiveness, hypothesis_kind, transition_share, rate_offset_variance = (
         np.array(per_hypothesis_values) for per_hypothesis_values in zip(*hypothesis_rows, strict=True)
     )
     transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
@@ -128,7 +128,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
         effectiveness,
         hypothesis_kind,
         transition_share,
-        offset_variance,
+        rate_offset_variance,
         _prior_probabilities(hypothesis_kind, transition_share),
         change_probability_per_sample,
         response_share_scaled_by_group_gain,
@@ -155,11 +155,11 @@ def _effectiveness_levels_and_prior_shares(model: Model, group_index: int) -> tu
     is_labelled_level = np.isin(levels, np.round(labelled_levels, 6))
     if not is_labelled_level.any() or is_labelled_level.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
-    labelled_level_share = settings.share_of_faults_at_likely_levels
+    fault_share_at_labelled_levels = settings.share_of_faults_at_likely_levels
     return levels, np.where(
         is_labelled_level,
-        labelled_level_share / is_labelled_level.sum(),
-        (1.0 - labelled_level_share) / (~is_labelled_level).sum(),
+        fault_share_at_labelled_levels / is_labelled_level.sum(),
+        (1.0 - fault_share_at_labelled_levels) / (~is_labelled_level).sum(),
     )
 
 
@@ -167,18 +167,18 @@ def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
     _, _, command_response, residual_covariance = model.coefficient_arrays()
-    summed_response_sd = np.abs(command_response[group_index]).sum(axis=0) / np.sqrt(
+    summed_response_in_residual_sd = np.abs(command_response[group_index]).sum(axis=0) / np.sqrt(
         np.diag(residual_covariance)
     )
     relative_axis_response = np.clip(
-        summed_response_sd / max(summed_response_sd.max(), MIN_DIVISOR), 0.3, 1.0
+        summed_response_in_residual_sd / max(summed_response_in_residual_sd.max(), MIN_DIVISOR), 0.3, 1.0
     )
-    variance_of_fault_kind = {
+    rate_offset_variance_by_fault_kind = {
         "loss": np.zeros(3),
         "stuck": np.diag(residual_covariance)
         * (model.settings.jam_rate_offset_sd * relative_axis_response) ** 2,
     }
-    return [variance_of_fault_kind[kind] for kind in model.vehicle.faults]
+    return [rate_offset_variance_by_fault_kind[kind] for kind in model.vehicle.faults]
 
 
 def _pair_hypotheses(n_groups: int, groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
@@ -231,10 +231,10 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     settings, n_groups = model.settings, len(model.groups)
     _, _, command_response, residual_covariance = model.coefficient_arrays()
     residual_variance = np.diag(residual_covariance)
-    trim_shift_by_group = command_response.sum(axis=1) * settings.trim_command_shift_sd
+    trim_shift_sd_by_group = command_response.sum(axis=1) * settings.trim_command_shift_sd
     initial_covariance = np.zeros((4 + n_groups, 4 + n_groups))
     initial_covariance[:3, :3] = (
-        np.diag(residual_variance * settings.trim_sd**2) + trim_shift_by_group.T @ trim_shift_by_group
+        np.diag(residual_variance * settings.trim_sd**2) + trim_shift_sd_by_group.T @ trim_shift_sd_by_group
     )
     initial_covariance[3, 3] = settings.gain_sd**2
     initial_covariance[range(4, 4 + n_groups), range(4, 4 + n_groups)] = (
@@ -246,14 +246,14 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     deviation_retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
     random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)
     random_walk_variance[:3] = residual_variance * np.array(settings.trim_random_walk_sd) ** 2
-    max_deviation_sd = np.array(
+    max_deviation_in_sd = np.array(
         [settings.max_trim_deviation_sd] * 3 + [settings.max_gain_deviation_sd] * (1 + n_groups)
     )
     initial_mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
     return TrimAndGainStateModel(
         initial_mean,
         initial_covariance,
-        np.sqrt(np.diag(initial_covariance)) * max_deviation_sd,
+        np.sqrt(np.diag(initial_covariance)) * max_deviation_in_sd,
         deviation_retention,
         random_walk_variance,
     )

@@ -279,11 +279,11 @@ def _read_sample_inputs(
 def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
     signals, commands = input_arrays[1], input_arrays[2]
-    for axis, angle in enumerate(("alpha_rad", "beta_rad")):
-        median_angle = _median_without_nan(np.abs(signals[:, axis]))
+    for signal_index, name in enumerate(("alpha_rad", "beta_rad")):
+        median_angle = _median_without_nan(np.abs(signals[:, signal_index]))
         if median_angle > 0.5 * pi:
             raise BadInput(
-                f"{flight_name}: flow.{angle} is {median_angle:.3g} in the middle, allowed: rad; `unit: deg`?"
+                f"{flight_name}: flow.{name} is {median_angle:.3g} in the middle, allowed: rad; `unit: deg`?"
             )
     is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
     density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
@@ -379,23 +379,23 @@ def _unexplained_start_rows_by_reason(
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
-    is_unexplained = np.zeros(len(t_s), dtype=bool)
+    is_after_unexplained_alarm = np.zeros(len(t_s), dtype=bool)
     for begin, end in gap_free_stretches:
-        first_second_end = begin + int(
+        first_second_end_row = begin + int(
             np.searchsorted(t_s[begin:end], t_s[begin] + _UNEXPLAINED_START_WINDOW_S)
         )
         if any(
             verdict.isolated == "unanticipated"
-            for verdict in replayed_flight.verdicts[begin:first_second_end]
+            for verdict in replayed_flight.verdicts[begin:first_second_end_row]
         ):
             first_alarm_row = next(
-                k for k in range(begin, first_second_end) if replayed_flight.verdicts[k].detected
+                k for k in range(begin, first_second_end_row) if replayed_flight.verdicts[k].detected
             )
-            is_unexplained[first_alarm_row:end] = True
+            is_after_unexplained_alarm[first_alarm_row:end] = True
     reason = (
         "no fault explains it from the first second on: another aircraft or loading, or undeclared errors"
     )
-    return {reason: is_unexplained}
+    return {reason: is_after_unexplained_alarm}
 
 
 def _add_rows_after_doubtful_alarm(
@@ -427,9 +427,11 @@ def _verdict_document(
     """The document of verdict.json."""
     surfaces = list(diagnosed_aircraft.aircraft.surfaces)
     alarm_rows = np.flatnonzero(rows.faulty)
-    last_verdict = replayed_flight.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
-    rows_with_last_verdict = [
-        k for k in alarm_rows.tolist() if replayed_flight.verdicts[k].isolated == last_verdict.isolated
+    verdict_of_last_alarm_row = replayed_flight.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    alarm_rows_with_last_isolation = [
+        k
+        for k in alarm_rows.tolist()
+        if replayed_flight.verdicts[k].isolated == verdict_of_last_alarm_row.isolated
     ]
     held_column_notes = [
         f"{name} is held, {mean_age_s:.2g} s old on average: errors declared have to cover it"
@@ -445,11 +447,13 @@ def _verdict_document(
         "rate_hz": 1.0 / samples.dt_s,
         "faulty": bool(alarm_rows.size),
         "detection_s": float(samples.t_s[alarm_rows[0]]) if alarm_rows.size else None,
-        "isolation_s": float(samples.t_s[rows_with_last_verdict[0]]) if last_verdict.isolated else None,
-        "isolated": last_verdict.isolated,
-        "type": last_verdict.type,
-        "estimate": last_verdict.estimate,
-        "candidates": list(last_verdict.candidates),
+        "isolation_s": float(samples.t_s[alarm_rows_with_last_isolation[0]])
+        if verdict_of_last_alarm_row.isolated
+        else None,
+        "isolated": verdict_of_last_alarm_row.isolated,
+        "type": verdict_of_last_alarm_row.type,
+        "estimate": verdict_of_last_alarm_row.estimate,
+        "candidates": list(verdict_of_last_alarm_row.candidates),
         "credible": trust.credibility_entry(rows.not_credible_rows_by_reason, rows.credible),
         "events": findings.fault_events(rows, surfaces),
         "can_separate": _excluded_loss_sentences(rows, surfaces),
@@ -461,15 +465,15 @@ def _verdict_document(
 def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[str]:
     """One sentence for each surface: the loss of effectiveness that is excluded within a second in half of
     the healthy rows."""
-    is_credible_healthy = (rows.faulty == 0) & (rows.credible == 1)
-    if not is_credible_healthy.any():
+    is_credible_without_alarm = (rows.faulty == 0) & (rows.credible == 1)
+    if not is_credible_without_alarm.any():
         return []
-    excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_healthy], axis=0)
+    smallest_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, excluded_losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, smallest_excluded_losses.tolist(), strict=True)
     ]
 
 

@@ -169,14 +169,14 @@ def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> li
 
 
 def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
-    verdict = (
+    correlation_text = (
         "they agree"
         if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
         else "they tell nothing of one another"
     )
     return (
         f"the change of {angle_column} is {fit.slope:.3f} times the integral of {rate_column} "
-        f"(correlation {fit.correlation:.2f}): {verdict}"
+        f"(correlation {fit.correlation:.2f}): {correlation_text}"
     )
 
 
@@ -189,9 +189,9 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     reader_name = reader or detect_reader(path)
-    time_column = _find_time_column(path, remarks) if reader_name == "table" else None
+    time_column_and_unit = _find_time_column(path, remarks) if reader_name == "table" else None
     recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
-    recording = next(read_parts(path, reader_name, time_column, recognized_columns))
+    recording = next(read_parts(path, reader_name, time_column_and_unit, recognized_columns))
     names_with_numbers = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
     column_of_quantity = {
         quantity: _matching_column(pattern, names_with_numbers)
@@ -211,7 +211,7 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
         )
         return None
     return _propose_vehicle(
-        path.stem, recording, reader_name, time_column, column_of_quantity, command_columns
+        path.stem, recording, reader_name, time_column_and_unit, column_of_quantity, command_columns
     )
 
 
@@ -219,9 +219,9 @@ def _propose_vehicle(
     name: str,
     recording: RecordedFlight,
     reader_name: str,
-    time_column: tuple[str, str] | None,
+    time_column_and_unit: tuple[str, str] | None,
     column_of_quantity: dict[str, str | None],
-    commands: list[str],
+    command_column_names: list[str],
 ) -> Document:
     columns = recording.columns
     roll_column = columns[column_of_quantity["roll"]] if column_of_quantity["roll"] else None
@@ -237,18 +237,22 @@ def _propose_vehicle(
         KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
     vehicle: Document = {"name": _as_vehicle_name(name), "reader": reader_name}
-    if time_column and time_column != (TIME_COLUMN, "s"):
-        vehicle["time"] = {"column": time_column[0], "unit": time_column[1]}
+    if time_column_and_unit and time_column_and_unit != (TIME_COLUMN, "s"):
+        vehicle["time"] = {"column": time_column_and_unit[0], "unit": time_column_and_unit[1]}
     vehicle["rates"] = {
         axis: _vehicle_file_column_entry(str(column_of_quantity[axis]), rate_unit, "rad/s") for axis in "pqr"
     }
-    vehicle["commands"] = [_vehicle_file_command_entry(name, columns[name].values) for name in commands]
-    vehicle["surfaces"] = {_as_vehicle_name(name): {name: 1.0} for name in commands}
-    angle_columns = {axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]}
+    vehicle["commands"] = [
+        _vehicle_file_command_entry(name, columns[name].values) for name in command_column_names
+    ]
+    vehicle["surfaces"] = {_as_vehicle_name(name): {name: 1.0} for name in command_column_names}
+    angle_column_names = {
+        axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]
+    }
     if roll_column is not None:
         vehicle["attitude"] = {
             axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
-            for axis, name in angle_columns.items()
+            for axis, name in angle_column_names.items()
         }
     if z_acceleration_column := column_of_quantity["az"]:
         median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column].values)))
@@ -286,8 +290,10 @@ def _may_be_command_column(column_name: str) -> bool:
 
 def _normalized_name(column_name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    with_unit = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower())
-    return re.sub(r"[\s/]+", "_", with_unit)
+    name_with_unit_suffix = re.sub(
+        r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower()
+    )
+    return re.sub(r"[\s/]+", "_", name_with_unit_suffix)
 
 
 def _matching_column(pattern: str, names: Sequence[str]) -> str | None:
@@ -351,11 +357,14 @@ def _guess_angle_unit(column_name: str, roll_column: Column, reader_name: str) -
 
 
 def _guess_rate_unit(
-    recording: RecordedFlight, rate_columns: list[str], roll_column: Column | None, rad_per_roll_unit: float
+    recording: RecordedFlight,
+    rate_column_names: list[str],
+    roll_column: Column | None,
+    rad_per_roll_unit: float,
 ) -> str:
     """The unit of the rates: by the roll angle, by their name, or by their size. rad_per_roll_unit: what the
     roll angle's numbers are multiplied by."""
-    logged_rates = [recording.columns[name] for name in rate_columns]
+    logged_rates = [recording.columns[name] for name in rate_column_names]
     if roll_column is not None:
         roll_fit = physics.fit_roll_angle_to_rates(
             logged_rates, replace(roll_column, values=roll_column.values * rad_per_roll_unit), None
@@ -363,7 +372,12 @@ def _guess_rate_unit(
         if roll_fit is not None and abs(roll_fit.correlation) > _MIN_ANGLE_RATE_CORRELATION:
             return nearest_unit(RATE, abs(roll_fit.slope), 1.5) or "rad/s"
     unit_in_name = next(
-        (unit for text, unit in _RATE_UNIT_BY_NAME_PART.items() if text in rate_columns[0].lower()), None
+        (
+            unit
+            for name_part, unit in _RATE_UNIT_BY_NAME_PART.items()
+            if name_part in rate_column_names[0].lower()
+        ),
+        None,
     )
     if unit_in_name:
         return unit_in_name

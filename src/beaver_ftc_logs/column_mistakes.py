@@ -64,7 +64,7 @@ def logs_with_one_mistake_corrected(
 def _with_exchanged_or_scaled_columns(
     samples: Samples,
     vehicle: Vehicle,
-    source_of_column: Mapping[str, str],
+    column_to_take_for: Mapping[str, str],
     factor_of_column: Mapping[str, float],
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
@@ -74,7 +74,7 @@ def _with_exchanged_or_scaled_columns(
     for name in column_names:
         stem, suffix = name.removesuffix(" by airspeed"), name[len(name.removesuffix(" by airspeed")) :]
         new_columns.append(
-            factor_of_column.get(stem, 1.0) * columns[source_of_column.get(stem, stem) + suffix]
+            factor_of_column.get(stem, 1.0) * columns[column_to_take_for.get(stem, stem) + suffix]
         )
     new_signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
     return replace(samples, rates=np.column_stack(new_columns[:3]), signals=new_signals)

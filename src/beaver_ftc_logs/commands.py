@@ -72,13 +72,13 @@ def identify(
 
     page = out.with_suffix(".html")
     refuse_to_replace_foreign_file(page)
-    vehicle_file = load_vehicle(vehicle)
+    loaded_vehicle = load_vehicle(vehicle)
     if false_alarms_per_hour is not None:
-        vehicle_file = with_false_alarm_rate(vehicle_file, false_alarms_per_hour)
-    loaded_flights, vehicle_file = scale_by_dynamic_pressure_if_better(
-        load_flights_for_fit(flights, vehicle_file, reader), vehicle_file
+        loaded_vehicle = with_false_alarm_rate(loaded_vehicle, false_alarms_per_hour)
+    loaded_flights, loaded_vehicle = scale_by_dynamic_pressure_if_better(
+        load_flights_for_fit(flights, loaded_vehicle, reader), loaded_vehicle
     )
-    model = identify(loaded_flights, vehicle_file)
+    model = identify(loaded_flights, loaded_vehicle)
     page_html = render_identification(loaded_flights, model)
     for path, text in ((out, as_text(model)), (page, page_html)):
         with clear_disk_errors(path):
@@ -104,11 +104,11 @@ def _check_logs(
     from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
     from beaver_ftc_logs.vehicle import load_vehicle
 
-    vehicle_file = load_vehicle(vehicle) if vehicle is not None else None
-    if out is not None and (out.exists() or vehicle_file is not None):
+    loaded_vehicle = load_vehicle(vehicle) if vehicle is not None else None
+    if out is not None and (out.exists() or loaded_vehicle is not None):
         reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {reason}")
-    findings = [check_log(path, vehicle_file, reader) for path in flights]
+    findings = [check_log(path, loaded_vehicle, reader) for path in flights]
     guessed_vehicle = next((one["vehicle"] for one in findings if one["vehicle"]), None)
     texts = [as_text(one) for one in findings]
     if guessed_vehicle is not None and out is not None:
@@ -250,9 +250,9 @@ def _diagnose_with_aircraft_model(options: DiagnoseOptions) -> None:
         vehicle_beside_log = path.with_name("vehicle.yaml")
         if options.vehicle is None and not vehicle_beside_log.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        vehicle_file = load_vehicle(options.vehicle or str(vehicle_beside_log))
-        for recording in read_parts_for_vehicle(path, vehicle_file, options.reader):
-            aircraft_inputs = read_diagnosis_inputs(recording, vehicle_file, diagnosed_aircraft)
+        loaded_vehicle = load_vehicle(options.vehicle or str(vehicle_beside_log))
+        for recording in read_parts_for_vehicle(path, loaded_vehicle, options.reader):
+            aircraft_inputs = read_diagnosis_inputs(recording, loaded_vehicle, diagnosed_aircraft)
             rows, verdict = diagnose_inputs(aircraft_inputs, diagnosed_aircraft)
             samples, surfaces = aircraft_inputs.samples, diagnosed_aircraft.aircraft.surfaces
             if options.score:

@@ -70,9 +70,11 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
     )
     estimate_covariance = np.linalg.inv(information + prior_information)
     trim_and_effectiveness_change = np.einsum("nij,nj->ni", estimate_covariance, score_vector)
-    standard_error = np.sqrt(np.maximum(np.diagonal(estimate_covariance, axis1=1, axis2=2)[:, 3:], 0.0))
+    effectiveness_standard_error = np.sqrt(
+        np.maximum(np.diagonal(estimate_covariance, axis1=1, axis2=2)[:, 3:], 0.0)
+    )
     return _diagnosis_rows_from_least_squares(
-        samples, model, 1.0 + trim_and_effectiveness_change[:, 3:], standard_error
+        samples, model, 1.0 + trim_and_effectiveness_change[:, 3:], effectiveness_standard_error
     )
 
 
@@ -84,12 +86,12 @@ def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, F
     trim_regressors = np.broadcast_to(
         np.diag(np.sqrt(np.diag(residual_covariance))), (len(is_predictable), 3, 3)
     )
-    regressors = np.where(
+    unwhitened_regressors = np.where(
         is_predictable[:, None, None],
         np.concatenate([trim_regressors, group_responses.transpose(0, 2, 1)], axis=2),
         0.0,
     )
-    return np.einsum("ab,nbi->nai", whitening_matrix, regressors), standardized_healthy_residual(
+    return np.einsum("ab,nbi->nai", whitening_matrix, unwhitened_regressors), standardized_healthy_residual(
         model, is_predictable, unexplained_rates, group_responses
     )
 
@@ -107,19 +109,21 @@ def _sums_over_memory(values: Floats, dt_s: float, forgets_exponentially: bool) 
 
 
 def _diagnosis_rows_from_least_squares(
-    samples: Samples, model: Model, effectiveness: Floats, standard_error: Floats
+    samples: Samples, model: Model, effectiveness: Floats, effectiveness_standard_error: Floats
 ) -> DiagnosisRows:
     """Rows of a least-squares estimate. With labelled levels, the effectiveness is the nearest of them, and
     below 1 it is a fault; without, it is a fault where it is below 1 by more than _MIN_LOSS_STANDARD_ERRORS
     standard deviations."""
     bank = build_hypothesis_bank(model)
-    unclipped_low, unclipped_high = (
-        np.clip(effectiveness + sign * _STANDARD_ERRORS_OF_90_PERCENT * standard_error, 0.0, 1.0)
+    low_by_standard_error, high_by_standard_error = (
+        np.clip(
+            effectiveness + sign * _STANDARD_ERRORS_OF_90_PERCENT * effectiveness_standard_error, 0.0, 1.0
+        )
         for sign in (-1.0, 1.0)
     )
     estimated_effectiveness, has_loss = (
         np.clip(effectiveness, 0.0, 1.0),
-        effectiveness + _MIN_LOSS_STANDARD_ERRORS * standard_error < 1.0,
+        effectiveness + _MIN_LOSS_STANDARD_ERRORS * effectiveness_standard_error < 1.0,
     )
     if model.settings.likely_effectiveness_levels_by_group:
         for group_index, group in enumerate(model.groups):
@@ -133,14 +137,19 @@ def _diagnosis_rows_from_least_squares(
                 np.abs(estimated_effectiveness[:, group_index, None] - levels).argmin(axis=1)
             ]
         has_loss = estimated_effectiveness < 1.0
-    bounds_by_group = {
-        "low": np.minimum(unclipped_low, estimated_effectiveness),
-        "high": np.maximum(unclipped_high, estimated_effectiveness),
+    group_bounds_by_side = {
+        "low": np.minimum(low_by_standard_error, estimated_effectiveness),
+        "high": np.maximum(high_by_standard_error, estimated_effectiveness),
     }
-    bounds = {name: expand_group_values_to_surfaces(bound, model) for name, bound in bounds_by_group.items()}
+    surface_bounds_by_side = {
+        side: expand_group_values_to_surfaces(bound, model) for side, bound in group_bounds_by_side.items()
+    }
     isolated_names = join_flagged_names(has_loss, ["+".join(group) for group in model.groups])
     return _rows_with_default_bounds(
-        samples, isolated_names, expand_group_values_to_surfaces(estimated_effectiveness, model), **bounds
+        samples,
+        isolated_names,
+        expand_group_values_to_surfaces(estimated_effectiveness, model),
+        **surface_bounds_by_side,
     )
 
 
@@ -150,13 +159,17 @@ def _rows_with_default_bounds(
     """Rows of a detector: faulty where it names a surface. Of low, high and probability those that are not
     in given_bounds: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in isolated_names], dtype=np.int64)
-    bounds = {
+    bounds_and_probability = {
         "low": effectiveness,
         "high": effectiveness,
         "probability": faulty.astype(float),
         **given_bounds,
     }
-    low, high, probability = bounds["low"], bounds["high"], bounds["probability"]
+    low, high, probability = (
+        bounds_and_probability["low"],
+        bounds_and_probability["high"],
+        bounds_and_probability["probability"],
+    )
     return DiagnosisRows(samples.t_s, faulty, isolated_names, effectiveness, low, high, probability)
 
 
@@ -165,19 +178,23 @@ def diagnose_by_freeze_rule(
 ) -> DiagnosisRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surface_names = list(model.vehicle.surfaces)
-    outputs = model.vehicle.outputs
-    logged_outputs = {
-        name: output.column for name, output in outputs.items() if output.column in recording.columns
+    servo_outputs = model.vehicle.outputs
+    logged_servo_output_columns = {
+        name: servo_output.column
+        for name, servo_output in servo_outputs.items()
+        if servo_output.column in recording.columns
     }
-    if not logged_outputs:
+    if not logged_servo_output_columns:
         return None
     is_frozen = np.zeros((len(samples.t_s), len(surface_names)), dtype=bool)
-    for name in logged_outputs:
-        column = recording.columns[logged_outputs[name]]
+    for name in logged_servo_output_columns:
+        column = recording.columns[logged_servo_output_columns[name]]
         last_output_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
-        has_moved = np.concatenate([[True], np.diff(column.values) != 0.0])
+        differs_from_previous_row = np.concatenate([[True], np.diff(column.values) != 0.0])
         unchanged_since_s = column.t_s[
-            np.maximum.accumulate(np.where(has_moved, np.arange(len(has_moved)), 0))
+            np.maximum.accumulate(
+                np.where(differs_from_previous_row, np.arange(len(differs_from_previous_row)), 0)
+            )
         ]
         is_frozen[:, surface_names.index(name)] = (
             samples.t_s - unchanged_since_s[np.maximum(last_output_rows, 0)] > MIN_FROZEN_OUTPUT_S
@@ -218,7 +235,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     predicted_rates = rates - np.where(
         is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
     )
-    acceleration = (predicted_rates - previous_rates) / dt_s
+    expected_acceleration = (predicted_rates - previous_rates) / dt_s
     contribution, command = (
         np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP)),
         np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
@@ -227,7 +244,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     for group_index, surface_indices in enumerate(surface_groups):
         contribution[:, :, group_index] = predictable_responses[:, group_index] / dt_s
         command[:, group_index] = np.nan_to_num(samples.commands[:, surface_indices].sum(axis=1))
-    frames = zip(samples.t_s.tolist(), rates, acceleration, contribution, command, strict=True)
+    frames = zip(samples.t_s.tolist(), rates, expected_acceleration, contribution, command, strict=True)
     model_error_sd_rad_s2 = _model_error_sd_rad_s2(model)
     return [
         (

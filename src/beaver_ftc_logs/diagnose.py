@@ -211,22 +211,22 @@ def _withdraw_contradicted_isolation(
     )
     direction_norms = np.linalg.norm(response_directions, axis=0)
     squared_projections = (residual @ (response_directions / np.maximum(direction_norms, MIN_DIVISOR))) ** 2
-    cumulated_projections = np.cumsum(squared_projections, axis=0)
-    window_begin = np.maximum(
-        np.arange(len(cumulated_projections)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
+    cumulated_squared_projections = np.cumsum(squared_projections, axis=0)
+    window_begin_row = np.maximum(
+        np.arange(len(cumulated_squared_projections)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
     )
-    log_likelihood_gain = (
+    log_likelihood_gain_by_group = (
         0.5
         * model.settings.effective_sample_share
-        * (cumulated_projections - cumulated_projections[window_begin])
+        * (cumulated_squared_projections - cumulated_squared_projections[window_begin_row])
     )
-    best_log_likelihood_gain, is_contradicted = (
-        log_likelihood_gain.max(axis=1),
+    max_log_likelihood_gain, is_contradicted = (
+        log_likelihood_gain_by_group.max(axis=1),
         np.zeros(len(residual), dtype=bool),
     )
     for group_index, group in enumerate(model.groups):
         is_contradicted |= _rows_isolating_any(rows.isolated_surfaces, set(group)) & (
-            best_log_likelihood_gain - log_likelihood_gain[:, group_index] > min_log_likelihood_gain
+            max_log_likelihood_gain - log_likelihood_gain_by_group[:, group_index] > min_log_likelihood_gain
         )
     return replace(
         rows.without_estimate(is_contradicted),
@@ -273,7 +273,7 @@ def diagnosis_rows_from_posterior(
         posterior[:, : bank.no_response_index]
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
     )
-    is_health_likelier = posterior[:, 0] + no_response_probability > 0.5
+    is_health_or_no_response_likelier = posterior[:, 0] + no_response_probability > 0.5
     alarm_threshold = model.settings.alarm_threshold
     evidence_increments = any_fault_log_odds_gains(posterior, bank)
     fault_evidence = page_cusum(evidence_increments, alarm_threshold or np.inf)
@@ -282,12 +282,12 @@ def diagnosis_rows_from_posterior(
     )
     if alarm_threshold is not None:
         naming_threshold = model.settings.isolation_evidence_factor * alarm_threshold
-        is_alarm_raised = (fault_evidence >= alarm_threshold) & ~is_health_likelier
+        is_alarm_raised = (fault_evidence >= alarm_threshold) & ~is_health_or_no_response_likelier
         has_isolation_evidence = (
             page_cusum(evidence_increments, naming_threshold) >= naming_threshold
-        ) & ~is_health_likelier
-    faulty = _latch_until_healthy(is_alarm_raised, is_health_likelier).astype(np.int64)
-    evidence_start_row = np.maximum.accumulate(
+        ) & ~is_health_or_no_response_likelier
+    faulty = _latch_until_healthy(is_alarm_raised, is_health_or_no_response_likelier).astype(np.int64)
+    evidence_start_rows = np.maximum.accumulate(
         np.where(fault_evidence <= 0.0, np.arange(len(fault_evidence)), 0)
     )
     estimate_and_bounds_by_group = [
@@ -309,24 +309,28 @@ def diagnosis_rows_from_posterior(
         t_s=samples.t_s,
         faulty=faulty,
         isolated_surfaces=_surfaces_at_fault(
-            model, bank, posterior, faulty, _latch_until_healthy(has_isolation_evidence, is_health_likelier)
+            model,
+            bank,
+            posterior,
+            faulty,
+            _latch_until_healthy(has_isolation_evidence, is_health_or_no_response_likelier),
         ),
         effectiveness=expand_group_values_to_surfaces(effectiveness, model),
         effectiveness_low=expand_group_values_to_surfaces(effectiveness_low, model),
         effectiveness_high=expand_group_values_to_surfaces(effectiveness_high, model),
         fault_probability=fault_probability,
-        evidence_start_time_s=samples.t_s[evidence_start_row],
+        evidence_start_time_s=samples.t_s[evidence_start_rows],
     )
 
 
 def _group_effectiveness_and_bounds(
-    bank: HypothesisBank, posterior: Floats, group_index: int, model: Model
+    bank: HypothesisBank, posterior_given_response: Floats, group_index: int, model: Model
 ) -> tuple[Floats, ...]:
     """A group's effectiveness and its bounds, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
-    levels, level_probability = _group_level_distribution(bank, posterior, group_index)
+    levels, level_probability = _group_level_distribution(bank, posterior_given_response, group_index)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
         level_probability = (
             level_probability
@@ -361,15 +365,15 @@ def _latch_until_healthy(
 
 
 def _group_level_distribution(
-    bank: HypothesisBank, posterior: Floats, group_index: int
+    bank: HypothesisBank, probability_given_response: Floats, group_index: int
 ) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
     levels, level_index_of_hypothesis = np.unique(
         bank.effectiveness[: bank.no_response_index, group_index], return_inverse=True
     )
-    level_probability = np.zeros((len(posterior), len(levels)))
+    level_probability = np.zeros((len(probability_given_response), len(levels)))
     for hypothesis, level_index in enumerate(level_index_of_hypothesis):
-        level_probability[:, level_index] += posterior[:, hypothesis]
+        level_probability[:, level_index] += probability_given_response[:, hypothesis]
     return levels, level_probability
 
 
@@ -434,30 +438,30 @@ def _surfaces_at_fault(
     )
     hold_samples, unchanged_samples = round(model.settings.isolation_change_hold_s * model.rate_hz), 0
     for k in np.flatnonzero(faulty):
-        new_name, last_name = likely_names[k] or UNKNOWN_SURFACE, isolated_names[k - 1] if k else ""
+        new_name, previous_name = likely_names[k] or UNKNOWN_SURFACE, isolated_names[k - 1] if k else ""
         unchanged_samples = (
             unchanged_samples + 1 if k and new_name == (likely_names[k - 1] or UNKNOWN_SURFACE) else 0
         )
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
-        keeps_name = last_name and (
+        keeps_name = previous_name and (
             is_unknown_offset_likelier[k]
             or (
-                last_name != UNKNOWN_SURFACE
+                previous_name != UNKNOWN_SURFACE
                 and (
                     unchanged_samples < hold_samples
-                    or _would_restore_excluded_surfaces(new_name, last_name, model)
+                    or _would_restore_excluded_surfaces(new_name, previous_name, model)
                 )
             )
         )
-        isolated_names[k] = last_name if keeps_name else new_name
+        isolated_names[k] = previous_name if keeps_name else new_name
     return isolated_names
 
 
-def _would_restore_excluded_surfaces(new_name: str, last_name: str, model: Model) -> bool:
+def _would_restore_excluded_surfaces(new_name: str, previous_name: str, model: Model) -> bool:
     """Whether a name holds all that one before it held: what was once excluded stays so (Ville's inequality
     bounds the chance of a wrong exclusion over all time)."""
     return model.settings.assumes_one_group_at_fault and (
-        new_name == UNKNOWN_SURFACE or set(last_name.split("+")) <= set(new_name.split("+"))
+        new_name == UNKNOWN_SURFACE or set(previous_name.split("+")) <= set(new_name.split("+"))
     )
 
 

@@ -56,22 +56,25 @@ def withdraw_surfaces_after_engine_failure(
             energy_height_rate_mps[evidence_begin_row:end] <= unpowered_energy_height_rate_mps,
             energy_height_rate_mps[evidence_begin_row:end] > 0.0,
         )
-        row_index = np.arange(end - evidence_begin_row)
-        last_falling_row, last_rising_row = (
-            np.maximum.accumulate(np.where(one, row_index, -1)) for one in (is_falling, is_rising)
+        index_since_evidence_begin = np.arange(end - evidence_begin_row)
+        last_falling_index, last_rising_index = (
+            np.maximum.accumulate(np.where(one, index_since_evidence_begin, -1))
+            for one in (is_falling, is_rising)
         )
-        may_engine_have_failed = (last_falling_row > last_rising_row)[begin - evidence_begin_row :]
+        may_engine_have_failed = (last_falling_index > last_rising_index)[begin - evidence_begin_row :]
         falling_share = np.cumsum(is_falling[begin - evidence_begin_row :]) / np.arange(1, end - begin + 1)
-        is_engine_named = (
+        may_engine_be_named = (
             may_engine_have_failed
             & (falling_share > 0.5)
             & (t_s[begin:end] - t_s[begin] >= _ENGINE_NAMING_DELAY_S)
         )
-        engine_names = np.where(
-            np.logical_or.accumulate(is_engine_named) & may_engine_have_failed, ENGINE, UNKNOWN_SURFACE
+        engine_or_unknown_names = np.where(
+            np.logical_or.accumulate(may_engine_be_named) & may_engine_have_failed, ENGINE, UNKNOWN_SURFACE
         )
-        is_within_evidence_window = t_s[begin:end] - t_s[evidence_begin_row] < _ENERGY_HEIGHT_WINDOW_S
+        is_evidence_younger_than_window = t_s[begin:end] - t_s[evidence_begin_row] < _ENERGY_HEIGHT_WINDOW_S
         isolated_names[begin:end] = np.where(
-            may_engine_have_failed | is_within_evidence_window, engine_names, isolated_surfaces[begin:end]
+            may_engine_have_failed | is_evidence_younger_than_window,
+            engine_or_unknown_names,
+            isolated_surfaces[begin:end],
         )
     return isolated_names

@@ -98,53 +98,59 @@ def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail
     )
 
 
-def _excess_overdispersion(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> float:
+def _excess_overdispersion(excesses_and_hours_by_flight: Sequence[PeaksAndHours]) -> float:
     """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
     excess_sums, hours = (
-        np.array([excesses.sum() for excesses, _ in held_out_peaks_and_hours]),
-        np.array([hours for _, hours in held_out_peaks_and_hours]),
+        np.array([excesses.sum() for excesses, _ in excesses_and_hours_by_flight]),
+        np.array([hours for _, hours in excesses_and_hours_by_flight]),
     )
-    n_peaks, hours_share = sum(len(excesses) for excesses, _ in held_out_peaks_and_hours), hours / hours.sum()
-    if len(held_out_peaks_and_hours) < 2 or excess_sums.sum() <= 0.0:
+    n_peaks_over_level, hours_share = (
+        sum(len(excesses) for excesses, _ in excesses_and_hours_by_flight),
+        hours / hours.sum(),
+    )
+    if len(excesses_and_hours_by_flight) < 2 or excess_sums.sum() <= 0.0:
         return 1.0
-    expected_excess_sums, mean_excess_of_peaks = hours_share * excess_sums.sum(), excess_sums.sum() / n_peaks
-    squared_deviation = (excess_sums - expected_excess_sums) ** 2 / np.maximum(
+    expected_excess_sums, mean_excess_of_peaks = (
+        hours_share * excess_sums.sum(),
+        excess_sums.sum() / n_peaks_over_level,
+    )
+    squared_standardized_deviations = (excess_sums - expected_excess_sums) ** 2 / np.maximum(
         2.0 * expected_excess_sums * mean_excess_of_peaks, MIN_DIVISOR
     )
-    return max(float(squared_deviation.sum()) / (len(held_out_peaks_and_hours) - 1), 1.0)
+    return max(float(squared_standardized_deviations.sum()) / (len(excesses_and_hours_by_flight) - 1), 1.0)
 
 
 def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> ExpectedFalseAlarmsPerHour:
     """False alarms an hour at a threshold not below the tail's level."""
-    pareto_shape, pareto_scale, grid_probability = _pareto_posterior(tail)
+    pareto_shapes, pareto_scales, grid_probabilities = _pareto_posterior(tail)
     false_alarm_rates = (
-        _exceedance_probability(threshold - tail.tail_start_level, pareto_shape, pareto_scale)[:, None]
+        _exceedance_probability(threshold - tail.tail_start_level, pareto_shapes, pareto_scales)[:, None]
         * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
-    order_by_rate, rate_probability = (
+    order_by_rate, rate_probabilities = (
         np.argsort(false_alarm_rates),
-        np.repeat(grid_probability, len(_PEAK_RATE_QUANTILE_PROBABILITIES))
+        np.repeat(grid_probabilities, len(_PEAK_RATE_QUANTILE_PROBABILITIES))
         / len(_PEAK_RATE_QUANTILE_PROBABILITIES),
     )
     quantile_index = np.searchsorted(
-        np.cumsum(rate_probability[order_by_rate]),
+        np.cumsum(rate_probabilities[order_by_rate]),
         np.array(_CREDIBLE_INTERVAL_PROBABILITIES) - _PROBABILITY_ROUNDING,
     )
     low, high = false_alarm_rates[order_by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
-    return ExpectedFalseAlarmsPerHour(float(false_alarm_rates @ rate_probability), float(low), float(high))
+    return ExpectedFalseAlarmsPerHour(float(false_alarm_rates @ rate_probabilities), float(low), float(high))
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:
     """The threshold at which this rate of false alarms is expected; the level of the tail if the rate there
     is lower."""
-    pareto_shape, pareto_scale, grid_probability = _pareto_posterior(tail)
+    pareto_shapes, pareto_scales, grid_probabilities = _pareto_posterior(tail)
     mean_peaks_per_hour = float(_peaks_per_hour_quantiles(tail).mean())
 
     def has_too_many_alarms(excess: float) -> bool:
         return (
             mean_peaks_per_hour
-            * float(_exceedance_probability(excess, pareto_shape, pareto_scale) @ grid_probability)
+            * float(_exceedance_probability(excess, pareto_shapes, pareto_scales) @ grid_probabilities)
             > false_alarms_per_hour
         )
 
@@ -195,19 +201,20 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
 
     excess = np.array(tail.excess_over_level)
     scale_grid = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
-    pareto_shape, pareto_scale = (
+    pareto_shapes, pareto_scales = (
         grid.ravel() for grid in np.meshgrid(_PARETO_SHAPE_GRID, scale_grid, indexing="ij")
     )
     log_posterior = (
-        genpareto.logpdf(excess[:, None], pareto_shape, scale=pareto_scale).sum(axis=0) / tail.overdispersion
+        genpareto.logpdf(excess[:, None], pareto_shapes, scale=pareto_scales).sum(axis=0)
+        / tail.overdispersion
     )
-    log_posterior -= 0.5 * (pareto_shape / _PARETO_SHAPE_PRIOR_SD) ** 2
-    grid_probability = np.exp(log_posterior - log_posterior.max())
-    return pareto_shape, pareto_scale, grid_probability / grid_probability.sum()
+    log_posterior -= 0.5 * (pareto_shapes / _PARETO_SHAPE_PRIOR_SD) ** 2
+    grid_probabilities = np.exp(log_posterior - log_posterior.max())
+    return pareto_shapes, pareto_scales, grid_probabilities / grid_probabilities.sum()
 
 
-def _exceedance_probability(excess: float, pareto_shape: Floats, pareto_scale: Floats) -> Floats:
+def _exceedance_probability(excess: float, pareto_shapes: Floats, pareto_scales: Floats) -> Floats:
     """Probability that a peak over the level exceeds it by more than `excess`."""
     from scipy.stats import genpareto
 
-    return np.asarray(genpareto.sf(excess, pareto_shape, scale=pareto_scale))
+    return np.asarray(genpareto.sf(excess, pareto_shapes, scale=pareto_scales))

@@ -74,16 +74,18 @@ def _posterior_averaged_over_noise_models(
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
-    log_likelihoods = [
+    sample_log_likelihoods_by_model = [
         _noise_model_log_likelihood(flight, single_model, single_model.noise_models[0])
         for flight, single_model in flights_and_models
     ]
-    noise_model_probabilities = _model_probabilities_with_forgetting(log_likelihoods, model.rate_hz)
+    noise_model_probabilities = _model_probabilities_with_forgetting(
+        sample_log_likelihoods_by_model, model.rate_hz
+    )
     kept_probabilities = np.where(
         np.asarray(noise_model_probabilities) < _MIN_NOISE_MODEL_PROBABILITY, 0.0, noise_model_probabilities
     )
     kept_probabilities /= kept_probabilities.sum(axis=0)
-    n_run_samples = [
+    n_run_samples_by_model = [
         int(np.flatnonzero(probability).max(initial=-1)) + 1 for probability in kept_probabilities
     ]
     bank_runs = [
@@ -92,13 +94,13 @@ def _posterior_averaged_over_noise_models(
             single_model.with_noise_model(flight.noise_ma_coefficients),
             bank,
         )
-        for (flight, single_model), n_samples in zip(flights_and_models, n_run_samples, strict=True)
+        for (flight, single_model), n_samples in zip(flights_and_models, n_run_samples_by_model, strict=True)
         if n_samples
     ]
     return _average_bank_runs(
         [
             probability
-            for probability, n_samples in zip(kept_probabilities, n_run_samples, strict=True)
+            for probability, n_samples in zip(kept_probabilities, n_run_samples_by_model, strict=True)
             if n_samples
         ],
         bank_runs,
@@ -155,7 +157,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
         * bank.transition_share[bank.is_fault_hypothesis].sum()
         / bank.transition_share.sum()
     )
-    predicted_probability = np.concatenate(
+    predicted_fault_probability = np.concatenate(
         [
             [bank.prior_probability[bank.is_fault_hypothesis].sum()],
             (1.0 - bank.change_probability_per_sample) * fault_probability[:-1] + change_to_fault_probability,
@@ -163,7 +165,7 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
     )
     return np.asarray(
         np.log(fault_probability / (1.0 - fault_probability))
-        - np.log(predicted_probability / (1.0 - predicted_probability))
+        - np.log(predicted_fault_probability / (1.0 - predicted_fault_probability))
     )
 
 
@@ -186,22 +188,27 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """
     if delay_s == 0.0:
         return samples
-    delay_in_samples, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
+    delay_magnitude_samples, commands = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
     neighbouring_commands = np.vstack(
         [commands[:1], commands[:-1]] if delay_s > 0 else [commands[1:], commands[-1:]]
     )
     return replace(
-        samples, commands=(1.0 - delay_in_samples) * commands + delay_in_samples * neighbouring_commands
+        samples,
+        commands=(1.0 - delay_magnitude_samples) * commands + delay_magnitude_samples * neighbouring_commands,
     )
 
 
-def _model_probabilities_with_forgetting(log_likelihoods: Sequence[Floats], rate_hz: float) -> Floats:
+def _model_probabilities_with_forgetting(
+    sample_log_likelihoods_by_model: Sequence[Floats], rate_hz: float
+) -> Floats:
     """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods
     (n,), forgotten exponentially within minutes."""
     from scipy.signal import lfilter
 
     forgetting_factor = np.exp(-1.0 / (_MODEL_EVIDENCE_MEMORY_S * rate_hz))
-    cumulated_log_likelihoods = lfilter([1.0], [1.0, -forgetting_factor], np.array(log_likelihoods), axis=1)
+    cumulated_log_likelihoods = lfilter(
+        [1.0], [1.0, -forgetting_factor], np.array(sample_log_likelihoods_by_model), axis=1
+    )
     relative_likelihoods = np.exp(cumulated_log_likelihoods - cumulated_log_likelihoods.max(axis=0))
     return np.asarray(relative_likelihoods / relative_likelihoods.sum(axis=0))
 
@@ -246,15 +253,17 @@ def recent_noise_variance_scale(
     """
     whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
     cumulated_residual = np.cumsum(np.vstack([np.zeros((1, 3)), whitened_residual]), axis=0)
-    cumulated_usable = np.concatenate([[0], np.cumsum(is_usable)])
+    cumulated_usable_count = np.concatenate([[0], np.cumsum(is_usable)])
     window_end = np.arange(1, len(whitened_residual) + 1)
     max_variance_ratio = np.zeros(len(whitened_residual))
     for span_s in _RESIDUAL_SUM_SPANS_S:
         window_begin = np.maximum(window_end - max(round(span_s * rate_hz), 1), 0)
-        squared_sum = ((cumulated_residual[window_end] - cumulated_residual[window_begin]) ** 2).sum(
-            axis=1
-        ) / (3.0 * np.maximum(cumulated_usable[window_end] - cumulated_usable[window_begin], 1))
-        cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum)])
+        squared_sum_per_sample_and_axis = (
+            (cumulated_residual[window_end] - cumulated_residual[window_begin]) ** 2
+        ).sum(axis=1) / (
+            3.0 * np.maximum(cumulated_usable_count[window_end] - cumulated_usable_count[window_begin], 1)
+        )
+        cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum_per_sample_and_axis)])
         window_begin = np.maximum(window_end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
         max_variance_ratio = np.maximum(
             max_variance_ratio,
@@ -435,7 +444,7 @@ def _correct_hypotheses(
     covariance without its inflation), and the log likelihood of the sample.
     """
     n_hypotheses, n_states = state_means.shape
-    log_likelihood = np.empty(n_hypotheses)
+    log_likelihoods = np.empty(n_hypotheses)
     squared_residuals = np.empty(n_hypotheses)
     zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
     noise_covariance, t_degrees_of_freedom = (
@@ -459,15 +468,16 @@ def _correct_hypotheses(
                 state_means[h], state_covariances[h], unexplained_rates, sensitivity, noise_covariance, noise
             )
         limited_squared_residual = min(squared_residuals[h], noise.max_squared_residual)
-        log_likelihood[h] = noise.effective_sample_share * (
+        log_likelihoods[h] = noise.effective_sample_share * (
             -0.5
             * (t_degrees_of_freedom + 3.0)
             * np.log(1.0 + limited_squared_residual / t_degrees_of_freedom)
             - 0.5 * log_determinant
         )
-    max_log_likelihood = log_likelihood.max()
+    max_hypothesis_log_likelihood = log_likelihoods.max()
     probabilities = np.maximum(
-        prior_probabilities * np.exp(log_likelihood - max_log_likelihood), _MIN_HYPOTHESIS_PROBABILITY
+        prior_probabilities * np.exp(log_likelihoods - max_hypothesis_log_likelihood),
+        _MIN_HYPOTHESIS_PROBABILITY,
     )
     probability_sum = probabilities.sum()
     probabilities /= probability_sum
@@ -476,19 +486,25 @@ def _correct_hypotheses(
         mean_clipped_squared_residual += probabilities[h] * min(
             noise.covariance_inflation * squared_residuals[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
         )
-    return probabilities, mean_clipped_squared_residual, max_log_likelihood + np.log(probability_sum)
+    return (
+        probabilities,
+        mean_clipped_squared_residual,
+        max_hypothesis_log_likelihood + np.log(probability_sum),
+    )
 
 
 @kernel
-def _state_sensitivity(effectiveness, gain_sensitivity, group_responses, intercept_rad_s, n_states):
+def _state_sensitivity(
+    effectiveness, response_share_scaled_by_gain, group_responses, intercept_rad_s, n_states
+):
     """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
     multiplies the intercept and all group_responses (G, 3) times effectiveness (G,); and to each group's own
-    gain, which multiplies the share gain_sensitivity (G,) of its response."""
+    gain, which multiplies the share response_share_scaled_by_gain (G,) of its response."""
     sensitivity = np.zeros((n_states, 3))
     sensitivity[:3] = np.eye(3)
     sensitivity[3] = intercept_rad_s
     for g in range(len(effectiveness)):
-        sensitivity[4 + g] = gain_sensitivity[g] * group_responses[g]
+        sensitivity[4 + g] = response_share_scaled_by_gain[g] * group_responses[g]
         sensitivity[3] += effectiveness[g] * group_responses[g]
     return sensitivity
 
@@ -552,11 +568,11 @@ def _invert_symmetric(matrix):
     adjugate = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
-            next_row, last_row = (i + 1) % 3, (i + 2) % 3
-            next_column, last_column = (j + 1) % 3, (j + 2) % 3
+            next_row, previous_row = (i + 1) % 3, (i + 2) % 3
+            next_column, previous_column = (j + 1) % 3, (j + 2) % 3
             adjugate[j, i] = (
-                matrix[next_row, next_column] * matrix[last_row, last_column]
-                - matrix[next_row, last_column] * matrix[last_row, next_column]
+                matrix[next_row, next_column] * matrix[previous_row, previous_column]
+                - matrix[next_row, previous_column] * matrix[previous_row, next_column]
             )
     determinant = (
         matrix[0, 0] * adjugate[0, 0] + matrix[0, 1] * adjugate[1, 0] + matrix[0, 2] * adjugate[2, 0]

@@ -165,10 +165,10 @@ def credibility_text_lines(verdict: Document) -> list[str]:
     credibility = verdict["credible"]
     if credibility["share"] >= 1.0:
         return []
-    reasons = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in credibility["reasons"]]
+    reason_lines = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in credibility["reasons"]]
     return [
         f"  credible in {credibility['share']:.1%} of the rows; in the others nothing is said, because",
-        *reasons,
+        *reason_lines,
     ]
 
 
@@ -195,7 +195,7 @@ def _event_text(event: Document) -> str:
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_hypothesis_bank(model)
-    group_responses = _whitened_group_responses(samples, model)
+    whitened_responses = _whitened_group_responses(samples, model)
     return {
         "together": [
             {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
@@ -205,11 +205,11 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
         "groups": [
             {
                 "surfaces": group,
-                **_group_isolability_entry(group_responses, group_index, model, bank, samples.dt_s),
+                **_group_isolability_entry(whitened_responses, group_index, model, bank, samples.dt_s),
             }
             for group_index, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosine_entries(group_responses, model),
+        "alike": _group_pair_cosine_entries(whitened_responses, model),
         "columns_held_s": {
             name: round(mean_age_s, 4) for name, mean_age_s in samples.mean_age_s_by_held_column.items()
         },
@@ -232,17 +232,17 @@ def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
 
 
 def _group_isolability_entry(
-    group_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
+    whitened_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     required_log_odds = _log_odds_needed_for_alarm(model, bank, group_index, dt_s)
-    if not len(group_responses):
+    if not len(whitened_responses):
         return {
             "information_per_s": 0.0,
             "smallest_loss": _smallest_detectable_losses(0.0, required_log_odds),
         }
-    information_per_s = float((group_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
-    conditional_information_per_s = _conditional_fisher_information(group_responses, group_index) / dt_s
+    information_per_s = float((whitened_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
+    conditional_information_per_s = _conditional_fisher_information(whitened_responses, group_index) / dt_s
     return {
         "information_per_s": information_per_s,
         "information_per_s_of_its_motion": conditional_information_per_s,
@@ -253,18 +253,20 @@ def _group_isolability_entry(
     }
 
 
-def _conditional_fisher_information(group_responses: Floats, group_index: int) -> float:
+def _conditional_fisher_information(whitened_responses: Floats, group_index: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
-    n_samples, n_groups, n_axes = group_responses.shape
+    n_samples, n_groups, n_axes = whitened_responses.shape
     trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
     other_responses = [
-        group_responses[:, other_group].reshape(-1, 1)
+        whitened_responses[:, other_group].reshape(-1, 1)
         for other_group in range(n_groups)
         if other_group != group_index
     ]
-    nuisance = np.column_stack([trim_regressors, *other_responses])
-    target = group_responses[:, group_index].reshape(-1)
-    unexplained_target = target - nuisance @ np.linalg.lstsq(nuisance, target, rcond=None)[0]
+    nuisance_regressors = np.column_stack([trim_regressors, *other_responses])
+    target = whitened_responses[:, group_index].reshape(-1)
+    unexplained_target = (
+        target - nuisance_regressors @ np.linalg.lstsq(nuisance_regressors, target, rcond=None)[0]
+    )
     return float(unexplained_target @ unexplained_target) / n_samples
 
 
@@ -289,20 +291,20 @@ def _smallest_detectable_losses(
     information_by_horizon = {
         f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S
     }
-    losses = {
+    loss_by_horizon = {
         horizon: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
         for horizon, information in information_by_horizon.items()
     }
-    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in losses.items()}
+    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in loss_by_horizon.items()}
 
 
-def _group_pair_cosine_entries(group_responses: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosine_entries(whitened_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pair_entries = []
     for first_group, second_group in combinations(range(len(model.groups)), 2):
         first_response, second_response = (
-            group_responses[:, first_group].ravel(),
-            group_responses[:, second_group].ravel(),
+            whitened_responses[:, first_group].ravel(),
+            whitened_responses[:, second_group].ravel(),
         )
         norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
         cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)

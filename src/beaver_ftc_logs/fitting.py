@@ -230,7 +230,7 @@ def bic_by_order(
         usable_flights, vehicle, max(RATE_LAG_COUNT_CANDIDATES), max(COMMAND_LAG_COUNT_CANDIDATES)
     )
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
-    regressor_gram, regressor_rate_products, rate_gram = (
+    scaled_regressor_gram, scaled_regressor_rate_products, rate_gram = (
         (regressors / regressor_rms).T @ (regressors / regressor_rms),
         (regressors / regressor_rms).T @ rates,
         rates.T @ rates,
@@ -239,17 +239,18 @@ def bic_by_order(
     for n_rate_lags in RATE_LAG_COUNT_CANDIDATES:
         for n_command_lags in COMMAND_LAG_COUNT_CANDIDATES:
             order_columns = _regressor_columns_of_order(vehicle, n_rate_lags, n_command_lags)
-            coefficients = np.linalg.lstsq(
-                regressor_gram[np.ix_(order_columns, order_columns)],
-                regressor_rate_products[order_columns],
+            scaled_coefficients = np.linalg.lstsq(
+                scaled_regressor_gram[np.ix_(order_columns, order_columns)],
+                scaled_regressor_rate_products[order_columns],
                 rcond=1e-12,
             )[0]
-            log_residual_determinant = np.linalg.slogdet(
-                (rate_gram - regressor_rate_products[order_columns].T @ coefficients) / len(rates)
+            log_residual_covariance_determinant = np.linalg.slogdet(
+                (rate_gram - scaled_regressor_rate_products[order_columns].T @ scaled_coefficients)
+                / len(rates)
             )[1]
-            bic_of_order[n_rate_lags, n_command_lags] = len(rates) * log_residual_determinant + 3 * len(
-                order_columns
-            ) * np.log(len(rates))
+            bic_of_order[n_rate_lags, n_command_lags] = len(
+                rates
+            ) * log_residual_covariance_determinant + 3 * len(order_columns) * np.log(len(rates))
     return bic_of_order
 
 
@@ -322,7 +323,7 @@ def stacked_regression_data(
         regression.group_surfaces_by_commands(vehicle),
         max(RATE_LAG_COUNT_CANDIDATES + COMMAND_LAG_COUNT_CANDIDATES),
     )
-    regressors, flight_rates, stretch_numbers = [], [], []
+    weighted_regressors_by_flight, weighted_rates_by_flight, stretch_numbers_by_flight = [], [], []
     for flight_index, usable_flight in enumerate(usable_flights):
         samples, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
         past_regressors, lagged_group_commands, is_predictable = regression.build_regressors(
@@ -331,17 +332,21 @@ def stacked_regression_data(
         is_usable = usable_flight.is_usable & is_predictable
         is_usable[:max_lag] = False
         n_samples = len(past_regressors)
-        regressors.append(
+        weighted_regressors_by_flight.append(
             samples.fit_weight
             * np.column_stack(
                 [np.ones(n_samples), past_regressors, lagged_group_commands.reshape(n_samples, -1)]
             )[is_usable]
         )
-        flight_rates.append(samples.fit_weight * samples.rates[is_usable])
-        stretch_numbers.append(
+        weighted_rates_by_flight.append(samples.fit_weight * samples.rates[is_usable])
+        stretch_numbers_by_flight.append(
             np.cumsum(np.diff(np.flatnonzero(is_usable), prepend=0) > 1) + 1_000_000 * flight_index
         )
-    return np.vstack(regressors), np.vstack(flight_rates), np.concatenate(stretch_numbers)
+    return (
+        np.vstack(weighted_regressors_by_flight),
+        np.vstack(weighted_rates_by_flight),
+        np.concatenate(stretch_numbers_by_flight),
+    )
 
 
 def _fit_model_of_order(
@@ -522,12 +527,12 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
     samples_and_usable = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
+    window_inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
     for fold_model, held_out_flights in _cross_validation_fits(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
         has_known_effect = np.array(trust.is_group_effect_known(fold_model))
-        gain_covariance: Floats = np.asarray(
+        prior_gain_covariance: Floats = np.asarray(
             np.kron(_prior_gain_covariance(fold_model, has_known_effect), np.ones((3, 3))), dtype=float
         )
         for held_out in held_out_flights:
@@ -542,14 +547,14 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
                 squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
-                    gain_covariance,
+                    prior_gain_covariance,
                 )
-                inflations_by_ma_coefficients.setdefault(held_out.samples.noise_ma_coefficients, []).append(
-                    min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_NOISE_INFLATION)
-                )
+                window_inflations_by_ma_coefficients.setdefault(
+                    held_out.samples.noise_ma_coefficients, []
+                ).append(min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_NOISE_INFLATION))
     noise_inflation_by_ma_coefficients = {
-        ma_coefficients: max(float(np.mean(inflations)), 1.0)
-        for ma_coefficients, inflations in inflations_by_ma_coefficients.items()
+        ma_coefficients: max(float(np.mean(window_inflations)), 1.0)
+        for ma_coefficients, window_inflations in window_inflations_by_ma_coefficients.items()
     }
     if model.vehicle.other_laws:
         noise_inflation_by_ma_coefficients = {
@@ -571,19 +576,21 @@ def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
 
 def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
-    gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
-    return np.asarray(gain_covariance[0, 0] + np.diag(np.diag(gain_covariance)[1:][has_known_effect]))
+    initial_gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
+    return np.asarray(
+        initial_gain_covariance[0, 0] + np.diag(np.diag(initial_gain_covariance)[1:][has_known_effect])
+    )
 
 
 def _normalized_squared_gain_error_and_rank(
-    gain_responses: Floats, residual: Floats, gain_covariance: Floats
+    gain_responses: Floats, residual: Floats, prior_gain_covariance: Floats
 ) -> tuple[float, int]:
     """Squares of the gains of a residual (m,) on gain_responses (m, G), in their covariance and what
     lies between flights, and how many gains there are."""
     information, score_vector = gain_responses.T @ gain_responses, gain_responses.T @ residual
     gain_errors = np.linalg.lstsq(information, score_vector, rcond=_RANK_TOLERANCE)[0]
     identity_plus_prior_information = (
-        np.eye(len(gain_errors)) + gain_covariance @ information
+        np.eye(len(gain_errors)) + prior_gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
     squared_error = max(
         float(
@@ -648,17 +655,19 @@ def _estimate_trim_random_walk_sd(
                     )
                     squared_difference_sums[i] += (np.diff(span_means, axis=0) ** 2).sum(axis=0)
                     n_differences[i] += max(len(span_means) - 1, 0)
-    default_sd = np.array(FilterSettings().trim_random_walk_sd)
+    default_random_walk_sd = np.array(FilterSettings().trim_random_walk_sd)
     if not n_differences.all():
-        return default_sd.tolist()
-    short_span_variance, long_span_variance = squared_difference_sums / n_differences[:, None]
+        return default_random_walk_sd.tolist()
+    short_span_difference_variance, long_span_difference_variance = (
+        squared_difference_sums / n_differences[:, None]
+    )
     short_span, long_span = span_samples
     random_walk_variance = (
         1.5
-        * (long_span * long_span_variance - short_span * short_span_variance)
+        * (long_span * long_span_difference_variance - short_span * short_span_difference_variance)
         / (long_span**2 - short_span**2)
     )
-    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), default_sd).tolist()
+    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), default_random_walk_sd).tolist()
 
 
 def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
@@ -713,7 +722,12 @@ def add_fitted_ranges_and_alarm_threshold(
     samples_and_usable = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    max_noise_variance_scale, max_column_mistake_gain, held_out_peaks_and_hours, squared_gain_deviations = (
+    (
+        max_noise_variance_scale,
+        max_column_mistake_gain_per_sample,
+        held_out_peaks_and_hours,
+        squared_gain_deviations,
+    ) = (
         1.0,
         0.0,
         list[extremes.PeaksAndHours](),
@@ -723,13 +737,14 @@ def add_fitted_ranges_and_alarm_threshold(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
         for held_out in held_out_flights:
-            held_out_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
+            held_out_max_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
                 fold_model, held_out
             )
-            max_noise_variance_scale = max(max_noise_variance_scale, held_out_noise_variance_scale)
+            max_noise_variance_scale = max(max_noise_variance_scale, held_out_max_noise_variance_scale)
             if len(held_out_peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
-                max_column_mistake_gain = max(
-                    max_column_mistake_gain, _max_column_mistake_log_likelihood_gain(fold_model, held_out)
+                max_column_mistake_gain_per_sample = max(
+                    max_column_mistake_gain_per_sample,
+                    _max_column_mistake_log_likelihood_gain(fold_model, held_out),
                 )
             held_out_peaks_and_hours.append(peaks_and_hours)
             if len(usable_flights) > 1 and model.vehicle.other_laws:
@@ -782,7 +797,7 @@ def add_fitted_ranges_and_alarm_threshold(
             "fitted_ranges": fitted_ranges.model_copy(
                 update={
                     "alarm_peak_tail": peak_tail,
-                    "max_column_mistake_log_likelihood_gain": max_column_mistake_gain,
+                    "max_column_mistake_log_likelihood_gain": max_column_mistake_gain_per_sample,
                 }
             ),
             "settings": model.settings.model_copy(update=alarm_settings),
@@ -811,18 +826,19 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
         share_by_chance = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
-        log_variance_ratio = (
+        log_determinant_ratio = (
             np.linalg.slogdet(np.array(noise_model.residual_covariance))[1]
             - np.linalg.slogdet(np.cov(residuals.T))[1]
         )
         unmodelled_variance_share = max(
-            unmodelled_variance_share, 1.0 - float(np.exp(log_variance_ratio / 3.0)) - share_by_chance
+            unmodelled_variance_share, 1.0 - float(np.exp(log_determinant_ratio / 3.0)) - share_by_chance
         )
-    effect_power = trust.effect_power_unexplained_by_others(
+    unexplained_effect_power = trust.effect_power_unexplained_by_others(
         [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights], model
     )
     return np.minimum(
-        np.sqrt(3.0 * unmodelled_variance_share / np.maximum(effect_power, MIN_DIVISOR)), _MAX_GAIN_SD
+        np.sqrt(3.0 * unmodelled_variance_share / np.maximum(unexplained_effect_power, MIN_DIVISOR)),
+        _MAX_GAIN_SD,
     )
 
 
@@ -834,11 +850,11 @@ def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Flo
     squared_deviation = np.full(group_responses.shape[1], np.nan)
     has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
     information = group_responses[:, has_known_effect].T @ group_responses[:, has_known_effect]
-    gain_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
-    gain_errors = gain_covariance @ (group_responses[:, has_known_effect].T @ residual.ravel())
+    gain_error_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
+    gain_errors = gain_error_covariance @ (group_responses[:, has_known_effect].T @ residual.ravel())
     if has_known_effect.any():  # a part without a residual shows the effect of no group
         squared_deviation[has_known_effect] = np.maximum(
-            gain_errors**2 - np.diag(gain_covariance) * max(float((residual**2).mean()), 1.0), 0.0
+            gain_errors**2 - np.diag(gain_error_covariance) * max(float((residual**2).mean()), 1.0), 0.0
         )
     return squared_deviation
 
@@ -874,10 +890,10 @@ def _choose_alarm_threshold(
 def _max_column_mistake_log_likelihood_gain(model: Model, held_out: FlightWithUsableRows) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    log_likelihood_gain_by_mistake, _ = trust.log_likelihood_gain_of_corrections(
+    min_gain_per_sample_by_correction, _ = trust.log_likelihood_gain_of_corrections(
         replace(held_out.samples, rates=rates), model
     )
-    return max(0.0, *log_likelihood_gain_by_mistake.values()) if log_likelihood_gain_by_mistake else 0.0
+    return max(0.0, *min_gain_per_sample_by_correction.values()) if min_gain_per_sample_by_correction else 0.0
 
 
 def _total_healthy_minutes(held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours]) -> float:
@@ -918,7 +934,7 @@ def _noise_scale_and_healthy_alarm_peaks(
     """Return for a part left out the largest scale of the noise, the peaks of the alarm statistic in health,
     and its healthy hours."""
     bank = build_hypothesis_bank(model)
-    posterior, _, noise_variance_scale = hypothesis_posterior(held_out.samples, model, bank)
+    posterior, _, noise_variance_scales = hypothesis_posterior(held_out.samples, model, bank)
     evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
     is_healthy = (
         held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
@@ -929,7 +945,7 @@ def _noise_scale_and_healthy_alarm_peaks(
         for begin, end in _consecutive_runs(healthy_rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(page_sum) for page_sum in page_sum_runs])
-    return float(noise_variance_scale[held_out.is_usable].max(initial=1.0)), (
+    return float(noise_variance_scales[held_out.is_usable].max(initial=1.0)), (
         peaks,
         len(healthy_rows) * held_out.samples.dt_s / 3600.0,
     )
@@ -975,27 +991,32 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
             first_command_row + group_index * n_command_lags,
             first_command_row + (group_index + 1) * n_command_lags,
         )
-        coefficient_error_correlation, standardized_errors = (
+        coefficient_error_correlation, standard_errors_over_noise_sd = (
             rate_regression.coefficient_error_correlation[group_coefficient_rows, group_coefficient_rows],
             rate_regression.standard_errors[group_coefficient_rows] / noise_sd,
         )
-        summed_response = rate_regression.coefficients[group_coefficient_rows].sum(axis=0) / noise_sd
+        response_sum_over_noise_sd = (
+            rate_regression.coefficients[group_coefficient_rows].sum(axis=0) / noise_sd
+        )
         summed_response_variance = np.einsum(
-            "la,lm,ma->a", standardized_errors, coefficient_error_correlation, standardized_errors
+            "la,lm,ma->a",
+            standard_errors_over_noise_sd,
+            coefficient_error_correlation,
+            standard_errors_over_noise_sd,
         )
         relative_sd_of_summed_response[group_index] = np.sqrt(
-            summed_response**2 @ np.maximum(summed_response_variance, 0.0)
-        ) / max(float(summed_response @ summed_response), MIN_DIVISOR)
-        standardized_response = (
+            response_sum_over_noise_sd**2 @ np.maximum(summed_response_variance, 0.0)
+        ) / max(float(response_sum_over_noise_sd @ response_sum_over_noise_sd), MIN_DIVISOR)
+        response_over_its_errors = (
             rate_regression.coefficients[group_coefficient_rows]
             / noise_sd
-            / np.maximum(standardized_errors, MIN_DIVISOR)
+            / np.maximum(standard_errors_over_noise_sd, MIN_DIVISOR)
         )
         response_factor_information[group_index] += np.einsum(
             "la,lm,ma->",
-            standardized_response,
+            response_over_its_errors,
             np.linalg.pinv(coefficient_error_correlation, rcond=_RANK_TOLERANCE),
-            standardized_response,
+            response_over_its_errors,
         )
     return np.minimum(
         1.0 / np.sqrt(response_factor_information)
@@ -1006,21 +1027,21 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
 
 
 def gain_standard_error_by_column(
-    rate_regression: regression.RateRegression, model: Model, gain_variance: float
+    rate_regression: regression.RateRegression, model: Model, gain_variance_between_laws: float
 ) -> dict[str, float]:
     """Standard error of the gain of what the rates of other axes answer to each rate and signal, as
     `group_gain_standard_error` of a whole response; K coefficients of nothing but errors have the information
-    K. As much wider as the noise of parts left out. gain_variance: variance of a gain between laws: a law
-    ties commands to these columns.
+    K. As much wider as the noise of parts left out. gain_variance_between_laws: variance of a gain between
+    laws: a law ties commands to these columns.
     """
-    noise_inflation, noise_sd = (
+    max_noise_inflation, noise_sd = (
         max((noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0),
         np.sqrt(np.diag(rate_regression.residual_covariance)),
     )
-    standard_error_of_column = {}
+    gain_standard_error_of_column = {}
     for name, (past_rows, coefficients) in trust.cross_axis_coefficients(model).items():
         coefficient_rows = [1 + row for row in past_rows]
-        standardized_coefficients = coefficients / np.maximum(
+        coefficients_over_standard_errors = coefficients / np.maximum(
             rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
         )
         inverse_error_correlation = np.linalg.pinv(
@@ -1028,13 +1049,16 @@ def gain_standard_error_by_column(
             rcond=_RANK_TOLERANCE,
         )
         information = np.einsum(
-            "la,lm,ma->", standardized_coefficients, inverse_error_correlation, standardized_coefficients
+            "la,lm,ma->",
+            coefficients_over_standard_errors,
+            inverse_error_correlation,
+            coefficients_over_standard_errors,
         ) - np.count_nonzero(coefficients)
-        standard_error_of_column[name] = min(
-            float(np.sqrt(noise_inflation / max(information, MIN_DIVISOR) + gain_variance)),
+        gain_standard_error_of_column[name] = min(
+            float(np.sqrt(max_noise_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)),
             _MAX_COLUMN_GAIN_SD,
         )
-    return standard_error_of_column
+    return gain_standard_error_of_column
 
 
 def explained_variance_by_fold(
@@ -1055,7 +1079,7 @@ def score_folds_and_choose_credible_mass(
 ) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     fold_entries: list[Document] = []
-    coverage_by_mass: list[list[float]] = []
+    coverage_by_fold_and_mass: list[list[float]] = []
     for fitted_flights, held_out, held_out_name in validation_folds(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         fold_entry: Document = {
@@ -1068,17 +1092,17 @@ def score_folds_and_choose_credible_mass(
             fold_entry["score"] = score_against_labels(
                 diagnosis_rows_by_mass[model.settings.credible_mass], labels
             )
-            coverage_by_mass.append(
+            coverage_by_fold_and_mass.append(
                 [
                     score_against_labels(diagnosis_rows_by_mass[mass], labels)["held_by_bounds"]
                     for mass in _CREDIBLE_MASS_CANDIDATES
                 ]
             )
         fold_entries.append(fold_entry)
-    if not coverage_by_mass:
+    if not coverage_by_fold_and_mass:
         return fold_entries, model.settings.credible_mass
     return fold_entries, _CREDIBLE_MASS_CANDIDATES[
-        int(np.argmin(np.abs(np.mean(coverage_by_mass, axis=0) - _CREDIBLE_COVERAGE_GOAL)))
+        int(np.argmin(np.abs(np.mean(coverage_by_fold_and_mass, axis=0) - _CREDIBLE_COVERAGE_GOAL)))
     ]
 
 
@@ -1105,10 +1129,10 @@ def one_step_prediction_quality(model: Model, held_out: FlightWithUsableRows) ->
     rates = held_out.samples.rates[rows]
     if not len(rates):
         return {"samples": 0}
-    explained_variance = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), MIN_DIVISOR)
+    explained_variance_share = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), MIN_DIVISOR)
     return {
         "samples": len(rates),
-        "explained": dict(zip("pqr", explained_variance.tolist(), strict=True)),
+        "explained": dict(zip("pqr", explained_variance_share.tolist(), strict=True)),
         "residual_rad_s": dict(zip("pqr", residual.std(axis=0).tolist(), strict=True)),
     }
 

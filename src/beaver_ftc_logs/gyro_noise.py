@@ -28,9 +28,9 @@ def residual_predictor_by_yule_walker(
     covariance_blocks = np.array(
         [[_autocovariance_at_lag(autocovariance, int(j - i)) for j in lags] for i in lags]
     )
-    lag_covariance = covariance_blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
+    past_residual_covariance = covariance_blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
     cross_covariance = np.concatenate([_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in lags])
-    coefficients = np.linalg.solve(lag_covariance, cross_covariance)
+    coefficients = np.linalg.solve(past_residual_covariance, cross_covariance)
     return np.asarray(coefficients), np.asarray(autocovariance[0] - cross_covariance.T @ coefficients)
 
 

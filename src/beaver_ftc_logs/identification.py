@@ -110,16 +110,16 @@ def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tu
     """
     has_labels = any(np.isfinite(one.labels).any() for one in flights)
     reason = "labels show faults under it" if has_labels else "logs of healthy flight do not tell"
-    assumption_of_key, assumption_lines = (
+    assumption_text_of_key, assumption_lines = (
         {"other_laws": "other laws may fly", "moving_air": "the air may move"},
         [],
     )
-    for key, assumption in assumption_of_key.items():
+    for key, assumption_text in assumption_text_of_key.items():
         if getattr(vehicle, key) is None:
             vehicle = vehicle.model_copy(update={key: not has_labels})
             assumption_lines.append(
                 f"{key}: {str(not has_labels).lower()}, "
-                f"{assumption if not has_labels else 'as fitted'} ({reason})"
+                f"{assumption_text if not has_labels else 'as fitted'} ({reason})"
             )
         else:
             assumption_lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
@@ -154,7 +154,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
             fitting.flights_with_usable_rows(whitened_flights), vehicle, *n_rate_and_command_lags
         )
         common_coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
-        scores_and_ma_coefficients = [
+        log_determinants_and_ma_coefficients = [
             _log_determinant_and_best_ma_coefficients(
                 fitting.flights_with_usable_rows([one]),
                 vehicle,
@@ -164,21 +164,21 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
             for one in flights
         ]
         if (
-            new_ma_coefficients := [
-                noise_ma_coefficients for _, noise_ma_coefficients in scores_and_ma_coefficients
+            new_ma_coefficients_by_flight := [
+                noise_ma_coefficients for _, noise_ma_coefficients in log_determinants_and_ma_coefficients
             ]
         ) == ma_coefficients_by_flight:
             break
         mean_log_determinant, ma_coefficients_by_flight = (
-            np.mean([log_determinant for log_determinant, _ in scores_and_ma_coefficients]),
-            new_ma_coefficients,
+            np.mean([log_determinant for log_determinant, _ in log_determinants_and_ma_coefficients]),
+            new_ma_coefficients_by_flight,
         )
         whitened_flights = [
             whiten_samples(
                 one, noise_ma_coefficients, float(np.exp((mean_log_determinant - log_determinant) / 6.0))
             )
             for one, (log_determinant, noise_ma_coefficients) in zip(
-                flights, scores_and_ma_coefficients, strict=True
+                flights, log_determinants_and_ma_coefficients, strict=True
             )
         ]
     return whitened_flights
@@ -235,13 +235,15 @@ def expected_performance_on_another_day(fold_entries: list[Document], model: Mod
     """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
     merit, false alarms an hour and how sure that is, and how many minutes would show it."""
     scores = [fold_entry["score"] for fold_entry in fold_entries if "score" in fold_entry]
-    values_by_figure = {key: [fold_score[key] for fold_score in scores] for key in _SCORE_TITLES if scores}
+    fold_values_by_score_key = {
+        key: [fold_score[key] for fold_score in scores] for key in _SCORE_TITLES if scores
+    }
     expected_performance: Document = {
         key: {
             "mean": float(np.mean(fold_values)),
             "worst": float((max if key == "mean_error" else min)(fold_values)),
         }
-        for key, fold_values in values_by_figure.items()
+        for key, fold_values in fold_values_by_score_key.items()
     }
     fitted_ranges, settings = model.fitted_ranges, model.settings
     if fitted_ranges is None or fitted_ranges.alarm_peak_tail is None or settings.alarm_threshold is None:
@@ -354,16 +356,18 @@ def check_explained_variance(
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
     entries_with_samples = [fold_entry for fold_entry in fold_entries if fold_entry["samples"]]
     sample_counts = [fold_entry["samples"] for fold_entry in entries_with_samples]
-    explained_by_axis = {
+    explained_shares_by_axis = {
         axis: [fold_entry["explained"][axis] for fold_entry in entries_with_samples] for axis in "pqr"
     }
-    mean_explained = {
+    mean_explained_share_by_axis = {
         axis: float(np.average(fold_values, weights=sample_counts))
-        for axis, fold_values in explained_by_axis.items()
+        for axis, fold_values in explained_shares_by_axis.items()
         if entries_with_samples
     }
     if unexplained_axes := {
-        axis: explained_share for axis, explained_share in mean_explained.items() if explained_share <= 0.0
+        axis: explained_share
+        for axis, explained_share in mean_explained_share_by_axis.items()
+        if explained_share <= 0.0
     }:
         minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in usable_flights) / 60.0
         stillest_surface_and_sd = min(
@@ -649,9 +653,9 @@ def fit_output_error(
         np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
     )
     held_out_error = standardized_simulation_error(optimum.x, held_out_windows).reshape(-1, 3) * rate_sd
-    explained_variance = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_windows].reshape(-1, 3).var(
-        axis=0
-    )
+    explained_variance_share = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_windows].reshape(
+        -1, 3
+    ).var(axis=0)
     return {
         "windows": len(window_rates),
         "servo_lag_s": float(optimum.x[0]),
@@ -659,7 +663,7 @@ def fit_output_error(
         "delay_s": float(optimum.x[1]),
         "delay_sd_s": float(standard_errors[1]),
         "shorter_than_can_be_told": bool(optimum.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": dict(zip("pqr", explained_variance.tolist(), strict=True)),
+        "explained_of_windows_not_fitted": dict(zip("pqr", explained_variance_share.tolist(), strict=True)),
     }
 
 
@@ -717,21 +721,23 @@ def _simulate_free_runs(
 ) -> Floats:
     """Free runs of all windows at once, (W, window_samples, 3)."""
     n_groups = window_commands.shape[2]
-    lag_s, delay_s = parameters[:2]
+    servo_lag_s, delay_s = parameters[:2]
     rate_transition = parameters[2:11].reshape(3, 3)
-    command_effect = parameters[11 : 11 + 3 * n_groups].reshape(n_groups, 3)
-    constant_rate = parameters[11 + 3 * n_groups :]
+    rate_step_per_servo_position = parameters[11 : 11 + 3 * n_groups].reshape(n_groups, 3)
+    constant_rate_step = parameters[11 + 3 * n_groups :]
     window_samples = measured_rates.shape[1]
     n_past_samples = window_commands.shape[1] - window_samples
     whole_delay_samples, delay_fraction = divmod(delay_s / dt_s, 1.0)
-    servo_retention = np.exp(-dt_s / lag_s)
+    servo_retention = np.exp(-dt_s / servo_lag_s)
     predicted_rates, servo_positions = measured_rates[:, 0].copy(), window_commands[:, 0].copy()
     simulated_rates = np.empty_like(measured_rates)
     for k in range(window_commands.shape[1]):
         if k >= n_past_samples:
             simulated_rates[:, k - n_past_samples] = predicted_rates
             predicted_rates = (
-                predicted_rates @ rate_transition.T + servo_positions @ command_effect + constant_rate
+                predicted_rates @ rate_transition.T
+                + servo_positions @ rate_step_per_servo_position
+                + constant_rate_step
             )
         delayed_rows = max(k - int(whole_delay_samples), 0), max(k - int(whole_delay_samples) - 1, 0)
         delayed_command = (1.0 - delay_fraction) * window_commands[

@@ -153,8 +153,8 @@ def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, boun
 def _shade_alarms(axis: Any, rows: DiagnosisRows) -> None:
     """Shade the time in which the alarm stands."""
     alarm_edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
-    times_s = rows.t_s[np.minimum(alarm_edges, len(rows.t_s) - 1)]
-    for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
+    alarm_edge_times_s = rows.t_s[np.minimum(alarm_edges, len(rows.t_s) - 1)]
+    for begin_s, end_s in zip(alarm_edge_times_s[::2], alarm_edge_times_s[1::2], strict=True):
         axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 

@@ -122,8 +122,8 @@ def _fit_angle_to_rate(
     )
     is_window_gap_free = (t_s[window_end] - t_s[window_begin]) < 2.0 * _INTEGRATION_WINDOW_S
     if pitch_rad is not None:
-        n_steep = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
-        is_window_gap_free &= n_steep[window_end] == n_steep[window_begin]
+        cumulated_steep_count = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
+        is_window_gap_free &= cumulated_steep_count[window_end] == cumulated_steep_count[window_begin]
     angle_changes, rate_integrals = (
         (angle[window_end] - angle[window_begin])[is_window_gap_free],
         (rate_term_integrals[window_end] - rate_term_integrals[window_begin])[is_window_gap_free],

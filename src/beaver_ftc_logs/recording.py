@@ -82,8 +82,10 @@ def refuse_log_unreadable_by_package(
         with redirect_stdout(StringIO()):
             yield
     except ImportError:
-        missing_package = f"reading a {log_kind} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
-        raise BadInput(f"{path}: {missing_package}") from None
+        missing_package_text = (
+            f"reading a {log_kind} needs {package}, allowed: pip install 'beaver-ftc[flights]'"
+        )
+        raise BadInput(f"{path}: {missing_package_text}") from None
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
         reason = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(
@@ -96,19 +98,19 @@ def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tu
 
     topics: each topic's fields by name, one of them the stamps in us.
     """
-    rows_of_topic = {
+    rows_and_note_of_topic = {
         name: rows_with_increasing_time(name, _as_floats(fields[stamp_field]))
         for name, fields in topics.items()
     }
     first_stamps_us = [
         float(topics[name][stamp_field][kept_rows[0]])
-        for name, (kept_rows, _) in rows_of_topic.items()
+        for name, (kept_rows, _) in rows_and_note_of_topic.items()
         if len(kept_rows)
     ]
     origin_us = min(first_stamps_us, default=0.0)
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
-        kept_rows, note = rows_of_topic[name]
+        kept_rows, note = rows_and_note_of_topic[name]
         t_s = (_as_floats(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
         columns |= {
             f"{name}.{field}": Column(t_s, _as_floats(values)[kept_rows], note)
@@ -122,23 +124,23 @@ def _as_floats(values: Any) -> Floats:
     return np.asarray(values, dtype=float)
 
 
-def rows_with_increasing_time(topic: str, t_s: Floats) -> tuple[NDArray[np.int64], str]:
+def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[NDArray[np.int64], str]:
     """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
 
     One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
     nothing is said: autopilots write a stamp twice.
     """
-    if (np.diff(t_s) > 0).all() and np.isfinite(t_s).all():
-        return np.arange(len(t_s)), ""
-    stamped_rows = np.flatnonzero(np.isfinite(t_s))
-    kept_rows = stamped_rows[_longest_increasing_rows(t_s[stamped_rows])]
-    left_out_rows = np.setdiff1d(np.arange(len(t_s)), kept_rows)
-    misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or t_s[k] != t_s[k - 1]]
+    if (np.diff(stamps) > 0).all() and np.isfinite(stamps).all():
+        return np.arange(len(stamps)), ""
+    stamped_rows = np.flatnonzero(np.isfinite(stamps))
+    kept_rows = stamped_rows[_longest_increasing_rows(stamps[stamped_rows])]
+    left_out_rows = np.setdiff1d(np.arange(len(stamps)), kept_rows)
+    misplaced_rows = [k for k in left_out_rows.tolist() if k == 0 or stamps[k] != stamps[k - 1]]
     if not misplaced_rows:
         return kept_rows, ""
     n_further = len(misplaced_rows) - 1
     others_text = (
-        f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(t_s)}" if n_further else ""
+        f", as {'is' if n_further == 1 else 'are'} {n_further} more of {len(stamps)}" if n_further else ""
     )
     return (
         kept_rows,
@@ -146,20 +148,20 @@ def rows_with_increasing_time(topic: str, t_s: Floats) -> tuple[NDArray[np.int64
     )
 
 
-def _longest_increasing_rows(t_s: Floats) -> NDArray[np.int64]:
+def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
     """Places of a longest strictly increasing subsequence, by patience sorting from the end.
 
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
-    negated_ends: list[float] = []
-    end_rows: list[int] = []
-    next_row = np.full(len(t_s), -1)
-    for k in range(len(t_s) - 1, -1, -1):
-        longest_before = bisect_left(negated_ends, -t_s[k])
-        next_row[k] = end_rows[longest_before - 1] if longest_before else -1
-        negated_ends[longest_before : longest_before + 1] = [-t_s[k]]
-        end_rows[longest_before : longest_before + 1] = [k]
-    kept_rows = end_rows[-1:]
-    while kept_rows and next_row[kept_rows[-1]] >= 0:
-        kept_rows.append(int(next_row[kept_rows[-1]]))
+    negated_first_stamps: list[float] = []
+    first_rows: list[int] = []
+    next_rows = np.full(len(stamps), -1)
+    for k in range(len(stamps) - 1, -1, -1):
+        longest_following_length = bisect_left(negated_first_stamps, -stamps[k])
+        next_rows[k] = first_rows[longest_following_length - 1] if longest_following_length else -1
+        negated_first_stamps[longest_following_length : longest_following_length + 1] = [-stamps[k]]
+        first_rows[longest_following_length : longest_following_length + 1] = [k]
+    kept_rows = first_rows[-1:]
+    while kept_rows and next_rows[kept_rows[-1]] >= 0:
+        kept_rows.append(int(next_rows[kept_rows[-1]]))
     return np.array(kept_rows, dtype=np.int64)

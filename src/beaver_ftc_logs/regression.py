@@ -31,10 +31,10 @@ def group_surfaces_by_commands(vehicle: Vehicle) -> list[list[int]]:
     groups: list[list[int]] = []
     for i, mixer_row in enumerate(mixer_rows):
         for group in groups:
-            first_row_of_group = mixer_rows[group[0]]
-            if (mixer_row @ first_row_of_group) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (
+            first_mixer_row_of_group = mixer_rows[group[0]]
+            if (mixer_row @ first_mixer_row_of_group) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (
                 mixer_row @ mixer_row
-            ) * (first_row_of_group @ first_row_of_group):
+            ) * (first_mixer_row_of_group @ first_mixer_row_of_group):
                 group.append(i)
                 break
         else:
@@ -93,11 +93,11 @@ def surface_indices_by_group(model: Model) -> list[list[int]]:
 
 def expand_group_values_to_surfaces(group_values: Floats, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
-    group_of_surface = np.full(len(model.vehicle.surfaces), -1)
+    group_index_of_surface = np.full(len(model.vehicle.surfaces), -1)
     for group_index, surface_indices in enumerate(surface_indices_by_group(model)):
-        group_of_surface[surface_indices] = group_index
+        group_index_of_surface[surface_indices] = group_index
     return np.asarray(
-        np.take(np.column_stack([group_values, np.ones(len(group_values))]), group_of_surface, axis=1)
+        np.take(np.column_stack([group_values, np.ones(len(group_values))]), group_index_of_surface, axis=1)
     )
 
 
@@ -194,42 +194,42 @@ def least_squares(
     regressor_rms = np.sqrt((regressors**2).mean(axis=0))
     regressor_scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
     scaled_regressors = regressors / regressor_scale
-    inverse_gram: Floats = np.asarray(
+    scaled_inverse_gram: Floats = np.asarray(
         np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_RIDGE_SHARE), dtype=np.float64
     )
-    coefficients = inverse_gram @ (scaled_regressors.T @ rates)
-    residuals = rates - scaled_regressors @ coefficients
+    scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ rates)
+    residuals = rates - scaled_regressors @ scaled_coefficients
     degrees_of_freedom = max(len(rates) - regressors.shape[1], 1)
     residual_covariance = residuals.T @ residuals / degrees_of_freedom
-    white_standard_errors = np.sqrt(
-        np.maximum(np.outer(np.diag(inverse_gram), np.diag(residual_covariance)), 0.0)
+    scaled_white_standard_errors = np.sqrt(
+        np.maximum(np.outer(np.diag(scaled_inverse_gram), np.diag(residual_covariance)), 0.0)
     )
-    newey_west_standard_errors = np.column_stack(
+    scaled_newey_west_standard_errors = np.column_stack(
         [
             _newey_west_standard_errors(
-                scaled_regressors, residuals[:, axis], inverse_gram, stretch_number, newey_west_max_lag
+                scaled_regressors, residuals[:, axis], scaled_inverse_gram, stretch_number, newey_west_max_lag
             )
             for axis in range(rates.shape[1])
         ]
     )
     standard_error_inflation = np.divide(
-        newey_west_standard_errors,
-        white_standard_errors,
-        out=np.ones_like(newey_west_standard_errors),
-        where=white_standard_errors > 0,
+        scaled_newey_west_standard_errors,
+        scaled_white_standard_errors,
+        out=np.ones_like(scaled_newey_west_standard_errors),
+        where=scaled_white_standard_errors > 0,
     )
-    inverse_gram_root = np.sqrt(np.maximum(np.diag(inverse_gram), MIN_DIVISOR))
+    root_of_inverse_gram_diagonal = np.sqrt(np.maximum(np.diag(scaled_inverse_gram), MIN_DIVISOR))
     return RateRegression(
-        coefficients / regressor_scale[:, None], residual_covariance,
-        newey_west_standard_errors / regressor_scale[:, None], standard_error_inflation,
-        inverse_gram / np.outer(inverse_gram_root, inverse_gram_root),
+        scaled_coefficients / regressor_scale[:, None], residual_covariance,
+        scaled_newey_west_standard_errors / regressor_scale[:, None], standard_error_inflation,
+        scaled_inverse_gram / np.outer(root_of_inverse_gram_diagonal, root_of_inverse_gram_diagonal),
     )  # fmt: skip
 
 
 def _newey_west_standard_errors(
     scaled_regressors: Floats,
     residual: Floats,
-    inverse_gram: Floats,
+    scaled_inverse_gram: Floats,
     stretch_number: NDArray[np.int64],
     max_lag: int,
 ) -> Floats:
@@ -243,7 +243,7 @@ def _newey_west_standard_errors(
         )
         window_sums = cumulated_scores[bartlett_width:] - cumulated_scores[:-bartlett_width]
         score_covariance += window_sums.T @ window_sums / bartlett_width
-    return np.sqrt(np.maximum(np.diag(inverse_gram @ score_covariance @ inverse_gram), 0.0))
+    return np.sqrt(np.maximum(np.diag(scaled_inverse_gram @ score_covariance @ scaled_inverse_gram), 0.0))
 
 
 def coefficient_upper_bounds(
@@ -254,16 +254,18 @@ def coefficient_upper_bounds(
     as in `FilterSettings`."""
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
     scaled_regressors = regressors / regressor_rms
-    inverse_gram = np.linalg.inv(
+    scaled_inverse_gram = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
         + _RIDGE_SHARE * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
-    coefficients = inverse_gram @ (scaled_regressors.T @ outputs)
-    squared_residuals = (outputs - scaled_regressors @ coefficients) ** 2
-    standard_error = np.sqrt(
-        np.maximum(np.diag(inverse_gram), 0.0) * squared_residuals.mean() / effective_sample_share
+    scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ outputs)
+    squared_residuals = (outputs - scaled_regressors @ scaled_coefficients) ** 2
+    scaled_standard_errors = np.sqrt(
+        np.maximum(np.diag(scaled_inverse_gram), 0.0) * squared_residuals.mean() / effective_sample_share
     )
-    return (coefficients + BOUND_WIDTH_STANDARD_ERRORS * standard_error) / regressor_rms, squared_residuals
+    return (
+        scaled_coefficients + BOUND_WIDTH_STANDARD_ERRORS * scaled_standard_errors
+    ) / regressor_rms, squared_residuals
 
 
 def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
@@ -275,11 +277,11 @@ def split_into_flight_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] 
 def variance_inflation_factors(regressors: Floats) -> Floats:
     """How much each column's coefficient's variance is inflated by the others: 1 alone, inf dependent."""
     centred_regressors = regressors - regressors.mean(axis=0)
-    column_norm = np.sqrt((centred_regressors**2).sum(axis=0))
+    column_norms = np.sqrt((centred_regressors**2).sum(axis=0))
     inflation_factors = np.full(regressors.shape[1], np.inf)
-    is_varying = column_norm > 1e-12
-    correlation = (centred_regressors[:, is_varying] / column_norm[is_varying]).T @ (
-        centred_regressors[:, is_varying] / column_norm[is_varying]
+    is_varying = column_norms > 1e-12
+    correlation = (centred_regressors[:, is_varying] / column_norms[is_varying]).T @ (
+        centred_regressors[:, is_varying] / column_norms[is_varying]
     )
     eigenvalues, eigenvectors = np.linalg.eigh(correlation)
     is_nonzero_eigenvalue, squared_eigenvectors = (

@@ -77,16 +77,18 @@ def _replay_verdict(
 ) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log_columns["t_s"]
-    detection_times_s = [float(row_t_s) for row_t_s, one in zip(t_s, verdicts, strict=True) if one.detected]
+    detected_row_times_s = [
+        float(row_t_s) for row_t_s, one in zip(t_s, verdicts, strict=True) if one.detected
+    ]
     isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
     logged_and_replayed = zip(log_columns.get("detected", []), verdicts, strict=False)
     verdict: Document = {
         "flight": scenario.name,
         "replay": True,
         "duration_s": float(t_s[-1] - t_s[0]),
-        "faulty": bool(detection_times_s),
+        "faulty": bool(detected_row_times_s),
         "credible": {"share": 1.0, "reasons": []},
-        "detection_s": detection_times_s[0] if detection_times_s else None,
+        "detection_s": detected_row_times_s[0] if detected_row_times_s else None,
         "isolation_s": isolation_s,
         "isolated": name,
         "rows_that_differ": sum(

@@ -47,15 +47,17 @@ _MIN_GAP_STEPS = 3.5
 class Samples:
     """One flight, ready for identification and filtering.
 
-    t_s (n,) s. rates (n, 3) rad/s. commands (n, S): command of each surface as the mixer makes it, in shares
-    of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown. stretch_number (n,): number of
-    the gap-free stretch. mean_age_s_by_held_column: mean age of the values of each column that is held.
-    log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading. airspeed (n,) m/s, nan
-    where unknown. time_since_change_s: for how long each column of rates, commands and signals has been
-    constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy height over the
-    last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the noise by which
-    rates, commands and signals are whitened, empty if they are not. fit_weight of each sample in a fit.
-    n_log_parts: number of parts in which the log was read; if several, the samples are chosen stretches.
+    t_s (n,) s: the log's own stamps, or an even grid within each stretch if the log is faster than the
+    vehicle's largest sample rate. rates (n, 3) rad/s. commands (n, S): command of each surface as the mixer
+    makes it, in shares of travel. signals (n, X). labels (n, S): effectiveness, nan where unknown.
+    stretch_number (n,): number of the gap-free stretch. mean_age_s_by_held_column: mean age of the values of
+    each column that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading.
+    airspeed (n,) m/s, nan where unknown. time_since_change_s: for how long each column of rates, commands and
+    signals has been constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy
+    height over the last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the
+    noise by which rates, commands and signals are whitened, empty if they are not. fit_weight of each sample
+    in a fit. n_log_parts: number of parts in which the log was read; if several, the samples are chosen
+    stretches.
     """
 
     name: str
@@ -94,17 +96,21 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     _check_rates_fit_attitude(recording, vehicle)
     log_stamps_s = recording.columns[rate_columns[0]].t_s
     t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
-    values_and_age = {name: values_and_age_at(recording.columns[name], t_s, step_s) for name in used_columns}
+    values_and_mean_age = {
+        name: values_and_age_at(recording.columns[name], t_s, step_s) for name in used_columns
+    }
     for name in rate_columns:
-        values, age_s = values_and_age[name]
-        values_and_age[name] = (
+        values, mean_age_s = values_and_mean_age[name]
+        values_and_mean_age[name] = (
             np.where(_is_stale(recording.columns[name], t_s, step_s), np.nan, values),
-            age_s,
+            mean_age_s,
         )
 
     def stacked_columns(names: list[str]) -> Floats:
         return (
-            np.column_stack([values_and_age[name][0] for name in names]) if names else np.empty((len(t_s), 0))
+            np.column_stack([values_and_mean_age[name][0] for name in names])
+            if names
+            else np.empty((len(t_s), 0))
         )
 
     samples = Samples(
@@ -117,7 +123,9 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         stretch_number=stretch_number,
         dt_s=step_s,
         mean_age_s_by_held_column={
-            name: age_s for name, (_, age_s) in values_and_age.items() if age_s is not None
+            name: mean_age_s
+            for name, (_, mean_age_s) in values_and_mean_age.items()
+            if mean_age_s is not None
         },
         logged_failures=recording.logged_failures,
         log_stamps_s=log_stamps_s,
@@ -175,11 +183,11 @@ def whiten_samples(
     run_edges = np.flatnonzero((np.diff(is_known) != 0) | (np.diff(samples.stretch_number) != 0)) + 1
     joined_values[~is_known] = np.nan
     for run_begin, run_end in pairwise([0, *run_edges.tolist(), len(joined_values)]):
-        first_row = joined_values[run_begin]
-        joined_values[run_begin:run_end] = first_row + lfilter(
+        first_values = joined_values[run_begin]
+        joined_values[run_begin:run_end] = first_values + lfilter(
             [sum(noise_ma_coefficients)],
             noise_ma_coefficients,
-            joined_values[run_begin:run_end] - first_row,
+            joined_values[run_begin:run_end] - first_values,
             axis=0,
         )
     whitened_rates, whitened_commands, whitened_signals = np.split(
@@ -265,10 +273,10 @@ def _sampled_energy_height_rate_mps(
 def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     columns, attitude, mistake = recording.columns, vehicle.attitude, None
-    rate_columns = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if attitude and not signals.is_clipped(next(iter(rate_columns.values())).values).any():
+    rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    if attitude and not signals.is_clipped(next(iter(rate_column_by_name.values())).values).any():
         angle_quantities = [attitude.roll, attitude.pitch, attitude.yaw]
-        angle_columns = [
+        named_angles = [
             (one.column, columns[one.column]) if one and one.column in columns else None
             for one in angle_quantities
         ]
@@ -280,7 +288,7 @@ def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> No
         other_logged_columns = {
             name: columns[name] for name in dict.fromkeys(other_column_names) if name in columns
         }
-        mistake = physics.find_attitude_mistake(rate_columns, angle_columns, other_logged_columns)
+        mistake = physics.find_attitude_mistake(rate_column_by_name, named_angles, other_logged_columns)
     z_acceleration = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and z_acceleration:
         mistake = physics.gravity_remark(z_acceleration, vehicle.acceleration.column)
@@ -320,27 +328,27 @@ def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_colu
         nearest_text = nearest_names(missing_names[0], recording.columns)
         reason = f"no column {missing_names[0]}, allowed: a log that has it; it has {nearest_text}"
         raise BadInput(f"{recording.name}: {reason}")
-    largest_magnitude = {}
+    max_abs_of_column = {}
     for name in used_columns:
         values = recording.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
-        largest_magnitude[name] = float(np.nanmax(np.abs(values)))
-        if largest_magnitude[name] > _MAX_LOGGED_MAGNITUDE:
+        max_abs_of_column[name] = float(np.nanmax(np.abs(values)))
+        if max_abs_of_column[name] > _MAX_LOGGED_MAGNITUDE:
             mistake = (
-                f"column {name} holds {largest_magnitude[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
+                f"column {name} holds {max_abs_of_column[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
             )
             raise BadInput(f"{recording.name}: {mistake}")
     for name in rate_columns:
-        if largest_magnitude[name] > _MAX_BODY_RATE_RAD_S:
-            max_rate_if_deg_s = np.deg2rad(largest_magnitude[name])
+        if max_abs_of_column[name] > _MAX_BODY_RATE_RAD_S:
+            max_rate_rad_s_if_deg_s = np.deg2rad(max_abs_of_column[name])
             deg_hint = (
-                f" (deg/s would be {max_rate_if_deg_s:.3g} rad/s: `unit: deg/s`)"
-                if max_rate_if_deg_s < _MAX_BODY_RATE_RAD_S
+                f" (deg/s would be {max_rate_rad_s_if_deg_s:.3g} rad/s: `unit: deg/s`)"
+                if max_rate_rad_s_if_deg_s < _MAX_BODY_RATE_RAD_S
                 else ""
             )
             raise BadInput(
-                f"{recording.name}: column {name} reaches {largest_magnitude[name]:g}, allowed: rates in "
+                f"{recording.name}: column {name} reaches {max_abs_of_column[name]:g}, allowed: rates in "
                 f"rad/s, up to {_MAX_BODY_RATE_RAD_S:g}{deg_hint}"
             )
 
@@ -395,12 +403,16 @@ def _other_time_unit_hint(rate_hz: float) -> str:
 
 def _regular_time_base(stamps: Floats, step_s: float) -> tuple[Floats, NDArray[np.int64], float]:
     """Samples a step apart over each stretch of the log, from its first stamp on: as `_time_base`."""
-    stretch_begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
-    stretch_end = np.append(stretch_begin[1:], len(stamps)) - 1
-    n_samples = np.ceil((stamps[stretch_end] - stamps[stretch_begin]) / step_s + 0.5).astype(np.int64)
-    stretch_number = np.repeat(np.arange(len(stretch_begin)), n_samples)
-    index_in_stretch = np.arange(len(stretch_number)) - np.repeat(np.cumsum(n_samples) - n_samples, n_samples)
-    return stamps[stretch_begin][stretch_number] + index_in_stretch * step_s, stretch_number, step_s
+    stretch_begin_rows = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
+    stretch_last_rows = np.append(stretch_begin_rows[1:], len(stamps)) - 1
+    n_samples_of_stretch = np.ceil(
+        (stamps[stretch_last_rows] - stamps[stretch_begin_rows]) / step_s + 0.5
+    ).astype(np.int64)
+    stretch_number = np.repeat(np.arange(len(stretch_begin_rows)), n_samples_of_stretch)
+    index_in_stretch = np.arange(len(stretch_number)) - np.repeat(
+        np.cumsum(n_samples_of_stretch) - n_samples_of_stretch, n_samples_of_stretch
+    )
+    return stamps[stretch_begin_rows][stretch_number] + index_in_stretch * step_s, stretch_number, step_s
 
 
 def _median_step_s(stamps: Floats) -> float:
@@ -512,7 +524,7 @@ def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None =
 def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
     """A flight; of a long one stretches that are spread over it evenly."""
     kept_stretches: list[Samples] = []
-    keep_every_nth, n_stretches, read_until_s = 1, 0, -np.inf
+    keep_every_nth_stretch, n_stretches_seen, read_until_s = 1, 0, -np.inf
     for part_number, recording in enumerate(read_parts_for_vehicle(path, vehicle, reader), 1):
         samples = resample(recording, vehicle)
         for begin in range(
@@ -520,11 +532,11 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
             len(samples.t_s),
             _FIT_STRETCH_SAMPLES,
         ):
-            if n_stretches % keep_every_nth == 0:
+            if n_stretches_seen % keep_every_nth_stretch == 0:
                 kept_stretches.append(_select_rows(samples, slice(begin, begin + _FIT_STRETCH_SAMPLES)))
-            n_stretches += 1
+            n_stretches_seen += 1
         while len(kept_stretches) * _FIT_STRETCH_SAMPLES > MAX_FIT_SAMPLES and part_number > 1:
-            kept_stretches, keep_every_nth = kept_stretches[::2], 2 * keep_every_nth
+            kept_stretches, keep_every_nth_stretch = kept_stretches[::2], 2 * keep_every_nth_stretch
         read_until_s = samples.t_s[-1]
     return samples if part_number == 1 else _concatenate_samples(path.stem, kept_stretches, part_number)
 

@@ -83,7 +83,7 @@ def score_against_failures(
     delay delay_s."""
     first_failure_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_failure_s) else float(first_failure_s))
-    surfaces = sorted(
+    failed_surfaces = sorted(
         {
             failure.surface
             for failure in failures
@@ -95,14 +95,14 @@ def score_against_failures(
     detected = bool(alarm_rows_after.size)
     name_shares = _name_shares_after_failure(rows, alarm_rows_after)
     return {
-        "failure": "+".join(surfaces) or None,
+        "failure": "+".join(failed_surfaces) or None,
         "failure_s": onset.at_s,
         "healthy_s": float(rows.t_s[is_before_failure][-1] - rows.t_s[0]) if is_before_failure.any() else 0.0,
         "false_alarms": int(np.sum(np.diff(rows.faulty[is_before_failure], prepend=0) == 1)),
         "detected": detected,
         "delay_s": onset.delay_s(float(rows.t_s[alarm_rows_after[0]])) if detected else None,
         "named": name_shares,
-        "right_group": _is_right_group(name_shares, surfaces, groups),
+        "right_group": _is_right_group(name_shares, failed_surfaces, groups),
     }
 
 
@@ -118,22 +118,22 @@ def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray
 
 
 def _is_right_group(
-    name_shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
+    name_shares: dict[str, float], failed_surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure is a group that failed; None without a failure or
     name."""
-    name_endings = tuple(f"_{surface}" for surface in surfaces)
-    failed_groups = {
+    name_endings = tuple(f"_{surface}" for surface in failed_surfaces)
+    failed_group_indices = {
         group_index
         for group_index, group in enumerate(groups)
         for name in group
-        if name in surfaces or name.endswith(name_endings)
+        if name in failed_surfaces or name.endswith(name_endings)
     }
     share_of_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
-    if not failed_groups or not share_of_name:
+    if not failed_group_indices or not share_of_name:
         return None
     most_frequent_surfaces = set(max(share_of_name, key=lambda name: share_of_name[name]).split("+"))
-    named_groups = {
+    named_group_indices = {
         group_index for group_index, group in enumerate(groups) if most_frequent_surfaces & set(group)
     }
-    return bool(named_groups) and named_groups <= failed_groups
+    return bool(named_group_indices) and named_group_indices <= failed_group_indices

@@ -20,9 +20,9 @@ Mask = NDArray[np.bool_]
 def time_since_change_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
     row_index = np.arange(len(column.values))
-    unchanged_since = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row_index, 0))
+    unchanged_since_row = np.maximum.accumulate(np.where(_differs_from_previous(column.values), row_index, 0))
     return np.where(
-        row_index - unchanged_since >= MIN_STILL_ROWS, column.t_s - column.t_s[unchanged_since], 0.0
+        row_index - unchanged_since_row >= MIN_STILL_ROWS, column.t_s - column.t_s[unchanged_since_row], 0.0
     )
 
 
@@ -43,7 +43,7 @@ def is_clipped(values: Floats) -> Mask:
         finite_values = np.where(np.isfinite(signed_values), signed_values, -np.inf)
         is_at_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (signed_values > 0.0)
         row_index = np.arange(len(signed_values))
-        at_maximum_since = np.maximum.accumulate(
+        at_maximum_since_row = np.maximum.accumulate(
             np.where(_differs_from_previous(signed_values) | ~is_at_maximum, row_index, 0)
         )
         maximum_number = np.cumsum(
@@ -54,7 +54,7 @@ def is_clipped(values: Floats) -> Mask:
         )
         is_clipped_row |= (
             is_at_maximum
-            & (row_index - at_maximum_since >= _MIN_CLIPPED_ROWS - 1)
+            & (row_index - at_maximum_since_row >= _MIN_CLIPPED_ROWS - 1)
             & (n_rows_at_maximum >= _MIN_CLIPPED_TOTAL_ROWS)
         )
     return is_clipped_row
@@ -65,10 +65,10 @@ def _count_rows_at_previous_maxima(
 ) -> NDArray[np.int64]:
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
     reached. maximum_number (n,): number of the present largest value, counted from 1."""
-    n_at_maximum = np.cumsum(is_at_maximum)
+    cumulated_rows_at_maximum = np.cumsum(is_at_maximum)
     first_row_of_maximum = np.flatnonzero(np.diff(maximum_number, prepend=0))
     return (
-        (n_at_maximum - is_at_maximum)[first_row_of_maximum][maximum_number - 1]
+        (cumulated_rows_at_maximum - is_at_maximum)[first_row_of_maximum][maximum_number - 1]
         if len(first_row_of_maximum)
         else np.zeros(len(maximum_number), dtype=np.int64)
     )

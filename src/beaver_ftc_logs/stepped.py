@@ -41,8 +41,8 @@ class ReplayedVerdicts:
 
 def declared_errors(scenario: Any) -> dict[str, Any]:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
-    scenario_keys = scenario.model_dump(mode="json", exclude_unset=True)
-    return {key: scenario_keys[key] for key in _DECLARING_SCENARIO_KEYS if key in scenario_keys}
+    scenario_values = scenario.model_dump(mode="json", exclude_unset=True)
+    return {key: scenario_values[key] for key in _DECLARING_SCENARIO_KEYS if key in scenario_values}
 
 
 def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
@@ -99,12 +99,12 @@ def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> F
         np.full(expected_effect.shape[2], -np.inf),
     )
     for part_rows in rows_by_part:
-        coefficient_bounds, _ = coefficient_upper_bounds(
+        part_upper_bounds, _ = coefficient_upper_bounds(
             regressors[part_rows].reshape(3 * len(part_rows), -1),
             scaled_innovation[part_rows].ravel(),
             _EFFECTIVE_SAMPLE_SHARE,
         )
-        gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + coefficient_bounds[3:])
+        gain_upper_bounds = np.maximum(gain_upper_bounds, 1.0 + part_upper_bounds[3:])
     return gain_upper_bounds
 
 

@@ -60,7 +60,7 @@ def compute_fitted_ranges(
     surface_groups = regression.surface_indices_by_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights])
-    known_airspeeds = [
+    used_airspeeds = [
         samples.airspeed[is_used] for samples, is_used in flights if samples.airspeed is not None
     ]
     group_commands = np.column_stack(
@@ -69,7 +69,7 @@ def compute_fitted_ranges(
     return FittedRanges(
         commands=central_ranges(commands),
         rates=central_ranges(rates),
-        airspeed=central_ranges(np.concatenate(known_airspeeds)[:, None])[0] if known_airspeeds else None,
+        airspeed=central_ranges(np.concatenate(used_airspeeds)[:, None])[0] if used_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_correlation_matrix(group_commands).tolist(),
         tied=effect_share_explained_by_others(flights, model).tolist(),
@@ -83,12 +83,14 @@ def compute_fitted_ranges(
 
 def _estimate_unpowered_climb_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
-    known_rates_mps = [
+    used_energy_height_rates_mps = [
         one.energy_height_rate_mps[is_used]
         for one, is_used in flights
         if one.energy_height_rate_mps is not None
     ]
-    energy_height_rates_mps = np.concatenate(known_rates_mps) if known_rates_mps else np.empty(0)
+    energy_height_rates_mps = (
+        np.concatenate(used_energy_height_rates_mps) if used_energy_height_rates_mps else np.empty(0)
+    )
     energy_height_rates_mps = energy_height_rates_mps[np.isfinite(energy_height_rates_mps)]
     return (
         float(np.quantile(energy_height_rates_mps, energy.UNPOWERED_ENERGY_HEIGHT_RATE_QUANTILE))
@@ -262,24 +264,28 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
     if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
         return
     rate_sd_ratios = np.nanstd(samples.rates, axis=0) / np.maximum(fitted_ranges.rate_sd_rad_s, MIN_DIVISOR)
-    mean_sd_ratio = float(np.exp(np.mean(np.log(np.maximum(rate_sd_ratios, MIN_DIVISOR)))))
+    geometric_mean_sd_ratio = float(np.exp(np.mean(np.log(np.maximum(rate_sd_ratios, MIN_DIVISOR)))))
     for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
         are_axes_alike = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
         if (
             are_axes_alike
-            and 1.0 / _UNIT_TOLERANCE_FACTOR**2 < mean_sd_ratio / units_per_rad < _UNIT_TOLERANCE_FACTOR**2
+            and 1.0 / _UNIT_TOLERANCE_FACTOR**2
+            < geometric_mean_sd_ratio / units_per_rad
+            < _UNIT_TOLERANCE_FACTOR**2
         ):
             raise BadInput(
-                f"{samples.name}: rates spread {mean_sd_ratio:.3g} times as widely as in the "
+                f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
                 "flights of the model, "
                 f"allowed: rates in rad/s; a factor of {1.0 / units_per_rad:.4g} (`unit: {unit}`) fits"
             )
         if (
             are_axes_alike
-            and 1.0 / _UNIT_TOLERANCE_FACTOR**2 < mean_sd_ratio * units_per_rad < _UNIT_TOLERANCE_FACTOR**2
+            and 1.0 / _UNIT_TOLERANCE_FACTOR**2
+            < geometric_mean_sd_ratio * units_per_rad
+            < _UNIT_TOLERANCE_FACTOR**2
         ):
             raise BadInput(
-                f"{samples.name}: rates spread {mean_sd_ratio:.3g} times as widely as in the "
+                f"{samples.name}: rates spread {geometric_mean_sd_ratio:.3g} times as widely as in the "
                 "flights of the model, "
                 f"allowed: rates in rad/s; a factor of {units_per_rad:.4g} fits: the model's "
                 f"own were in {unit}?"
@@ -454,24 +460,26 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     more as flights were that the model was not fitted on, whose columns are right, and by as much again for
     another law (`FittedRanges.misread`).
     """
-    log_likelihood_gain_by_mistake, n_effective_part_samples = log_likelihood_gain_of_corrections(
+    min_gain_per_sample_by_correction, n_effective_part_samples = log_likelihood_gain_of_corrections(
         samples, model
     )
-    if not log_likelihood_gain_by_mistake:
+    if not min_gain_per_sample_by_correction:
         return None
-    correction_text, largest_gain = max(log_likelihood_gain_by_mistake.items(), key=lambda one: one[1])
-    max_gain_without_mistake = (
+    correction_text, max_gain_per_sample = max(
+        min_gain_per_sample_by_correction.items(), key=lambda one: one[1]
+    )
+    max_gain_per_sample_without_mistake = (
         2.0 * model.fitted_ranges.max_column_mistake_log_likelihood_gain
         if model.fitted_ranges is not None
         else 0.0
     )
     if (
-        largest_gain * n_effective_part_samples
-        <= np.log(len(log_likelihood_gain_by_mistake) / _MAX_FALSE_MISTAKE_PROBABILITY)
-        + max_gain_without_mistake * n_effective_part_samples
+        max_gain_per_sample * n_effective_part_samples
+        <= np.log(len(min_gain_per_sample_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
+        + max_gain_per_sample_without_mistake * n_effective_part_samples
     ):
         return None
-    log10_ratio = largest_gain * n_effective_part_samples / np.log(10.0)
+    log10_ratio = max_gain_per_sample * n_effective_part_samples / np.log(10.0)
     return f"each part of the flight is at least 10^{log10_ratio:.0f} times as likely with {correction_text}"
 
 
@@ -485,15 +493,15 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
     if likelihoods_and_sample_count is None:
         return {}, 0.0
     log_likelihood_by_part, n_effective_part_samples = likelihoods_and_sample_count
-    log_likelihood_gain_by_mistake = {}
+    min_gain_per_sample_by_correction = {}
     for correction in corrections:
         corrected_likelihoods = _log_likelihood_by_flight_part(correction.samples, model)
-        log_likelihood_gain_by_mistake[correction.correction_text] = (
+        min_gain_per_sample_by_correction[correction.correction_text] = (
             -np.inf
             if corrected_likelihoods is None
             else float((corrected_likelihoods[0] + correction.log_jacobian - log_likelihood_by_part).min())
         )
-    return log_likelihood_gain_by_mistake, n_effective_part_samples
+    return min_gain_per_sample_by_correction, n_effective_part_samples
 
 
 def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:

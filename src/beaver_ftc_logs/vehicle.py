@@ -287,13 +287,13 @@ class Vehicle(Section):
             mistakes += _unknown_name_mistakes(
                 ("surfaces", surface), command_shares, "command", self.command_columns
             )
-        tables_by_surface: dict[str, Collection[str]] = {
+        surface_tables_by_key: dict[str, Collection[str]] = {
             "labels": self.labels,
             "outputs": self.outputs,
             "full_deflection_rad": self.full_deflection_rad,
             "airspeed_powers": self.airspeed_powers,
         }
-        for key, value_by_surface in tables_by_surface.items():
+        for key, value_by_surface in surface_tables_by_key.items():
             mistakes += _unknown_name_mistakes((key,), value_by_surface, "surface", self.surfaces)
         for location, kind, quantity in self.quantities_of_known_kind():
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
@@ -381,9 +381,11 @@ class Vehicle(Section):
     def signal_regressor_names(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
         airspeed (`samples.scale_by_dynamic_pressure`)."""
-        rates = [getattr(self.rates, axis).column for axis in "pqr"]
-        airspeed_products = rates + self.signal_columns if self.reference_airspeed_mps is not None else []
-        return self.signal_columns + [f"{name} by airspeed" for name in airspeed_products]
+        rate_columns = [getattr(self.rates, axis).column for axis in "pqr"]
+        names_multiplied_by_airspeed = (
+            rate_columns + self.signal_columns if self.reference_airspeed_mps is not None else []
+        )
+        return self.signal_columns + [f"{name} by airspeed" for name in names_multiplied_by_airspeed]
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""

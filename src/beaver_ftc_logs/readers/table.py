@@ -74,8 +74,8 @@ def read_parts(
                 f"{note_of_column[column]}\n{remark}" if column in note_of_column else remark
             )
         t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[time_unit]
-        kept_rows, lost_lines = _rows_with_time(path, time_column, t_s)
-        row_selection = slice(None) if kept_rows is None else kept_rows
+        is_row_kept, left_out_row_notes = _rows_with_time(path, time_column, t_s)
+        row_selection = slice(None) if is_row_kept is None else is_row_kept
         t_s = t_s[row_selection]
         check_time(path, t_s, time_column, cells.n_rows_before)
         flight_columns = {
@@ -83,7 +83,7 @@ def read_parts(
             for column_name, values in table.items()
         }
         is_whole_table = part_number == 1 and not has_more
-        all_notes = (*filter(None, note_of_column.get("", "").split("\n")), *lost_lines)
+        all_notes = (*filter(None, note_of_column.get("", "").split("\n")), *left_out_row_notes)
         yield RecordedFlight(
             path.stem if is_whole_table else f"{path.stem}-part-{part_number}",
             flight_columns,
@@ -251,12 +251,12 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
     row_groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
     column_chunks = [row_group.column(i) for row_group in row_groups for i in range(row_group.num_columns)]
-    stored_bytes = sum(
+    uncompressed_bytes = sum(
         column_chunk.total_uncompressed_size
         for column_chunk in column_chunks
         if column_chunk.path_in_schema in set(names)
     )
-    n_bytes = max(stored_bytes, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
+    n_bytes = max(uncompressed_bytes, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
     if n_bytes > _MAX_NUMBER_BYTES:
         raise BadInput(
             f"{path}: holds {n_bytes / 1e9:,.1f} GB of numbers, allowed: up to {_MAX_NUMBER_BYTES / 1e9:g} GB"

@@ -390,20 +390,23 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
     methods = _method_titles(data_set)
     failure_of_flight = {one["left_out"]: one["failure"] for one in data_set["flights"]}
-    surfaces = [
+    failed_surfaces = [
         failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
     ]
-    for i, surface in enumerate(surfaces):
+    for i, failed_surface in enumerate(failed_surfaces):
         shown_flights = [
-            one for one in data_set["flights"] if one["failure"] == surface and one["method"] in methods
+            one
+            for one in data_set["flights"]
+            if one["failure"] == failed_surface and one["method"] in methods
         ]
         delays_s = [
             _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in shown_flights
         ]
         mark_heights = [
-            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(surfaces) - 0.5) for one in shown_flights
+            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(failed_surfaces) - 0.5)
+            for one in shown_flights
         ]
-        label = surface.replace("_", " ").replace("+", " + ")
+        label = failed_surface.replace("_", " ").replace("+", " + ")
         axis.plot(
             [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
             mark_heights,
@@ -418,17 +421,19 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
 
 def _draw_label_shares(axis: Any, data_set: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
-    label_of_figure = {
+    label_of_score = {
         "classes": "class",
         "healthy_or_faulty": "healthy or faulty",
         "side": "side of the aircraft",
     }
     rows = [*data_set["rows"], *data_set["published"]]
-    for i, (key, label) in enumerate(label_of_figure.items()):
-        rows_with_figure = [row_index for row_index, row in enumerate(rows) if row.get(key) is not None]
-        mark_heights = [row_index + 0.22 * (i - 1) for row_index in rows_with_figure]
+    for i, (key, label) in enumerate(label_of_score.items()):
+        indices_of_rows_with_score = [
+            row_index for row_index, row in enumerate(rows) if row.get(key) is not None
+        ]
+        mark_heights = [row_index + 0.22 * (i - 1) for row_index in indices_of_rows_with_score]
         axis.plot(
-            [rows[row_index][key] for row_index in rows_with_figure],
+            [rows[row_index][key] for row_index in indices_of_rows_with_score],
             mark_heights,
             marker(i),
             color=SERIES[i],

@@ -229,36 +229,36 @@ def _score_days(
         whole_flight_model.coefficient_arrays()[3],
     )
     for day in days:
-        scores: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
+        scores_by_detector: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in models_and_held_out:
             altered_samples, labels = (
                 apply_day_changes(day, held_out.samples, past_coefficients, noise_covariance),
                 benchmark.labels_in_usable_span(held_out),
             )
-            for detector_name, method_scores in scores.items():
+            for detector_name, method_scores in scores_by_detector.items():
                 method_scores.append(
                     scoring.score_against_labels(
                         diagnose_with_detector(detector_name, altered_samples, model), labels
                     )
                 )
-        rival_classes = benchmark.summarize_labels(scores[_RIVAL_DETECTOR])["classes"]
+        rival_class_score = benchmark.summarize_labels(scores_by_detector[_RIVAL_DETECTOR])["classes"]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_labels(scores[BANK_OF_FILTERS_DETECTOR]),
-            "beside": rival_classes,
+            **benchmark.summarize_labels(scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
+            "beside": rival_class_score,
         }
 
 
 def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values_of_figure = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
-    mean = {key: float(np.mean(figure_values)) for key, figure_values in values_of_figure.items()}
+    values_of_score = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
+    mean = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
     return {
         "kind": kind,
         "mean": mean,
         "worst": {
-            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(figure_values)
-            for k, figure_values in values_of_figure.items()
+            k: _WORST_FUNCTION_BY_SCORE.get(k, min)(score_values)
+            for k, score_values in values_of_score.items()
         },
     }

@@ -166,7 +166,7 @@ def _effectiveness_levels_and_prior_shares(model: Model, group_index: int) -> tu
 def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
     summed_response_in_residual_sd = np.abs(command_response[group_index]).sum(axis=0) / np.sqrt(
         np.diag(residual_covariance)
     )
@@ -229,7 +229,7 @@ class TrimAndGainStateModel(NamedTuple):
 def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     """The prior and the limits of trim and gains, from a model's settings."""
     settings, n_groups = model.settings, len(model.groups)
-    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
     residual_variance = np.diag(residual_covariance)
     trim_shift_sd_by_group = command_response.sum(axis=1) * settings.trim_command_shift_sd
     initial_covariance = np.zeros((4 + n_groups, 4 + n_groups))
@@ -297,7 +297,7 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
     )
     scale_memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(
-        model.whitened_intercept(noise_ma_coefficients), model.coefficient_arrays()[3],
+        model.whitened_intercept(noise_ma_coefficients), model.intercept_past_response_noise()[3],
         settings.effective_sample_share, settings.t_degrees_of_freedom, scale_memory_samples,
         _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
         model.noise_inflation(noise_ma_coefficients),

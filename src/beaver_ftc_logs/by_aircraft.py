@@ -21,7 +21,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import DiagnosisRows
 from beaver_ftc_logs.recording import Floats, RecordedFlight, nearest_names
-from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_age_at
+from beaver_ftc_logs.samples import Samples, convert_to_si, resample, values_and_mean_age_at
 from beaver_ftc_logs.stepped import (
     ReplayedVerdicts,
     declared_errors,
@@ -248,7 +248,7 @@ def _read_sample_inputs(
     )
 
     def sampled_values(quantity: QuantityColumn) -> Floats:
-        values, mean_age_s = values_and_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
+        values, mean_age_s = values_and_mean_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
         if mean_age_s is not None:
             mean_age_s_by_held_column[quantity.column] = mean_age_s
         return values

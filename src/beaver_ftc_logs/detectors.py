@@ -59,10 +59,10 @@ BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
 def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponentially: bool) -> DiagnosisRows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
     regressors, residual = _whitened_loss_regression(samples, model)
-    information = _sums_over_memory(
+    information = _fading_or_sliding_sums(
         np.einsum("nai,naj->nij", regressors, regressors), samples.dt_s, forgets_exponentially
     )
-    score_vector = _sums_over_memory(
+    score_vector = _fading_or_sliding_sums(
         np.einsum("nai,na->ni", regressors, residual), samples.dt_s, forgets_exponentially
     )
     prior_information = np.diag(
@@ -81,7 +81,7 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
 def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
     is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
-    residual_covariance = model.coefficient_arrays()[3]
+    residual_covariance = model.intercept_past_response_noise()[3]
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance))
     trim_regressors = np.broadcast_to(
         np.diag(np.sqrt(np.diag(residual_covariance))), (len(is_predictable), 3, 3)
@@ -96,7 +96,7 @@ def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, F
     )
 
 
-def _sums_over_memory(values: Floats, dt_s: float, forgets_exponentially: bool) -> Floats:
+def _fading_or_sliding_sums(values: Floats, dt_s: float, forgets_exponentially: bool) -> Floats:
     """Sums over the memory that ends at each sample."""
     if forgets_exponentially:
         from scipy.signal import lfilter
@@ -206,11 +206,11 @@ class LinearRateModel:
     """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
 
     def __init__(self, past_coefficients: Floats, dt_s: float) -> None:
-        self._jacobian = (past_coefficients[:3] - np.eye(3)) / dt_s
+        self._transposed_jacobian = (past_coefficients[:3] - np.eye(3)) / dt_s
 
     def f(self, x: Floats, y: Floats) -> Floats:
         """Angular acceleration rad/s2 by the rates alone."""
-        return np.asarray(x @ self._jacobian)
+        return np.asarray(x @ self._transposed_jacobian)
 
     def G(self, y: Floats) -> Floats:
         """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
@@ -229,7 +229,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
             f"loop: at most {len(LOOP_SURFACES_FOR_GROUPS)}"
         )
     is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
-    intercept, dt_s = model.coefficient_arrays()[0], 1.0 / model.rate_hz
+    intercept, dt_s = model.intercept_past_response_noise()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     previous_rates = np.vstack([rates[:1], rates[:-1]])
     predicted_rates = rates - np.where(
@@ -264,7 +264,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(model.coefficient_arrays()[3])) / (1.0 / model.rate_hz))
+    return np.asarray(np.sqrt(np.diag(model.intercept_past_response_noise()[3])) / (1.0 / model.rate_hz))
 
 
 def loop_detector_context(model: Model) -> Context:
@@ -272,7 +272,7 @@ def loop_detector_context(model: Model) -> Context:
     dt_s = 1.0 / model.rate_hz
     declared_noise_sd = np.zeros(7)
     declared_noise_sd[:3] = _DECLARED_GYRO_NOISE_RAD_S
-    design_model: Any = LinearRateModel(model.coefficient_arrays()[1], dt_s)
+    design_model: Any = LinearRateModel(model.intercept_past_response_noise()[1], dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design_model, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
         trim_rad=np.zeros(_N_LOOP_SURFACES_WITH_FLAP),

@@ -205,7 +205,7 @@ def _withdraw_contradicted_isolation(
     since gusts have directions too.
     """
     residual = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
-    _, _, command_response, residual_covariance = model.coefficient_arrays()
+    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
     response_directions = np.linalg.solve(
         np.linalg.cholesky(residual_covariance), command_response.sum(axis=1).T
     )
@@ -239,7 +239,7 @@ def standardized_healthy_residual(
 ) -> Floats:
     """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
-    intercept, _, _, residual_covariance = model.coefficient_arrays()
+    intercept, _, _, residual_covariance = model.intercept_past_response_noise()
     residual = np.where(
         is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
     )

@@ -446,7 +446,7 @@ class Model(Section):
         intercept = np.array(self.intercept)
         return np.asarray(intercept - intercept @ self.residual_ar_coefficients(ma_coefficients).sum(axis=0))
 
-    def coefficient_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
+    def intercept_past_response_noise(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return (
             np.array(self.intercept),

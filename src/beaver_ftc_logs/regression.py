@@ -118,7 +118,7 @@ def unexplained_rates_and_responses(
     past_regressors, lagged_group_commands, is_predictable = build_regressors(
         samples, surface_indices_by_group(model), *regressor_order
     )
-    _, past_coefficients, command_response, _ = model.coefficient_arrays()
+    _, past_coefficients, command_response, _ = model.intercept_past_response_noise()
     unexplained_rates = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
     return (
         is_predictable,

@@ -97,7 +97,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     log_stamps_s = recording.columns[rate_columns[0]].t_s
     t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
     values_and_mean_age = {
-        name: values_and_age_at(recording.columns[name], t_s, step_s) for name in used_columns
+        name: values_and_mean_age_at(recording.columns[name], t_s, step_s) for name in used_columns
     }
     for name in rate_columns:
         values, mean_age_s = values_and_mean_age[name]
@@ -252,7 +252,7 @@ def _sampled_airspeed(
 ) -> Floats | None:
     """The airspeed at each sample, nan where it is unknown; None where the vehicle has none."""
     column = recording.columns.get(vehicle.airspeed.column) if vehicle.airspeed else None
-    return None if column is None else values_and_age_at(column, t_s, step_s)[0]
+    return None if column is None else values_and_mean_age_at(column, t_s, step_s)[0]
 
 
 def _sampled_energy_height_rate_mps(
@@ -266,7 +266,7 @@ def _sampled_energy_height_rate_mps(
     if len(logged_columns) < 2 or not all(len(column.t_s) > 1 for column in logged_columns):
         return None
     t_s, stretch_number, step_s = time_base
-    altitude, airspeed = (values_and_age_at(column, t_s, step_s)[0] for column in logged_columns)
+    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in logged_columns)
     return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
@@ -420,7 +420,7 @@ def _median_step_s(stamps: Floats) -> float:
     return float(np.median(np.diff(stamps[:_MIN_LOG_SAMPLES]))) if len(stamps) > 1 else float("inf")
 
 
-def values_and_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
+def values_and_mean_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
         return column.values, None

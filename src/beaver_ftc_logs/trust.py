@@ -76,12 +76,12 @@ def compute_fitted_ranges(
         gain_sd=gain_standard_error.tolist(),
         still_s=_longest_unchanged_time_s_by_column(flights),
         scale=noise_variance_scale,
-        energy_climb=_estimate_unpowered_climb_mps(flights),
+        energy_climb=_estimate_unpowered_energy_height_rate_mps(flights),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
     )
 
 
-def _estimate_unpowered_climb_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
+def _estimate_unpowered_energy_height_rate_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
     used_energy_height_rates_mps = [
         one.energy_height_rate_mps[is_used]
@@ -539,7 +539,8 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
     noise_inflation = model.noise_inflation(samples.noise_ma_coefficients)
     noise_covariance_root = np.linalg.cholesky(
-        model.with_noise_model(samples.noise_ma_coefficients).coefficient_arrays()[3] / noise_inflation
+        model.with_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
+        / noise_inflation
     )
     log_noise_sd_product = float(
         np.log(np.diag(noise_covariance_root)).sum()

@@ -225,8 +225,8 @@ def _score_days(
     whole_flight_model: Model,
 ) -> Iterator[Document]:
     past_coefficients, noise_covariance = (
-        whole_flight_model.coefficient_arrays()[1],
-        whole_flight_model.coefficient_arrays()[3],
+        whole_flight_model.intercept_past_response_noise()[1],
+        whole_flight_model.intercept_past_response_noise()[3],
     )
     for day in days:
         scores_by_detector: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}

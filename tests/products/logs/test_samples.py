@@ -72,9 +72,9 @@ def test_a_fast_log_is_sampled_over_each_stretch_from_its_first_stamp():
 def test_a_column_with_these_very_stamps_is_as_it_is():
     t_s = stamps(0.1, 5)
     same = column(t_s.copy(), np.arange(5.0))
-    assert of.values_and_age_at(same, t_s, 0.1) == (same.values, None)
+    assert of.values_and_mean_age_at(same, t_s, 0.1) == (same.values, None)
     other = column(t_s + 0.01, np.arange(5.0))
-    values, age_s = of.values_and_age_at(other, t_s, 0.1)
+    values, age_s = of.values_and_mean_age_at(other, t_s, 0.1)
     np.testing.assert_array_equal(values, [np.nan, 0.0, 1.0, 2.0, 3.0])
     assert age_s == pytest.approx(0.09)
 
@@ -83,7 +83,7 @@ def test_a_column_with_these_very_stamps_is_as_it_is():
 def test_a_column_of_less_than_six_tenths_of_a_step_is_averaged(step, averaged):
     fast = column(stamps(step, 40), np.arange(40.0))
     t_s = stamps(0.1, 10) + 0.3
-    found = of.values_and_age_at(fast, t_s, 0.1)
+    found = of.values_and_mean_age_at(fast, t_s, 0.1)
     expected = (of._averaged_values if averaged else of._held_values)(
         fast, *((t_s, 0.1) if averaged else (t_s,))
     )

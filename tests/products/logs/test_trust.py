@@ -396,8 +396,8 @@ def test_what_is_kept_of_the_flights_fitted():
         small.model(), 23, time_since_change_s={"roll": np.array([0.4]), "air": np.array([0.7])}
     )
     flights = [(other, use), (one, use)]
-    assert trust._estimate_unpowered_climb_mps(flights) == pytest.approx(3.0)
-    assert trust._estimate_unpowered_climb_mps(flights[:1]) is None
+    assert trust._estimate_unpowered_energy_height_rate_mps(flights) == pytest.approx(3.0)
+    assert trust._estimate_unpowered_energy_height_rate_mps(flights[:1]) is None
     assert trust._longest_unchanged_time_s_by_column(flights) == {"roll": 0.4, "air": 0.7}
     model = small.model(fitted={"commands": [[0.0, 1.0], [1.0, 3.0]], "rates": []})
     commands = np.linspace([-1.0, 0.0], [3.0, 3.0], 1001)

@@ -23,7 +23,8 @@ _HEAD = """# Properties of the aircraft
 
 Which JSBSim properties does the Beaver have, and what does each mean? This page is for readers who fly the
 model in JSBSim alone, or who read a property in Python. A scenario file needs no property names: its sections
-`faults`, `uncertainty` and `actuators` set the properties ([scenarios](reference/scenarios.md)).
+`faults`, `uncertainty` and `actuators` set the properties ([scenarios](reference/scenarios.md)). In JSBSim
+alone, set a property by its name: `fdm["failures/elevator/effectiveness"] = 0.6`.
 
 *Example.* This program flies 1 s and prints the position of the elevator in rad
 ([simulation](reference/python.md)):
@@ -49,11 +50,14 @@ How to read the tables:
 - A name ends with its unit: `rad_sec` is rad/s, `rad_sec2` is rad/s², `mps` is m/s, `lbs` is pound-force,
   `lbsft` is pound-force times foot. A name without a unit is dimensionless.
 - The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
-  these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw.
+  these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw. A force is its
+  coefficient times the dynamic pressure times S. A moment in roll or yaw has the further factor b, in
+  pitch c.
+- *Incidence* is the angle of attack, alpha.
 - Symbols of the motion: p, q and r are the body rates in rad/s, V is the airspeed in m/s, and rho is the
   density in kg/m3. A name with `dot` is a derivative with respect to time.
-- Symbols of the aircraft: b is the span in m, and c is the chord in m. Ix, Iy, Iz and Jxz are the
-  [moments of inertia](reference/beaver.md) in kg m2.
+- Symbols of the aircraft: b is the span in m, c is the chord in m, and S is the wing area in m2. Ix, Iy,
+  Iz and Jxz are the [moments of inertia](reference/beaver.md) in kg m2.
 - Symbols of the engine: n is the engine speed in rpm, pz is the manifold pressure in inHg, and P is the shaft
   power in kW.
 - The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to

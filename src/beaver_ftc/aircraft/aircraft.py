@@ -283,7 +283,7 @@ class Aircraft:
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
 
     def separated_by_force(self, force: str) -> tuple[int, ...]:
-        """Indices of surfaces that the body rates cannot distinguish, but a measured force can.
+        """Indices of the surfaces of one group that only a measured force distinguishes, not the body rates.
 
         - `force`: `CZ` selects the surfaces of pitch, which differ in lift. `CY` selects the other surfaces.
 

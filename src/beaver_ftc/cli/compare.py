@@ -65,11 +65,12 @@ def command(options: Options) -> None:
     sweep: Compare on the flights of this sweep.
     benchmark: Compare on the benchmark's standard sets of flights, and update the ranking.
     tune: Choose parameters of schemes and laws on the calibration flights.
-    grade: With --tune: use only flights of this grade: exact, actuators or errors. Default: all three grades.
+    grade: With --tune: use only flights of this grade. exact: ideal sensors and actuators. actuators:
+    actuators that lag. errors: errors of sensors or air. Default: all three grades.
     trials: With --tune: number of trials for each method and grade.
     seed: With --tune: seed of the random numbers of the search.
     draw: With --tune: number of the set of calibration flights. 0 is the standard set. With another set, the
-    command also measures what the tuning gains.
+    command also compares tuned and default parameters.
     tuned: With --sweep or --benchmark: read the parameters from this file instead of the parameters of the
     package.
     schemes: Names of schemes, separated by commas. Without --schemes and --laws, all registered schemes and

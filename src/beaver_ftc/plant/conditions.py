@@ -115,7 +115,8 @@ def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
 def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "LinearModel":
     """Linear model xdot = A x + B u of the truth of a scenario at its trim.
 
-    The ten states and the surfaces are named in `states` and `inputs` of the result. Arguments and errors are
+    The ten states are airspeed (m/s), alpha, beta (rad), p, q, r (rad/s), phi, theta, psi (rad) and altitude
+    (m). `states` and `inputs` of the result name the states and the surfaces. Arguments and errors are
     those of `trim`. The method `state_space` returns the model for python-control.
     """
     from beaver_ftc.plant.linear import differences

@@ -107,8 +107,7 @@ class Snapshot:
     The snapshot stores the commands and injected faults up to this instant, not the state of JSBSim. JSBSim
     keeps filters, delays, integrators and engines where no property can read them. `resume` therefore flies
     the flight again. The repeated flight is exact for every aircraft and sensor. It takes about 1 ms for each
-    second of flight at 100 Hz. To copy the process instead (fork) would take as long as to repeat 8 s of
-    flight.
+    second of flight at 100 Hz.
     """
 
     frames: int

@@ -26,8 +26,10 @@ You can give several values if `...` follows the word. Write the options before 
 *Example.* `beaver-ftc run [OPTIONS] {SCENARIO}...` requires at least one scenario, and accepts several.
 
 **Table of options.** The first column has the option, and the kind of its value in `<...>`. A kind is a path,
-a text (`str`), a whole number (`int`), a number (`float`) or one of the listed words. `list` means that you
-can give the option or value several times. The second column has the effect and the unit. In brackets it has:
+a text (`str`), a whole number (`int`), a number (`float`) or one of the listed words. `int range` and
+`float range` are numbers with limits. A word in capitals says what you give, for example FILE,
+HOST:PORT or HZ. `list` means that you can give the option or value several times. The
+second column has the effect and the unit. In brackets it has:
 
 - `[default: X]`: the value if the option is left out. Without it, the text states the default, or the option
   is off.

@@ -102,7 +102,8 @@ SAYS = {
     "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives an aircraft `jsbsim:NAME` at its first use, "
     "and checks an aircraft `./FOLDER` against its JSBSim model.",
     "Plug-ins": "The two classes that you can write, and the records that they receive and return.",
-    "Errors": "Both errors have a message for the user, and an `exit_code` for a script. `BadInput` has "
+    "Errors": "Both errors have a message for the user, and an `exit_code` for a script: "
+    "2 for `BadInput`, 3 for `SimulationFailed`. `BadInput` has "
     "these subclasses:\n\n"
     "- `ScenarioError`: a file has mistakes. The message has one line for each mistake.\n"
     "- `UnknownAircraft`: there is no aircraft of this name.\n"

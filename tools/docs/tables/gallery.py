@@ -1,6 +1,7 @@
 """The gallery of built-in scenarios: a thumbnail of each, its outcome and its description."""
 
 import hashlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -59,6 +60,7 @@ def _row(name: str) -> tuple[str, str, str]:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(_thumbnail(flight), encoding="utf-8")
     description = " ".join(bf.load(name).description.split())
+    description = re.sub(r"(Compare it with )([\w-]+)", r"\1`\2`", description)
     shown = f"![{name}: deflection, and ratio of residual to threshold, over time]({path.as_posix()})"
     return shown, f"`{name}`<br>{description}", _outcome(flight)
 

@@ -98,6 +98,18 @@ def test_the_first_missing_kernel_compiles_all_that_are_expected(tmp_path, monke
     assert kept(tmp_path) == ALL
 
 
+def test_one_that_is_expected_may_call_the_first_missing_kernel(tmp_path, monkeypatch):
+    """A glider's first flight asks for the frame, and the expected segment calls the frame."""
+    monkeypatch.setattr(cache, "can_fork", lambda: False)
+    frame = kernels(tmp_path)[0]
+    space = {"__name__": __name__, "frame": frame}
+    exec("def segment(x):\n    return frame(x) + 1.0\n", space)
+    segment = compiled.compile_into(tmp_path, space["segment"])
+    cache.expect(lambda: [Wanted.of(segment, KINDS)])
+    assert frame(np.array([3.0])) == 6.0
+    assert segment(np.array([3.0])) == 7.0
+
+
 def test_one_that_another_process_compiles_is_left_to_it(tmp_path):
     """Another process holds the lock of a kernel: nobody else compiles it, and whoever calls it waits."""
     pytest.importorskip("fcntl")

@@ -771,13 +771,17 @@ class Kernel(Dispatcher):
         """Machine code for arguments of these types; inside another kernel only what stands for it."""
         args, _ = sigutils.normalize_signature(sig)
         args = tuple(map(unliteral, args))  # a number in the text makes no other function of it
-        with global_compiler_lock, self._compiling_counter:
-            there = self.overloads.get(args)
-            if there is not None and (compiling or args not in self._inner):
-                return there.entry_point
-            if compiling:
-                return self._compiled_as_part(args)
-            return self._loaded(args) or self._compiled(args)
+        with global_compiler_lock:
+            if not compiling and (args in self._inner or not self.is_kept(args)):
+                # Outside the counter: one of these may call this kernel, and would be refused as a recursion.
+                cache.compile_expected()
+            with self._compiling_counter:
+                there = self.overloads.get(args)
+                if there is not None and (compiling or args not in self._inner):
+                    return there.entry_point
+                if compiling:
+                    return self._compiled_as_part(args)
+                return self._loaded(args) or self._compiled(args)
 
     def typeof_pyval(self, val: Any) -> Any:
         """The type of an argument; in place of Numba's for records that have a size."""
@@ -831,7 +835,6 @@ class Kernel(Dispatcher):
 
     def _compiled(self, args: tuple[Any, ...]) -> Any:
         """Compile, one process at a time, and keep the code."""
-        cache.compile_expected()
         with self._alone(args):
             return self._loaded(args) or self._compile_and_keep(args)  # another process may have come first
 

@@ -18,9 +18,9 @@ import warnings
 import gymnasium
 import numpy as np
 
-import beaver_ftc_links.gym
+from beaver_ftc_links.environments import ID
 
-OURS = beaver_ftc_links.gym.ID
+OURS = ID
 THEIRS = "C172-HeadingControlTask-Shaping.STANDARD-NoFG-v0"
 SCENARIO = "elevator-partial-loss"  # 30 s at 100 Hz: 3000 frames an episode
 STEPS = 200  # a round: an episode of none ends

@@ -23,7 +23,7 @@ class Matrix(StudyCommand):
 
     The command reports which faults are detected and which are named. It also divides the tracking error by
     that of the informed law, a law that receives the true fault. With --declared the command also reports how
-    many faults the informed test detects, and how many of these faults are named.
+    many faults the informed test detects, and how many of these faults the diagnosis names.
 
     The exit status is 1 if a fault is named wrongly or an alarm is false. With --pitch-lost, the exit status
     is 1 if an aircraft is lost only with control by engine power.

@@ -414,7 +414,7 @@ class _Leg(Section):
     hold: Flag = entry(
         False,
         "true: hold the value that is commanded at this time. If no value is commanded, hold the present "
-        "value of the aircraft",
+        "value of the aircraft. Without `hold: true`, `value` is required",
     )
     value: Number | None = None
 
@@ -433,7 +433,7 @@ class AltitudeLeg(_Leg):
     value: Number | None = number(
         None,
         "m",
-        "altitude above sea level. Required, unless `hold: true` is given",
+        "altitude above sea level",
         ge=-300,
         le=6000,
         examples=[1900],
@@ -444,26 +444,20 @@ class AltitudeLeg(_Leg):
 class AirspeedLeg(_Leg):
     """A commanded airspeed. The command moves to it at a constant acceleration."""
 
-    value: Number | None = number(
-        None, "m/s", "true airspeed. Required, unless `hold: true` is given", ge=20, le=70, examples=[45]
-    )
+    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
     change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
 
 
 class HeadingLeg(_Leg):
     """A commanded true heading. The aircraft takes the shorter turn."""
 
-    value: Number | None = number(
-        None, "deg", "true heading. Required, unless `hold: true` is given", ge=-360, le=360, examples=[90]
-    )
+    value: Number | None = number(None, "deg", "true heading", ge=-360, le=360, examples=[90])
 
 
 class BankLeg(_Leg):
     """A commanded bank angle, positive with the right wing down."""
 
-    value: Number | None = number(
-        None, "deg", "bank angle. Required, unless `hold: true` is given", ge=-45, le=45, examples=[20]
-    )
+    value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
 
 
 @lru_cache

@@ -563,7 +563,7 @@ def _line(row: Document) -> str:
 
 @dataclass(frozen=True)
 class Detectability(StudyCommand):
-    """Compute the smallest losses that are certain to be detected and isolated.
+    """Compute the smallest loss that is certain to be isolated.
 
     The command varies the airspeed, the altitude and the amplitude of the references. It prints one sentence
     for each surface, and then the tables.

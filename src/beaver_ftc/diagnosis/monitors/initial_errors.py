@@ -269,100 +269,81 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     for the second order in h. x: the error of the row's hypothesis.
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
-    previous_reading, body_acceleration = memory.previous_reading, memory.body_acceleration
-    max_effect_per_unit, coupling_effect_per_unit = (
-        initial_errors.max_effect_per_unit_error,
-        initial_errors.coupling_effect_per_unit_error,
-    )
-    sin_alpha, cos_alpha = np.sin(previous_reading[ALPHA]), np.cos(previous_reading[ALPHA])
-    sin_beta, cos_beta = np.sin(previous_reading[BETA]), np.cos(previous_reading[BETA])
-    sin_phi, cos_phi = np.sin(previous_reading[PHI]), np.cos(previous_reading[PHI])
-    sin_theta, cos_theta = np.sin(previous_reading[THETA]), np.cos(previous_reading[THETA])
+    reading, a = memory.previous_reading, memory.body_acceleration
+    largest = initial_errors.max_effect_per_unit_error
+    coupling = initial_errors.coupling_effect_per_unit_error
+    sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
+    sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
+    sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
+    sin_theta, cos_theta = np.sin(reading[THETA]), np.cos(reading[THETA])
     # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    sideslip_magnitude = abs(previous_reading[BETA])
-    max_sideslip = abs(previous_reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
-    beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
-    max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    sideslip_magnitude = abs(reading[BETA])
+    max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
+    secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
+    max_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
-    normal_acceleration = body_acceleration[2] * cos_alpha - body_acceleration[0] * sin_alpha
-    side_acceleration = (
-        body_acceleration[1] * cos_beta
-        - (body_acceleration[0] * cos_alpha + body_acceleration[2] * sin_alpha) * sin_beta
-    )
-    max_acceleration = max(
+    a_normal = a[2] * cos_alpha - a[0] * sin_alpha
+    a_side = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
+    a_max = max(
         memory.acceleration_magnitude,
-        np.sqrt(body_acceleration[0] ** 2 + body_acceleration[1] ** 2 + body_acceleration[2] ** 2),
+        np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2),
     )
     # rad/s: rates about the flow's projection on the plane of symmetry, and across it
     flow_roll_rate, flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
-    widened_step_s = h * (1.0 + h * (max_acceleration / V + abs(p) + abs(q) + abs(r)))
-    roll_yaw_rate_magnitude, predicted_climb_m = (
-        np.hypot(p, r),
-        memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE],
-    )
+    step_s = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
+    roll_yaw_rate = np.hypot(p, r)
+    predicted_climb_m = memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    max_effect_per_unit[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect_per_unit[BETA_HYPOTHESIS, SPEED_TEST] = (
-        widened_step_s * max_acceleration
-    )
+    largest[ALPHA_HYPOTHESIS, SPEED_TEST] = largest[BETA_HYPOTHESIS, SPEED_TEST] = step_s * a_max
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    max_effect_per_unit[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        widened_step_s * beta_secant * (max_acceleration / V + roll_yaw_rate_magnitude * abs(sin_beta))
-    )
+    largest[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = step_s * secant * (a_max / V + roll_yaw_rate * abs(sin_beta))
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    max_effect_per_unit[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
-        roll_yaw_rate_magnitude + max_acceleration * abs(sin_beta) / V
-    )
+    largest[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * (roll_yaw_rate + a_max * abs(sin_beta) / V)
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    max_effect_per_unit[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + max_acceleration / V)
+    largest[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+        step_s * secant * max_secant * (abs(flow_roll_rate) + a_max / V)
     )
     # beta' with beta off: a turned by beta
-    max_effect_per_unit[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * max_acceleration / V
+    largest[BETA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * a_max / V
     # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    max_effect_per_unit[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
-        AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST
-    ] = widened_step_s * beta_secant * max_acceleration / V
+    largest[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
+        step_s * secant * a_max / V
+    )
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
     # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    max_effect_per_unit[PHI_HYPOTHESIS, SPEED_TEST] = (
-        widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    largest[PHI_HYPOTHESIS, SPEED_TEST] = step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    largest[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
+        step_s * g * cos_theta * secant / V
     )
-    max_effect_per_unit[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
-        PHI_HYPOTHESIS, BETA_FLOW_TEST
-    ] = widened_step_s * g * cos_theta * beta_secant / V
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
     # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    max_effect_per_unit[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
-    max_effect_per_unit[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
-    max_effect_per_unit[THETA_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
-    )
+    largest[THETA_HYPOTHESIS, SPEED_TEST] = step_s * g
+    largest[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step_s * secant * g / V
+    largest[THETA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
     # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
     # (sin(theta), -cos(phi) cos(theta))
     vertical_projection_length = np.hypot(sin_theta, cos_phi * cos_theta)
-    max_effect_per_unit[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
+    largest[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
     # with beta off: (cos(beta), -sin(beta)) turned, times V
-    max_effect_per_unit[BETA_HYPOTHESIS, CLIMB_TEST] = (
+    largest[BETA_HYPOTHESIS, CLIMB_TEST] = (
         h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
     )
     # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    max_effect_per_unit[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
+    largest[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
         1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
     )
     # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    max_effect_per_unit[PHI_HYPOTHESIS, CLIMB_TEST] = (
-        h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
-    )
+    largest[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
     # with theta off: the vertical is turned, against v
-    max_effect_per_unit[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
+    largest[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
     # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
     # is turned by the error
-    coupling_effect_per_unit[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
-    coupling_effect_per_unit[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
+    coupling[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
+    coupling[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
-    pitch_magnitude = abs(previous_reading[THETA])
-    coupling_effect_per_unit[THETA_GRAVITY_COUPLING_INDEX] = (
+    pitch_magnitude = abs(reading[THETA])
+    coupling[THETA_GRAVITY_COUPLING_INDEX] = (
         h
         * g
         * np.cos(
@@ -374,34 +355,24 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     )
     # alpha: altitude' = V cos(beta) vertical_projection_length sin(gamma - alpha) + ..., where tan(gamma) =
     # tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma - alpha)
-    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]) + (
+    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    coupling_effect_per_unit[ALPHA_CLIMB_COUPLING_INDEX] = (
+    coupling[ALPHA_CLIMB_COUPLING_INDEX] = (
         h * V * cos_beta * vertical_projection_length * np.cos(min(max_mean_angle, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + flow_yaw_rate sin(e / 2)). beta off by
     # e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of either
     # sign, is an uncertainty of both
-    (
-        coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX],
-        coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX],
-    ) = (
-        h * flow_roll_rate,
-        h * flow_yaw_rate,
-    )
-    coupling_effect_per_unit[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * max_acceleration / V
-    coupling_effect_per_unit[BETA_FORCE_UNCERTAINTY_INDEX] = (
-        h
-        * np.sin(min(max_sideslip, 0.5 * np.pi))
-        * beta_secant
-        * max_beta_secant
-        * abs(normal_acceleration)
-        / V
+    coupling[VANE_ROLL_RATE_COUPLING_INDEX] = h * flow_roll_rate
+    coupling[VANE_YAW_RATE_COUPLING_INDEX] = h * flow_yaw_rate
+    coupling[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * a_max / V
+    coupling[BETA_FORCE_UNCERTAINTY_INDEX] = (
+        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * secant * max_secant * abs(a_normal) / V
     )
     # V: a across the flow, over the airspeed
-    coupling_effect_per_unit[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * normal_acceleration * beta_secant / V
-    coupling_effect_per_unit[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * side_acceleration / V
+    coupling[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * a_normal * secant / V
+    coupling[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * a_side / V
 
 
 @kernel

@@ -406,19 +406,20 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
 def prepare_statistical_tests(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     statistical_detector, dt = fdi.statistical, fdi.config.dt
-    test_config, noise_record, gust = (
-        statistical_detector.test_config,
-        statistical_detector.noise,
-        statistical_detector.gust,
-    )
     update_gusts_and_forces(
-        gust, statistical_detector.inertial_gust, statistical_detector.forces, prediction, measured, k, dt
+        statistical_detector.gust,
+        statistical_detector.inertial_gust,
+        statistical_detector.forces,
+        prediction,
+        measured,
+        k,
+        dt,
     )
     statistical.prepare_tests(
-        test_config,
-        noise_record,
+        statistical_detector.test_config,
+        statistical_detector.noise,
         statistical_detector.block,
-        gust,
+        statistical_detector.gust,
         fdi.bound,
         prediction.design,
         measured,
@@ -434,16 +435,11 @@ def add_instant_to_statistical_tests(fdi, prediction, measured):
         fdi.statistical,
         prediction.frame_share_per_instant * fdi.config.dt,
     )
-    test_config, noise_record, gust = (
+    statistical.add_instant_to_tests(
         statistical_detector.test_config,
         statistical_detector.noise,
-        statistical_detector.gust,
-    )
-    statistical.add_instant_to_tests(
-        test_config,
-        noise_record,
         statistical_detector.block,
-        gust,
+        statistical_detector.gust,
         fdi.bound,
         prediction.design,
         measured,

@@ -155,7 +155,7 @@ TABLE = (
         "minutes: one condition, one rival",
         "beaver-ftc power --sensors tactical-grade --turbulence none --schemes rls-monitor",
     ),
-    Exempt(r"(beaver-ftc matrix.*)", "one airspeed for three", r"\1 --airspeed 45"),
+    Exempt(r"(beaver-ftc matrix(?!.*--airspeed).*)", "one airspeed for three", r"\1 --airspeed 45"),
     Exempt(r"beaver-ftc bench.*", "two minutes of compiling", "beaver-ftc bench --rounds 3 --no-parts"),
     Exempt(
         r"beaver-ftc detectability fault-free",

@@ -73,12 +73,12 @@ def benchmark_gains() -> str:
     other = len(rows) - kept - len(none)
     largest = max(again.get("gain", 0.0) for again in last)
     says = [
-        f"The table does not contain searches that found no better values. There are {len(rows)} pairs of "
+        f"The table leaves out searches that found no better values. There are {len(rows)} pairs of "
         f"method and grade. For {kept} of them, the last search found no values that cost at least 5 % less.",
         f"For {', '.join(none)}, no values were admissible.",
-        f'For the other {other}, the last search found other values (rows with "no").',
-        f"The largest gain of a last search is {100.0 * largest:.1f} %.",
-        'After each row with "yes", a further search followed.',
+        f'For the other {other} pairs, the last search found new values, but they were not adopted ("no").',
+        f"The largest gain that a last search reached is {100.0 * largest:.1f} %.",
+        'After each row with "yes" in the column "adopted", a further search followed.',
     ]
     return f"{markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])}\n\n{' '.join(says)}"
 
@@ -202,7 +202,9 @@ def _rates(number: int, sets: dict[str, Document]) -> str:
     head = ("faulted flights", *(f"measured {100 * share:.0f} %" for share in SHARES))
     return "\n\n".join(
         [
-            _caption(number, "Wilson 95 % intervals of such shares, rounded to whole faults, %"),
+            _caption(
+                number, "Wilson 95 % intervals of the shares in Tables 2 and 3, rounded to whole faults, %"
+            ),
             markdown_table(head, rows),
         ]
     )
@@ -221,7 +223,10 @@ def _alarms(number: int, rows: Rows) -> str:
     hours = [_hours(rows, in_air) for in_air in (False, True)]
     flown = f"{hours[0]:.2f} h with exact sensors, {hours[1]:.2f} h in air"
     return "\n\n".join(
-        [_caption(number, f"False alarms per hour without a fault; {flown}"), markdown_table(head, body)]
+        [
+            _caption(number, f"False alarms per flight hour without a fault; flown: {flown}"),
+            markdown_table(head, body),
+        ]
     )
 
 

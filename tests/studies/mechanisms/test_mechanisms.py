@@ -241,7 +241,7 @@ def test_findings_in_sentences(few_cells):
         "adaptation of the isolation estimators (published): without it all 2 flights are the same."
     )
     assert last.startswith(
-        "In all of these flights worst-case detectors raise 1 false alarms; 1 of them have an undeclared"
+        "In all of these flights, worst-case detectors raise 1 false alarms. The reason of 1 of them is an "
     )
     row = document["mechanisms"][0] | {"names": {"value": -0.12, "low": -0.2, "high": -0.04}}
     assert finding(row | {"same_verdict": 1}).endswith("(published): without it, lost names -12.0 points.")

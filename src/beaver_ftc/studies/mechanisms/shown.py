@@ -99,9 +99,9 @@ def alarms_sentence(document: Document) -> str:
     total, without = (sum(row[key] for row in rows) for key in ("count", "unexplained"))
     certified, certifiable = (sum(row[key] for row in rows) for key in ("certified", "certifiable"))
     return (
-        f"In all of these flights worst-case detectors raise {total} false alarms; {total - without} of "
-        f"them have an undeclared error as their reason, and {certified} of {certifiable} of the default "
-        f"scheme have a certificate."
+        f"In all of these flights, worst-case detectors raise {total} false alarms. The reason of "
+        f"{total - without} of them is an undeclared error. Of {certifiable} false alarms of the default "
+        f"scheme, {certified} have a certificate."
     )
 
 

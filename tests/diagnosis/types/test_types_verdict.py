@@ -132,7 +132,7 @@ def test_questions_about_the_types_left(kinds, constant, explained):
     _, surface = one(*kinds)
     assert sum(map(bool, (verdict.type_remains(surface, kind) for kind in ALL))) == len(kinds)
     assert all(verdict.type_remains(surface, kind) for kind in kinds)
-    assert bool(verdict.any_constant_type_remains(surface)) == constant
+    assert bool(verdict.any_constant_parameter_type_remains(surface)) == constant
     assert bool(verdict.any_type_remains(surface)) == (kinds != ())
     for k, half_cycles in enumerate((2, 3)):
         surface["oscillatory"]["n_half_cycles"] = half_cycles
@@ -164,7 +164,7 @@ def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_remaining_typ
         else -1
     )
     assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
-    assert verdict.sole_remaining_constant_type(surface) == one_type
+    assert verdict.sole_remaining_constant_parameter_type(surface) == one_type
     found = verdict.sole_remaining_type_if_shown(surface)
     assert (verdict.FIRST_TYPE_WITH_SAME_NAME[found] if found >= 0 else -1) == same_name
 
@@ -853,12 +853,12 @@ def test_a_surface_off_its_command_is_within_its_travel():
 def test_whereabouts_cover_every_constant_type_left():
     fdi, surface = one(STUCK, FLOAT, SLOW)
     surface["feasible_sets"]["low"][STUCK], surface["feasible_sets"]["high"][STUCK] = 0.1, 0.2
-    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (0.0, 0.2)
+    assert on(pairs.constant_parameter_types_deflection_range, fdi, surface) == (0.0, 0.2)
     leave(surface, BIAS)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = -np.inf, 0.0
-    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (-0.4, 0.0)
+    assert on(pairs.constant_parameter_types_deflection_range, fdi, surface) == (-0.4, 0.0)
     surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS] = 0.1, np.inf
-    assert on(pairs.possible_deflection_range_of_constant_types, fdi, surface) == (0.1, 0.5)
+    assert on(pairs.constant_parameter_types_deflection_range, fdi, surface) == (0.1, 0.5)
 
 
 def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
@@ -963,7 +963,7 @@ def test_a_second_begins_with_what_was_known_of_the_first():
     for frame in ("last_observation", "judged_observation", "earlier_observation"):
         fdi["types"]["surface"][frame]["is_anomalous"] = 1
     assert on(pairs.detect_second_pitch_fault, fdi)
-    assert verdict.sole_remaining_constant_type(elevator) == STUCK
+    assert verdict.sole_remaining_constant_parameter_type(elevator) == STUCK
     assert (elevator["feasible_sets"]["low"][STUCK], elevator["feasible_sets"]["high"][STUCK]) == (0.1, 0.14)
     assert not flap["feasible_sets"]["excluded"].any()
     for surface in (elevator, flap):

@@ -22,11 +22,11 @@ from beaver_ftc.diagnosis.rivals.kalman import (
 
 LOSS_THETA_LEVELS = (-0.25, -0.5, -0.9)
 # (leader of roll, pitch or yaw, theta); the last one is noise
-MODE_DEFINITIONS = (
+HEALTHY_AND_LOSS_MODES = (
     (None, 0.0),
     *((leading_axis, theta) for leading_axis in range(3) for theta in LOSS_THETA_LEVELS),
 )
-N_MODES = len(MODE_DEFINITIONS) + 1
+N_MODES = len(HEALTHY_AND_LOSS_MODES) + 1
 _MIN_MODE_PROBABILITY = 1e-12  # no probability below it: a mode must be able to come back
 
 
@@ -46,10 +46,10 @@ def mix_states(
     mixing_weights = transition_probabilities * mode_probabilities[:, None] / predicted_probabilities[None, :]
     mixed_states = mixing_weights.T @ x
     state_deviations = x[:, None, :] - mixed_states[None, :, :]
-    spread_covariances = P[:, None] + state_deviations[..., :, None] * state_deviations[..., None, :]
+    covariances_with_spread = P[:, None] + state_deviations[..., :, None] * state_deviations[..., None, :]
     return (
         mixed_states,
-        np.einsum("ij,ijab->jab", mixing_weights, spread_covariances),
+        np.einsum("ij,ijab->jab", mixing_weights, covariances_with_spread),
         predicted_probabilities,
     )
 
@@ -121,7 +121,7 @@ class InteractingMultipleModels:
     def accelerations(self, measured: Measured) -> np.ndarray:
         """Compute each hypothesis' acceleration in the elapsed frame, (M, 3) rad/s2."""
         mode_accelerations = np.tile(measured.acceleration, (N_MODES, 1))
-        for m, (leading_axis, theta) in enumerate(MODE_DEFINITIONS):
+        for m, (leading_axis, theta) in enumerate(HEALTHY_AND_LOSS_MODES):
             if leading_axis is not None:
                 mode_accelerations[m] += theta * measured.contribution[:, self.context.leading[leading_axis]]
         return mode_accelerations

@@ -43,16 +43,16 @@ def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.n
 
 
 def update_state(
-    z: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
+    state: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Condition (z, P) on the innovation nu (..., m) of the first m states; returns z, P and S (..., m,
-    m)."""
+    """Condition (state, P) on the innovation nu (..., m) of the first m states; returns state, P and
+    S (..., m, m)."""
     n_measured = nu.shape[-1]
     S = P[..., :n_measured, :n_measured] + R
     K = np.linalg.solve(S, P[..., :n_measured, :]).swapaxes(-1, -2)
-    z = z + (K @ nu[..., None])[..., 0]
+    state = state + (K @ nu[..., None])[..., 0]
     P = P - K @ P[..., :n_measured, :]
-    return z, 0.5 * (P + P.swapaxes(-1, -2)), S
+    return state, 0.5 * (P + P.swapaxes(-1, -2)), S
 
 
 def normalised_innovation_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
@@ -68,15 +68,15 @@ def log_likelihood(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
     )
 
 
-def sigma_points(z: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.ndarray, np.ndarray]:
-    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean z and the covariance P.
+def sigma_points(state: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean `state` and the covariance P.
 
     point_spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one
     dimension.
     """
-    n_states = len(z)
+    n_states = len(state)
     point_offsets = _matrix_root(point_spread * P).T
-    state_points = np.concatenate((z[None], z + point_offsets, z - point_offsets))
+    state_points = np.concatenate((state[None], state + point_offsets, state - point_offsets))
     point_weights = np.full(2 * n_states + 1, 0.5 / point_spread)
     point_weights[0] = 1.0 - n_states / point_spread
     return state_points, point_weights

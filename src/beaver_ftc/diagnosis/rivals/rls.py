@@ -24,8 +24,8 @@ from beaver_ftc.diagnosis.rivals import rival_options
 class RecursiveLeastSquaresFit:
     """y = w' phi, learnt sample by sample.
 
-    n: parameters. forgetting: lam in (0, 1]. prior: variance of the parameters at the start; it also bounds
-    P, which would otherwise grow without excitation.
+    forgetting_factor: lam in (0, 1]. prior_variance: of the parameters at the start; it also bounds P, which
+    would otherwise grow without excitation.
     """
 
     def __init__(self, n_parameters: int, forgetting_factor: float, prior_variance: float) -> None:

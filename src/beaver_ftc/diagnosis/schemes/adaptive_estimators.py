@@ -192,10 +192,13 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
 @kernel
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    statistical_detector, position_estimator = fdi.statistical, fdi.layout.position_estimator[fie.surface]
+    statistical_detector, position_estimator_index = (
+        fdi.statistical,
+        fdi.layout.position_estimator[fie.surface],
+    )
     parity_views, surface_effectiveness_column = (
         statistical_detector.views[: statistical_detector.n_views],
-        fdi.isolation.estimator[position_estimator].frame_mean_effect.regressor,
+        fdi.isolation.estimator[position_estimator_index].frame_mean_effect.regressor,
     )
     return parity.views_exclude_surface(
         parity_views,
@@ -338,10 +341,10 @@ isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()]
 
 def isolation_variant_index(config: FdiConfig) -> int:
     """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
-    alarm_authority = config.authority if config.weighs_chance else "worst-case"
-    if config.fault_class == "all" and alarm_authority == "statistical":
-        alarm_authority = "either"
-    return list(ISOLATION_VARIANTS).index((config.fault_class, alarm_authority))
+    isolation_authority = config.authority if config.weighs_chance else "worst-case"
+    if config.fault_class == "all" and isolation_authority == "statistical":
+        isolation_authority = "either"
+    return list(ISOLATION_VARIANTS).index((config.fault_class, isolation_authority))
 
 
 @apart
@@ -392,9 +395,16 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity.update_view_tests(
         parity_views, test_config, statistical_detector.tone_config, y, dt, k, is_alarm_latched
     )
-    is_error_mapped = fdi.bound.model_error_map.is_outside_all_boxes == 0
+    is_model_error_known = fdi.bound.model_error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
-        statistical_detector.alarm, test_config, blocks, parity_views, forces_record, gust, t, is_error_mapped
+        statistical_detector.alarm,
+        test_config,
+        blocks,
+        parity_views,
+        forces_record,
+        gust,
+        t,
+        is_model_error_known,
     )
     form_innovation_after_known_faults(prediction, measured.x, dt)
     statistical.filter_innovation_after_known_faults(
@@ -530,12 +540,12 @@ def update_verdict(fdi, prediction, measured, t):
 def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    yawing_moment_bound, conclusion_record = (
+    engine_asymmetry_bound, conclusion_record = (
         fdi.bound.model_error_map.engine_asymmetry_bound_now,
         fdi.verdict,
     )
     if not conclusion_record.detected and monitors.detect_engine_failure(
-        fdi.engine_monitor, yawing_moment_bound, y
+        fdi.engine_monitor, engine_asymmetry_bound, y
     ):
         conclusion.replace_isolated_estimator(conclusion_record, UNANTICIPATED, t)
         return YAW

@@ -125,8 +125,8 @@ def fill_input_basis(network, i, input_index, n_centres, input_value):
             position_in_centre_spacings, n_centres, 0, network.memory.input_basis[input_index]
         )
     )
-    for k in range(n_centres):
-        network.memory.input_basis[input_index, k] /= basis_norm
+    for centre_index in range(n_centres):
+        network.memory.input_basis[input_index, centre_index] /= basis_norm
 
 
 @kernel

@@ -33,13 +33,13 @@ from beaver_ftc.diagnosis.types import (
     verdict,
 )
 from beaver_ftc.diagnosis.types.registry import (
-    ACCOMMODATION_MODES,
+    ACCOMMODATION_MODE_BY_TYPE,
     N_CONSTANT_PARAMETER_TYPES,
     possible_deflection_range,
 )
 from beaver_ftc.diagnosis.types.verdict import (
     NO_SURFACE,
-    any_constant_type_remains,
+    any_constant_parameter_type_remains,
     can_be_at_fault,
     type_remains,
 )
@@ -82,7 +82,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
     )
     determinant = aileron_roll_per_rad * rudder_yaw_per_rad - aileron_yaw_per_rad * rudder_roll_per_rad
     abs_determinant = abs(determinant)
-    deflection_error, deflection_error_tolerance = (
+    aileron_deflection_error, aileron_deflection_error_tolerance = (
         (roll_innovation * rudder_yaw_per_rad - yaw_innovation * rudder_roll_per_rad) / determinant,
         (
             roll_innovation_tolerance * abs(rudder_yaw_per_rad)
@@ -91,9 +91,9 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         / abs_determinant,
     )
     aileron_is_within_reach = set_observed_deflection_error(
-        types.surface[aileron_index], deflection_error, deflection_error_tolerance
+        types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
-    deflection_error, deflection_error_tolerance = (
+    rudder_deflection_error, rudder_deflection_error_tolerance = (
         (yaw_innovation * aileron_roll_per_rad - roll_innovation * aileron_yaw_per_rad) / determinant,
         (
             yaw_innovation_tolerance * abs(aileron_roll_per_rad)
@@ -103,7 +103,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
     )
     if not (
         set_observed_deflection_error(
-            types.surface[rudder_index], deflection_error, deflection_error_tolerance
+            types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
         )
         and aileron_is_within_reach
     ):
@@ -111,14 +111,19 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
 
 
 @kernel
-def possible_deflection_range_of_constant_types(config, surface, k):
+def constant_parameter_types_deflection_range(config, surface, k):
     """Least and greatest deflection (rad) of a surface by the elapsed frame, of this number, over all types
     of a constant that are left."""
     min_deflection, max_deflection = np.inf, -np.inf
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
-            type_min, type_max = possible_deflection_range(config, surface, type_index, k)
-            min_deflection, max_deflection = min(min_deflection, type_min), max(max_deflection, type_max)
+            type_min_deflection, type_max_deflection = possible_deflection_range(
+                config, surface, type_index, k
+            )
+            min_deflection, max_deflection = (
+                min(min_deflection, type_min_deflection),
+                max(max_deflection, type_max_deflection),
+            )
     reachable_low, reachable_high = surface.actuator.reachable_low, surface.actuator.reachable_high
     return (
         min(max(min_deflection, reachable_low), reachable_high),
@@ -145,18 +150,20 @@ def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bou
 @kernel
 def locate_second_pitch_surface(types, layout, estimators, innovation, innovation_bound):
     """Find the position of the second surface, given the sets of the first."""
-    first_surface_index = types.pair.first_pitch_fault_surface
-    second_surface_index = layout.partner[first_surface_index]
-    first_effect = estimators[layout.position_estimator[first_surface_index]].frame_mean_effect
+    first_fault_surface_index = types.pair.first_pitch_fault_surface
+    second_surface_index = layout.partner[first_fault_surface_index]
+    first_effect = estimators[layout.position_estimator[first_fault_surface_index]].frame_mean_effect
     second_effect = estimators[layout.position_estimator[second_surface_index]].frame_mean_effect
-    first_surface = types.surface[first_surface_index]
-    min_first_deflection, max_first_deflection = possible_deflection_range_of_constant_types(
+    first_surface = types.surface[first_fault_surface_index]
+    first_surface_min_deflection, first_surface_max_deflection = constant_parameter_types_deflection_range(
         types.config, first_surface, types.frame_index
     )
-    set_position_of_known_fault(first_surface, min_first_deflection, max_first_deflection)
+    set_position_of_known_fault(first_surface, first_surface_min_deflection, first_surface_max_deflection)
     second_regressor, first_regressor = second_effect.regressor[PITCH], first_effect.regressor[PITCH]
     first_fault_acceleration = first_regressor * observed_deflection_error(first_surface)
-    acceleration_tolerance = abs(first_regressor) * 0.5 * (max_first_deflection - min_first_deflection)
+    acceleration_tolerance = (
+        abs(first_regressor) * 0.5 * (first_surface_max_deflection - first_surface_min_deflection)
+    )
     acceleration_tolerance += (
         innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
     )
@@ -210,11 +217,11 @@ def decide_roll_and_yaw_isolation(types, layout, t):
         or not verdict.any_type_remains(yaw_surface)
     )
     fault_is_outside_class = both_must_be_at_fault and class_is_refuted
-    types_are_undecided = both_must_be_at_fault and not (
+    types_do_not_explain_flight_yet = both_must_be_at_fault and not (
         verdict.any_type_explains_flight(roll_surface) and verdict.any_type_explains_flight(yaw_surface)
     )
     can_isolate = pair_record.group_has_alarm[LATERAL_GROUP] == 1 and not (
-        fault_is_outside_class or types_are_undecided
+        fault_is_outside_class or types_do_not_explain_flight_yet
     )
     set_isolation_status(
         roll_surface,
@@ -277,7 +284,7 @@ def begin_second_pitch_fault(types, layout):
 def alternative_types_would_have_shown(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
     may_be_growing_bias = verdict.can_be_another_type(
-        surface, verdict.sole_remaining_constant_type(surface), False
+        surface, verdict.sole_remaining_constant_parameter_type(surface), False
     )
     type_is_undecided = may_be_growing_bias or verdict.remaining_type_can_hide_at_rest(config, surface)
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
@@ -296,7 +303,7 @@ def detect_second_pitch_fault(types, layout):
         return False
     first_surface = types.surface[types.pair.first_pitch_fault_surface]
     if first_surface.status.may_be_sole_fault and not (
-        can_be_at_fault(first_surface) and any_constant_type_remains(first_surface)
+        can_be_at_fault(first_surface) and any_constant_parameter_type_remains(first_surface)
     ):
         begin_second_pitch_fault(types, layout)
     return not first_surface.status.may_be_sole_fault
@@ -311,7 +318,7 @@ def pitch_fault_type(config, surface):
     fault_type = verdict.fault_type_on_surface(config, surface)
     return (
         verdict.TYPE_UNDECIDED
-        if fault_type >= 0 and ACCOMMODATION_MODES[fault_type] == GIVE_UP
+        if fault_type >= 0 and ACCOMMODATION_MODE_BY_TYPE[fault_type] == GIVE_UP
         else fault_type
     )
 
@@ -354,7 +361,7 @@ def find_sole_pitch_surface_at_fault(types, layout):
         if types.pair.group_has_alarm[PITCH_GROUP]
         else NO_SURFACE
     )
-    if s < 0 or not any_constant_type_remains(types.surface[s]):
+    if s < 0 or not any_constant_parameter_type_remains(types.surface[s]):
         return NO_SURFACE
     if alternative_types_would_have_shown(types.config, types.surface[s]):
         store_first_pitch_fault_sets(types, s)
@@ -392,7 +399,7 @@ def decide_pair_isolation(types, conclusion, layout, t):
 @kernel
 def first_fault_finding(types, conclusion, layout, s, lateral_fault_outside_class, t):
     """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
-    instant. NO_SURFACE: none is named, and the fault of roll and yaw may be `outside` the class."""
+    instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
     if s >= 0:
         status = types.surface[s].status
         isolated_estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
@@ -438,7 +445,10 @@ def choose_pair_accommodation(types, layout):
             surface_mode = verdict.choose_accommodation_mode(surface) if may_be_at_fault else SUBTRACT_OFFSET
             if verdict.update_fault_presence(types.config, surface, surface_mode, may_be_at_fault):
                 verdict.set_accommodation_mode(surface, surface_mode)
-                is_replaced_elevator = s == layout.main[PITCH] and surface_mode in (SCALE_COMMAND, GIVE_UP)
-                if accommodated_surface == NO_SURFACE or is_replaced_elevator:
+                elevator_is_scaled_or_given_up = s == layout.main[PITCH] and surface_mode in (
+                    SCALE_COMMAND,
+                    GIVE_UP,
+                )
+                if accommodated_surface == NO_SURFACE or elevator_is_scaled_or_given_up:
                     accommodated_surface, accommodation_mode = s, surface_mode
     return accommodated_surface, accommodation_mode

@@ -95,7 +95,7 @@ def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
 
 
 # The columns that verdict.py reads; `FaultType` says what they are.
-ACCOMMODATION_MODES, STOP_DIRECTIONS, EVIDENCE_AT_REST = (
+ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, EVIDENCE_AT_REST_BY_TYPE = (
     _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
 SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
@@ -170,7 +170,7 @@ def _kernel_calling_each_type(
     """A kernel that calls this part of every type; result_kernel(surface, type_index, interval): called with
     what that returns."""
     part_kernels = _kernels_by_type(part_name)
-    parameters = ", ".join(argument for argument in argument_list.split(", ") if argument != "type_index")
+    parameter_list = ", ".join(argument for argument in argument_list.split(", ") if argument != "type_index")
     call_expressions = {
         type_index: _call_expression(type_index, argument_list) for type_index in part_kernels
     }
@@ -180,7 +180,7 @@ def _kernel_calling_each_type(
     ]
     return _compile_kernel(
         f"{part_name}_each",
-        parameters,
+        parameter_list,
         [*body_lines, "return"],
         _kernel_namespace(part_kernels, result_kernel=result_kernel),
     )
@@ -194,12 +194,12 @@ def _kernel_calling_one_type(part_name: str, argument_list: str, default_result:
         f"if type_index == {type_index}: return {_call_expression(type_index, argument_list)}"
         for type_index in part_kernels
     ]
-    parameters = (
+    parameter_list = (
         argument_list if "type_index" in argument_list.split(", ") else f"{argument_list}, type_index"
     )
     return _compile_kernel(
         f"{part_name}_of",
-        parameters,
+        parameter_list,
         [*body_lines, "return default"],
         _kernel_namespace(part_kernels, default=default_result),
     )
@@ -316,7 +316,7 @@ FRAME_BLOCK_RECORD = record(
 @lru_cache
 def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
-    what is concluded. refuted: its estimator is excluded (verdict.py)."""
+    what is concluded. estimator_excluded: as verdict.py keeps it."""
     memory_dtypes = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
@@ -600,7 +600,7 @@ def count_rest_as_evidence(types, surface_index):
         and not types.config.has_declared_surface_errors
     ):
         for type_index in range(N_TYPES):
-            if EVIDENCE_AT_REST[type_index] == REST_EXCLUDES_TYPE:
+            if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
                 exclude_type(surface, type_index)
 
 
@@ -613,6 +613,6 @@ def agrees_with_rest_position(surface):
             surface.judged_observation.position_low > set_high
             or surface.judged_observation.position_high < set_low
         )
-        if EVIDENCE_AT_REST[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
+        if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
             return False
     return True

@@ -26,11 +26,11 @@ from beaver_ftc.diagnosis.types import (
     registry,
 )
 from beaver_ftc.diagnosis.types.registry import (
-    ACCOMMODATION_MODES,
+    ACCOMMODATION_MODE_BY_TYPE,
     CAN_LOOK_LIKE,
     DEFLECTION_ERROR_TYPES_BY_PRECEDENCE,
     ERROR_DEPENDS_ON_COMMAND,
-    EVIDENCE_AT_REST,
+    EVIDENCE_AT_REST_BY_TYPE,
     FIRST_TYPE_WITH_SAME_NAME,
     HALF_CYCLES_BEFORE_ISOLATING_OTHERS,
     MODE_SERVES_TYPE,
@@ -38,7 +38,7 @@ from beaver_ftc.diagnosis.types.registry import (
     N_CONSTANT_PARAMETER_TYPES,
     N_TYPES,
     SHOWS_WITHIN_HALF_CYCLES,
-    STOP_DIRECTIONS,
+    STOP_DIRECTION_BY_TYPE,
     TYPE_INDEX_AT_END_OF_RANGE,
     deflection_error_under_type,
     has_shown,
@@ -75,7 +75,7 @@ def type_remains(surface, type_index):
 
 
 @kernel
-def any_constant_type_remains(surface):
+def any_constant_parameter_type_remains(surface):
     """Whether a type with a constant parameter is left."""
     return not np.all(surface.feasible_sets.excluded[:N_CONSTANT_PARAMETER_TYPES])
 
@@ -109,10 +109,11 @@ def types_would_have_shown(config, surface):
 
 
 @kernel
-def sole_remaining_type(surface, n_types):
-    """The one of the first n_types that is left, or TYPE_UNDECIDED; of several of one name, the first."""
+def sole_remaining_type(surface, n_considered_types):
+    """The one of the first n_considered_types that is left, or TYPE_UNDECIDED; of several of one name, the
+    first."""
     remaining_type = TYPE_UNDECIDED
-    for type_index in range(n_types):
+    for type_index in range(n_considered_types):
         if type_remains(surface, type_index):
             if (
                 remaining_type >= 0
@@ -124,7 +125,7 @@ def sole_remaining_type(surface, n_types):
 
 
 @kernel
-def sole_remaining_constant_type(surface):
+def sole_remaining_constant_parameter_type(surface):
     """The one type of constant parameter left, or TYPE_UNDECIDED."""
     return sole_remaining_type(surface, N_CONSTANT_PARAMETER_TYPES)
 
@@ -141,13 +142,13 @@ def remaining_type_can_hide_at_rest(config, surface):
     """Whether what a constant explains may be a type that does not show in a surface at rest, such as a slow
     surface that has come to where it is commanded: it has not stood off its command for long."""
     if (
-        not any_constant_type_remains(surface)
+        not any_constant_parameter_type_remains(surface)
         or surface.evidence.n_anomalous_frames - surface.evidence.n_rest_frames
         >= config.slowest_half_cycle_frames
     ):
         return False
     for type_index in range(N_TYPES):
-        if EVIDENCE_AT_REST[type_index] == REST_HIDES_TYPE and type_remains(surface, type_index):
+        if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_HIDES_TYPE and type_remains(surface, type_index):
             return True
     return False
 
@@ -162,7 +163,7 @@ def can_be_confused_with(surface, type_index, apparent_type):
             and CAN_LOOK_LIKE[type_index, other_type]
             and type_remains(surface, other_type)
         )
-        if can_look_alike and not motion_rules_out(surface, STOP_DIRECTIONS[other_type], type_index):
+        if can_look_alike and not motion_rules_out(surface, STOP_DIRECTION_BY_TYPE[other_type], type_index):
             return True
     return False
 
@@ -182,7 +183,7 @@ def can_be_another_type(surface, apparent_type, includes_command_dependent_types
 
 
 @kernel
-def sole_possible_surface(surfaces, needs_constant_type):
+def sole_possible_surface(surfaces, needs_constant_parameter_type):
     """The one possible surface, with a type of constant parameter left if so asked; NO_SURFACE or
     SEVERAL_SURFACES."""
     sole_surface_index = NO_SURFACE
@@ -190,7 +191,7 @@ def sole_possible_surface(surfaces, needs_constant_type):
         if (
             surface.status.may_be_sole_fault
             and can_be_at_fault(surface)
-            and (any_constant_type_remains(surface) or not needs_constant_type)
+            and (any_constant_parameter_type_remains(surface) or not needs_constant_parameter_type)
         ):
             sole_surface_index = s if sole_surface_index == NO_SURFACE else SEVERAL_SURFACES
     return sole_surface_index
@@ -259,23 +260,23 @@ def fault_type_on_surface(config, surface):
     if config.has_declared_surface_errors:
         return sole_remaining_type_if_shown(surface)
     types_have_had_time = types_would_have_shown(config, surface)
-    if any_constant_type_remains(surface):
-        remaining_type = sole_remaining_constant_type(surface)
+    if any_constant_parameter_type_remains(surface):
+        remaining_type = sole_remaining_constant_parameter_type(surface)
         return (
             remaining_type
             if types_have_had_time and not can_be_another_type(surface, remaining_type, True)
             else TYPE_UNDECIDED
         )
-    return varying_fault_type_on_surface(surface, types_have_had_time)
+    return varying_parameter_fault_type_on_surface(surface, types_have_had_time)
 
 
 @kernel
-def varying_fault_type_on_surface(surface, types_have_had_time):
+def varying_parameter_fault_type_on_surface(surface, types_have_had_time):
     """The same when no constant explains it: the one type left that need not show itself; else the one that
     has."""
-    remaining_type = sole_remaining_varying_type(surface, False)
+    remaining_type = sole_remaining_varying_parameter_type(surface, False)
     if remaining_type == NO_TYPE:
-        remaining_type = sole_remaining_varying_type(surface, True)
+        remaining_type = sole_remaining_varying_parameter_type(surface, True)
         return (
             remaining_type if remaining_type >= 0 and has_shown(surface, remaining_type) else TYPE_UNDECIDED
         )
@@ -288,7 +289,7 @@ def varying_fault_type_on_surface(surface, types_have_had_time):
 
 
 @kernel
-def sole_remaining_varying_type(surface, must_show_itself):
+def sole_remaining_varying_parameter_type(surface, must_show_itself):
     """The one type of a parameter that varies which is left, of those that must show themselves or of those
     that need not; NO_TYPE, or TYPE_UNDECIDED if there are several."""
     remaining_type = NO_TYPE
@@ -342,7 +343,7 @@ def estimator_of_fault(layout, s, type_index):
     """The estimator that stands for a fault of this type (TYPE_UNDECIDED if open) on surface s."""
     return (
         layout.loss_estimator[s]
-        if type_index >= 0 and ACCOMMODATION_MODES[type_index] == SCALE_COMMAND
+        if type_index >= 0 and ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND
         else layout.position_estimator[s]
     )
 
@@ -354,24 +355,24 @@ def choose_accommodation_mode(surface):
     SUBTRACT_OFFSET subtracts what the last frame shows to be off. It serves a type of another mode meanwhile,
     and moves the command, so that a surface that does not follow shows in the next frame.
     """
-    constant_type_remains = any_constant_type_remains(surface)
+    constant_parameter_type_remains = any_constant_parameter_type_remains(surface)
     for candidate_mode in (GIVE_UP, SCALE_COMMAND, WAIT_FOR_SURFACE):
-        if constant_type_remains and serves_all_constant_types(surface, candidate_mode):
+        if constant_parameter_type_remains and serves_all_constant_parameter_types(surface, candidate_mode):
             return candidate_mode
     for candidate_mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-        if not constant_type_remains and serves_any_varying_type(surface, candidate_mode):
+        if not constant_parameter_type_remains and is_mode_of_varying_parameter_type(surface, candidate_mode):
             return candidate_mode
     return SUBTRACT_OFFSET
 
 
 @kernel
-def serves_all_constant_types(surface, accommodation_mode):
+def serves_all_constant_parameter_types(surface, accommodation_mode):
     """Whether a mode is that of some type of constant parameter left, and serves all of them."""
-    is_mode_of_some_type = False
+    is_mode_of_remaining_type = False
     for type_index in range(N_CONSTANT_PARAMETER_TYPES):
         if type_remains(surface, type_index):
-            is_mode_of_some_type = (
-                is_mode_of_some_type or ACCOMMODATION_MODES[type_index] == accommodation_mode
+            is_mode_of_remaining_type = (
+                is_mode_of_remaining_type or ACCOMMODATION_MODE_BY_TYPE[type_index] == accommodation_mode
             )
             serves_type_at_end_of_range = (
                 TYPE_INDEX_AT_END_OF_RANGE[type_index] >= 0
@@ -380,14 +381,14 @@ def serves_all_constant_types(surface, accommodation_mode):
             )
             if not (MODE_SERVES_TYPE[accommodation_mode, type_index] or serves_type_at_end_of_range):
                 return False
-    return is_mode_of_some_type
+    return is_mode_of_remaining_type
 
 
 @kernel
-def serves_any_varying_type(surface, accommodation_mode):
+def is_mode_of_varying_parameter_type(surface, accommodation_mode):
     """Whether a mode is that of some type left whose parameter varies."""
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
-        if type_remains(surface, type_index) and ACCOMMODATION_MODES[type_index] == accommodation_mode:
+        if type_remains(surface, type_index) and ACCOMMODATION_MODE_BY_TYPE[type_index] == accommodation_mode:
             return True
     return False
 
@@ -477,7 +478,7 @@ def remaining_effectiveness(types, layout, estimators, s):
     surface = types.surface[s]
     if types.pair.enabled and can_be_at_fault(surface):
         for type_index in range(N_CONSTANT_PARAMETER_TYPES):
-            if ACCOMMODATION_MODES[type_index] == SCALE_COMMAND and type_remains(surface, type_index):
+            if ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND and type_remains(surface, type_index):
                 return feasible_set_midpoint(surface, type_index)
     return 1.0 + estimators[layout.loss_estimator[s]].theta[layout.dominant_axis[s]]
 
@@ -616,10 +617,10 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         for type_index, is_excluded in enumerate(surface["feasible_sets"]["excluded"])
         if _can_be_at_fault(fdi, s) and not is_excluded
     ]
-    constant_type_indices = [
+    constant_parameter_type_indices = [
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
-    if constant_type_indices and not fdi["types"]["config"]["has_declared_surface_errors"]:
+    if constant_parameter_type_indices and not fdi["types"]["config"]["has_declared_surface_errors"]:
         evidence, slowest_half_cycle_frames = (
             surface["evidence"],
             fdi["types"]["config"]["slowest_half_cycle_frames"],
@@ -630,28 +631,31 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         type_indices = [
             type_index
             for type_index in type_indices
-            if type_index in constant_type_indices
+            if type_index in constant_parameter_type_indices
             or anomaly_is_shorter_than_half_cycle
-            or _can_count_with_constant_types(type_index, constant_type_indices)
+            or _counts_with_constant_parameter_types(type_index, constant_parameter_type_indices)
         ]
     second_fault_is_possible = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
     if second_fault_is_possible and any(
-        registry.ACCOMMODATION_MODES[type_index] == GIVE_UP for type_index in constant_type_indices
+        registry.ACCOMMODATION_MODE_BY_TYPE[type_index] == GIVE_UP
+        for type_index in constant_parameter_type_indices
     ):
         # if the other surface is off as well, each constant may be one of another type
         type_indices += sorted(
             range(registry.N_CONSTANT_PARAMETER_TYPES),
-            key=lambda type_index: registry.ACCOMMODATION_MODES[type_index] == SCALE_COMMAND,
+            key=lambda type_index: registry.ACCOMMODATION_MODE_BY_TYPE[type_index] == SCALE_COMMAND,
         )
     return list(dict.fromkeys(registry.TYPE_NAMES[type_index] for type_index in type_indices))
 
 
-def _can_count_with_constant_types(type_index: int, constant_type_indices: list[int]) -> bool:
+def _counts_with_constant_parameter_types(
+    type_index: int, constant_parameter_type_indices: list[int]
+) -> bool:
     """Whether a varying type counts together with these constant ones: it may yet show itself, or looks like
     one of them."""
     return bool(
         registry.MUST_SHOW_ITSELF[type_index]
-        or registry.CAN_LOOK_LIKE[type_index, constant_type_indices].any()
+        or registry.CAN_LOOK_LIKE[type_index, constant_parameter_type_indices].any()
     )
 
 

@@ -486,22 +486,24 @@ def narrow_position_by_min_rate(config, surface, memory, side_of_command):
     min_motion_in_frame = (
         config.n_substeps * config.frames_per_block * surface.actuator.min_rate_limited_motion_per_substep
     )
-    lag_distance = (
+    distance_where_lag_slows_approach = (
         surface.actuator.min_rate_limited_motion_per_substep / surface.actuator.approach_share_per_substep
     )
-    min_command, max_command = command_range(config, surface)
+    min_command, max_command = command_range_for_judged_frame(config, surface)
     if side_of_command > 0:
         memory.position_high = min(
-            memory.position_high, max(memory.position_high - min_motion_in_frame, max_command + lag_distance)
+            memory.position_high,
+            max(memory.position_high - min_motion_in_frame, max_command + distance_where_lag_slows_approach),
         )
     elif side_of_command < 0:
         memory.position_low = max(
-            memory.position_low, min(memory.position_low + min_motion_in_frame, min_command - lag_distance)
+            memory.position_low,
+            min(memory.position_low + min_motion_in_frame, min_command - distance_where_lag_slows_approach),
         )
 
 
 @kernel
-def command_range(config, surface):
+def command_range_for_judged_frame(config, surface):
     """The least and greatest order that moved it towards and within the judged frame, rad."""
     command_record = surface.commands
     newest_blocks_ago = 2 if config.frame_shows_single_instant else 1
@@ -513,7 +515,7 @@ def command_range(config, surface):
 @kernel
 def surface_side_of_commands(config, surface):
     """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
-    min_command, max_command = command_range(config, surface)
+    min_command, max_command = command_range_for_judged_frame(config, surface)
     return (
         1
         if surface.judged_observation.position_low > max_command

@@ -85,12 +85,12 @@ def clear_held_interval(surface, type_index):
 
 
 @kernel
-def simulate_return_in_frame(config, surface, start_position, release_side=0):
+def simulate_return_in_frame(config, surface, start_position, mean_extreme_sign=0):
     """Mean position over the judged frame of a surface released at `start_position` (rad), its position at
     the end of the frame, and the possible error of the mean where the effectiveness changes meanwhile.
 
-    The release is at the beginning of the frame; with a release_side, at any instant of it: the least mean if
-    release_side < 0, else the greatest.
+    The release is at the beginning of the frame; with a mean_extreme_sign, at any instant of it: the least
+    mean if mean_extreme_sign < 0, else the greatest.
     """
     position_sum, n_positions, position, min_position, max_position = (
         0.0,
@@ -111,9 +111,9 @@ def simulate_return_in_frame(config, surface, start_position, release_side=0):
                 surface.actuator.approach_share_per_substep,
                 surface.actuator.max_motion_per_substep,
             )
-            if release_side != 0:
+            if mean_extreme_sign != 0:
                 position = (
-                    min(position, start_position) if release_side < 0 else max(position, start_position)
+                    min(position, start_position) if mean_extreme_sign < 0 else max(position, start_position)
                 )
     return (
         position_sum / n_positions,
@@ -495,10 +495,10 @@ FLOAT = FaultType(
 @kernel
 def min_runaway_distance(config, surface, k):
     """The least way (rad) a runaway has gone by a frame; over a block the mean was reached within it."""
-    elapsed_frames = k - surface.evidence.first_anomalous_frame
+    min_runaway_frames = k - surface.evidence.first_anomalous_frame
     if config.frames_per_block > 1:
-        elapsed_frames = max(elapsed_frames - 1, 0)
-    return surface.actuator.min_runaway_rate * config.block_duration_s * elapsed_frames
+        min_runaway_frames = max(min_runaway_frames - 1, 0)
+    return surface.actuator.min_runaway_rate * config.block_duration_s * min_runaway_frames
 
 
 @kernel

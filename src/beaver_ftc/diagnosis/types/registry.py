@@ -589,11 +589,11 @@ def count_rest_as_evidence(types, surface_index):
     surface = types.surface[surface_index]
     if not agrees_with_rest_position(surface):
         return
-    for other_index, other_surface in enumerate(types.surface):
-        if other_index == surface_index or (
-            surface.status.may_be_sole_fault and other_surface.status.may_be_sole_fault
+    for each_surface_index, each_surface in enumerate(types.surface):
+        if each_surface_index == surface_index or (
+            surface.status.may_be_sole_fault and each_surface.status.may_be_sole_fault
         ):
-            count_anomalous_frame(other_surface)
+            count_anomalous_frame(each_surface)
     surface.evidence.n_rest_frames += 1
     if (
         surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames

@@ -131,15 +131,15 @@ def release_within_block_explains_block(config, surface, type_index):
     )
     if config.frames_per_block == 1 or held_position_min > held_position_max:
         return False
-    lowest_mean_position, _, lowest_mean_tolerance = simulate_return_in_frame(
+    lowest_mean_position, _, tolerance_of_lowest_mean = simulate_return_in_frame(
         config, surface, held_position_min, -1
     )
-    highest_mean_position, _, highest_mean_tolerance = simulate_return_in_frame(
+    highest_mean_position, _, tolerance_of_highest_mean = simulate_return_in_frame(
         config, surface, held_position_max, 1
     )
     return (
-        lowest_mean_position - lowest_mean_tolerance <= surface.judged_observation.position_high
-        and highest_mean_position + highest_mean_tolerance >= surface.judged_observation.position_low
+        lowest_mean_position - tolerance_of_lowest_mean <= surface.judged_observation.position_high
+        and highest_mean_position + tolerance_of_highest_mean >= surface.judged_observation.position_low
     )
 
 
@@ -165,34 +165,34 @@ def narrow_return_interval(config, surface, release_slot, type_index):
     The mean over the frame rises with where the return began, and by no more than that.
     """
     release = surface.release
-    mean_position_from_low, _, mean_tolerance_from_low = simulate_return_in_frame(
+    mean_position_from_low, _, mean_position_tolerance_from_low = simulate_return_in_frame(
         config, surface, release.return_position_low[release_slot, type_index]
     )
-    mean_position_from_high, _, mean_tolerance_from_high = simulate_return_in_frame(
+    mean_position_from_high, _, mean_position_tolerance_from_high = simulate_return_in_frame(
         config, surface, release.return_position_high[release_slot, type_index]
     )
-    mean_tolerance, healthy_position = (
-        max(mean_tolerance_from_low, mean_tolerance_from_high),
+    mean_position_tolerance, healthy_position = (
+        max(mean_position_tolerance_from_low, mean_position_tolerance_from_high),
         surface.judged_observation.healthy_position,
     )
     if (
         max(
-            abs(mean_position_from_low - mean_tolerance - healthy_position),
-            abs(mean_position_from_high + mean_tolerance - healthy_position),
+            abs(mean_position_from_low - mean_position_tolerance - healthy_position),
+            abs(mean_position_from_high + mean_position_tolerance - healthy_position),
         )
         <= HEALTHY_POSITION_TOLERANCE_RAD
     ):
         return False
     if (
-        mean_position_from_low - mean_tolerance > surface.judged_observation.position_high
-        or mean_position_from_high + mean_tolerance < surface.judged_observation.position_low
+        mean_position_from_low - mean_position_tolerance > surface.judged_observation.position_high
+        or mean_position_from_high + mean_position_tolerance < surface.judged_observation.position_low
     ):
         return False
     narrowed_low = release.return_position_low[release_slot, type_index] + max(
-        surface.judged_observation.position_low - mean_position_from_low - mean_tolerance, 0.0
+        surface.judged_observation.position_low - mean_position_from_low - mean_position_tolerance, 0.0
     )
     narrowed_high = release.return_position_high[release_slot, type_index] - max(
-        mean_position_from_high - mean_tolerance - surface.judged_observation.position_high, 0.0
+        mean_position_from_high - mean_position_tolerance - surface.judged_observation.position_high, 0.0
     )
     set_return_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
     return True

@@ -308,3 +308,9 @@ def test_what_is_asked_of_a_sweep():
     assert (asked.keep.policy, asked.report, asked.search, asked.source) == ("all", False, "delay", "f.yaml")
     usual = sweep._options(sweep.Arguments("f.yaml"))
     assert (usual.backend, usual.report, usual.search, usual.resume) == ("local", True, None, False)
+
+
+def test_formats_of_figures_are_each_kept_once_and_without_spaces():
+    assert run._formats("pdf, svg ,pdf") == ("pdf", "svg")
+    with pytest.raises(BadInput, match=r"^--figures: 'gif' is no format, allowed: "):
+        run._formats("svg,gif")

@@ -159,6 +159,9 @@ def test_an_instrumented_copy(jet, tmp_path, changed):
     assert instrumented.surfaces_of(jet) == ("aileron", "elevator")
     assert instrumented.others_of(jet) == ("fcs/spoiler-pos-norm", "gear/gear-pos-norm")
     assert instrumented.engines_of(jet) == 1
+    glider = tmp_path / "glider.xml"
+    glider.write_text("<fdm_config><propulsion/></fdm_config>")
+    assert instrumented.engines_of(glider) == 0
     travel = {"aileron": (-0.3, 0.25), "elevator": (-0.4, 0.35)}
     model = instrumented.instrument(
         jet, tmp_path / "copy", travel, ["fcs/spoiler-pos-norm", "gear/gear-pos-norm"]

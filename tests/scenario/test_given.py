@@ -77,6 +77,12 @@ class TestWith:
         assert other.sensors.p.noise_std_deg_s == 0.001
         assert scenario.faults[0].magnitude == 0.4
 
+    def test_sections_that_do_not_change_are_the_same_objects(self):
+        scenario = bf.load("elevator-loss-in-turbulence")
+        other = scenario.with_({"seed": 7, "uncertainty.coefficients.Cm_q": 0.98})
+        assert other.fdi is scenario.fdi
+        assert other.uncertainty.coefficients["Cm_q"] == 0.98
+
     def test_a_default_that_follows_from_another_key_follows_it(self):
         assert not bf.load("elevator-partial-loss").with_({"fdi.thresholds": "published"}).fdi.sharpen.memory
 

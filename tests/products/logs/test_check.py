@@ -332,6 +332,8 @@ def test_names_as_the_patterns_have_them():
         check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["zyro_x", "xgyro_x", "agyro_x"])
         == "agyro_x"
     )
+    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["agyro_x", "zgyro_x", "GyrX"]) == "GyrX"
+    assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], ["a_gyro_x", "gyro_x"]) == "gyro_x"
     assert check._matching_column(check._COLUMN_NAME_PATTERNS["r"], rates) is None
     commands = ["Aileron", "rudder_position", "da", "servo1", "elevator_truth", "elevon_error", "roll"]
     assert check._command_columns(commands, {"p": "da"}) == ["Aileron", "servo1"]

@@ -135,6 +135,9 @@ def test_the_columns_of_a_diagnosis(tmp_path, monkeypatch, flown):
     assert (tmp_path / "small" / "verdict.json").read_text().startswith('{\n  "faulty": true')
     pages.write_results(tmp_path, "bare", {"t_s": [1.0]}, {})
     assert {path.name for path in (tmp_path / "bare").iterdir()} == {"diagnosis.parquet", "verdict.json"}
+    extra = pages.write_results(tmp_path, "more", {"t_s": [1.0]}, {}, None, lambda at: (at / "extra").touch())
+    assert {path.name for path in extra.iterdir()} == {"diagnosis.parquet", "verdict.json", "extra"}
+    assert {path.name for path in tmp_path.iterdir()} == {"small", "bare", "more"}
 
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):

@@ -214,3 +214,8 @@ def test_a_prediction_is_the_sum_over_the_samples_before_times_their_coefficient
         for k in range(len(values))
     ]
     np.testing.assert_allclose(regression.subtract_noise_prediction(values, predictor), expected, atol=1e-12)
+
+
+def test_a_flight_is_split_where_its_shortest_part_is_long_enough():
+    assert [len(part) for part in regression.split_into_flight_parts(np.arange(242))] == [61, 61, 60, 60]
+    assert regression.split_into_flight_parts(np.arange(239)) is None  # the last part has 59 rows

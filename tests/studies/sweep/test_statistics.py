@@ -84,6 +84,12 @@ def test_the_confusion_matrix_has_every_flight_once(summary):
     }  # fmt: skip
 
 
+def test_a_false_alarm_without_a_fault_is_counted_by_the_name_it_has(tmp_path, sweep):
+    healthy = {"fault.actuator": None, "fault.type": None, "fault.at_s": None, "false_alarm": True}
+    confusion = summarise(flights_of([detected(0, 0.5, "rudder", **healthy)], tmp_path), sweep)["confusion"]
+    assert confusion == {"faults": ["no fault"], "diagnoses": ["rudder"], "counts": [[1]]}
+
+
 def test_departures_and_failures(summary):
     assert (summary["departures"]["count"], summary["departures"]["of"]) == (1, 11)
     assert summary["statuses"] == {"bad_input": 1, "departed": 1, "flown": 10}

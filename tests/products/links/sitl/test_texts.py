@@ -159,6 +159,13 @@ def test_a_link_without_a_packet_is_a_document_too():
     assert document["latency_ms"] == {"median": 0.0, "p99": 0.0, "largest": 0.0}
 
 
+def test_a_link_is_silent_since_its_last_frame():
+    link = Link()
+    assert link.silent_s(7.5) == 0.0  # nothing has begun yet
+    link.hear(8.0)
+    assert link.silent_s(10.25) == 2.25
+
+
 @pytest.mark.parametrize("detected", [0, 1])
 @pytest.mark.parametrize("watched", [0, 1])
 @pytest.mark.parametrize("plugged", [None, "a plug-in"])

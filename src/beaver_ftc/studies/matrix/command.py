@@ -32,7 +32,7 @@ class Matrix(StudyCommand):
 
     Examples:
       beaver-ftc matrix --airspeed 45
-      beaver-ftc matrix --airspeed 45 --declared --turbulence light
+      beaver-ftc matrix --declared --turbulence light --airspeed 45
 
     out: Folder in which the result folder `fault-matrix` or `pitch-lost` is written.
     airspeed: Airspeed, m/s. Repeat the option for several. Default: 38, 45 and 52 for the Beaver; for

@@ -223,7 +223,7 @@ def figure_of(document: Document) -> "Figure":
         panel.tick_params(labelsize=8)
     grid[0][0].set_yticks(range(len(rows)), [label(row) for row in rows], fontsize=8)
     grid[0][0].invert_yaxis()
-    label_edges(grid, "worse without the mechanism, net %")
+    label_edges(grid, "worse without it, net points")
     for system, colour in zip((PAPER, DEFAULT), SERIES, strict=False):
         grid[0][0].plot([], [], "o", color=colour, label=f"{system} system")
     figure.legend(loc="outside lower center", ncols=2, fontsize=9, frameon=False)

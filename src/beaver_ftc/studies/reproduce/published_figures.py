@@ -127,11 +127,11 @@ def margins_figure(document: Document) -> "Figure":
     axes.set_yticks(range(len(claims)), [f"{c['where']}  {c['statement']}" for c in claims], fontsize=8)
     axes.tick_params(axis="x", labelsize=8)
     axes.grid(axis="x", color="#dddddd", linewidth=0.6)
-    axes.set_xlabel("share of what is allowed (arrow: beyond the axis)", fontsize=9)
-    axes.set_title("Left of 1 the statement holds", fontsize=9)
-    axes.plot([], [], "o", color=BLACK, markersize=5, label="as flown")
-    axes.plot([], [], color=BLUE, linewidth=3, alpha=0.55, label="over all changes, which it survives")
-    axes.plot([], [], color=VERMILION, linewidth=3, alpha=0.55, label="over all changes, one breaks it")
+    axes.set_xlabel("ratio of number and limit (arrow: beyond the axis)", fontsize=9)
+    axes.set_title("Left of 1 the number keeps its limit", fontsize=9)
+    axes.plot([], [], "o", color=BLACK, markersize=5, label="as published")
+    axes.plot([], [], color=BLUE, linewidth=3, alpha=0.55, label="over all settings: always kept")
+    axes.plot([], [], color=VERMILION, linewidth=3, alpha=0.55, label="over all settings: not always kept")
     axes.legend(
         loc="upper right", bbox_to_anchor=(1.0, -0.045), ncols=3, fontsize=8
     )  # below: no corner is free

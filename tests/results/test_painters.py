@@ -4,7 +4,9 @@ import os
 import signal
 import sys
 import threading
+import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -44,25 +46,39 @@ def bytes_of(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("killed", [0, 1, 2])
+@pytest.mark.parametrize("killed", [[], [0], [1], [0, 1]])
 def test_figures_are_the_same_whoever_draws_them(killed, pictures, drawn_here, tmp_path):
     others = children()  # of tests before this one
     with painters() as at_work:
+        (first,) = [child for child in children() if child not in others]
         assert len(at_work) == 2
-        for painter in at_work[:killed]:
+        for painter in at_work:
             painter.send("no picture")  # it answers what went wrong, and goes on
             assert isinstance(painter.recv(), Exception)
+        (second,) = children(first)
         with drawing(pictures, at_work):
-            for child in [each for each in children() if each not in others][:killed]:
-                os.kill(child, signal.SIGKILL)
+            for number in killed:
+                os.kill((first, second)[number], signal.SIGKILL)
     assert children() == others
+    for _ in range(500):  # its parent has ended before it: nobody waits for it
+        if not is_running(second):
+            break
+        time.sleep(0.01)
+    assert not is_running(second)
     (tmp_path / "here").mkdir()
     assert bytes_of(tmp_path / "beside") == drawn_here(pictures, tmp_path / "here")
 
 
-def children():
-    with open(f"/proc/self/task/{os.getpid()}/children") as file:
+def children(process=None):
+    with open(f"/proc/{process or os.getpid()}/task/{process or os.getpid()}/children") as file:
         return [int(word) for word in file.read().split()]
+
+
+def is_running(process):
+    try:
+        return " Z " not in Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
 
 
 def test_a_failure_is_raised_here_once_all_have_ended(pictures, tmp_path):

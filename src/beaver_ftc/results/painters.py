@@ -1,8 +1,9 @@
 """Figures drawn by processes beside this one, which import matplotlib while the flight is flown.
 
-They are forked before anything heavy is there, and end with the one that began them. The figures are drawn in
-this process, and are the same, where it cannot be forked, has one core or other threads (whose locks a fork
-would copy), or where a painter has died.
+The first is forked before anything heavy is there, and the second from the first, once it has imported
+matplotlib: it is imported once. They end when the process that began them closes the connection, or ends.
+The figures are drawn in this process, and are the same, where it cannot be forked, has one core or other
+threads (whose locks a fork would copy), or where a painter has died.
 """
 
 import gc
@@ -30,21 +31,19 @@ def painters(wanted: bool = True) -> Iterator[Painters]:
         yield ()
         return
     fork = multiprocessing.get_context("fork")
-    ours: list[Connection] = []
-    processes = []
-    for _ in range(N_PAINTERS):
-        here, there = fork.Pipe()
-        ours.append(here)
-        processes.append(fork.Process(target=_draw_until_closed, args=(there, tuple(ours)), daemon=True))
-        processes[-1].start()
+    pairs = [fork.Pipe() for _ in range(N_PAINTERS)]
+    ours, theirs = zip(*pairs, strict=True)
+    first = fork.Process(target=_paint, args=(theirs, ours), daemon=True)
+    first.start()
+    for there in theirs:
         there.close()
     try:
         yield ours
     finally:
-        for process in processes:
-            process.kill()  # one that has just begun would still handle SIGTERM as this process does
-        for process in processes:
-            process.join()
+        for here in ours:
+            here.close()
+        first.kill()  # one that has just begun would still handle SIGTERM as this process does
+        first.join()
 
 
 def _can_fork() -> bool:
@@ -94,8 +93,8 @@ def _send_pictures(painter: Connection, pictures: "Sequence[Picture]") -> bool:
     return True
 
 
-def _draw_until_closed(connection: Connection, other_ends: Sequence[Connection]) -> None:
-    """Draw what is asked for until the other end is closed: by its process, or with it."""
+def _paint(connections: Sequence[Connection], other_ends: Sequence[Connection]) -> None:
+    """Import matplotlib, fork the other painters, and draw."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for each in other_ends:
@@ -104,6 +103,20 @@ def _draw_until_closed(connection: Connection, other_ends: Sequence[Connection])
     from beaver_ftc.results.figures import figure_class
 
     figure_class()
+    own, *others = connections
+    for other in others:
+        if os.fork() == 0:
+            own.close()
+            try:
+                _draw_until_closed(other)
+            finally:
+                os._exit(0)
+        other.close()
+    _draw_until_closed(own)
+
+
+def _draw_until_closed(connection: Connection) -> None:
+    """Draw what is asked for until the other end is closed: by its process, or with it."""
     while True:
         try:
             pictures = connection.recv()

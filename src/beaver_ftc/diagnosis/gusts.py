@@ -59,7 +59,7 @@ from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
-MIN_UNMEASURED_INTENSITY_SHARES = (1.0, 0.003, 0.03)
+MIN_UNMEASURED_GUST_ROTATION_SHARES = (1.0, 0.003, 0.03)
 UNMEASURED_SHARE_BY_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
 ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
@@ -177,14 +177,14 @@ def measure_air_relative_velocity(gust, y, attitude):
     alpha, beta, V = y[ALPHA], y[BETA], y[AIRSPEED]
     fill_level_to_body_rotation(attitude[0], attitude[1], gust.memory.level_to_body)
     gust.memory.heading = attitude[2]
-    forward_velocity = V * np.cos(alpha) * np.cos(beta)
-    right_velocity = V * np.sin(beta)
-    down_velocity = V * np.sin(alpha) * np.cos(beta)
+    body_forward_velocity = V * np.cos(alpha) * np.cos(beta)
+    body_right_velocity = V * np.sin(beta)
+    body_down_velocity = V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
         gust.memory.air_relative_velocity[i] = (
-            gust.memory.level_to_body[0, i] * forward_velocity
-            + gust.memory.level_to_body[1, i] * right_velocity
-            + gust.memory.level_to_body[2, i] * down_velocity
+            gust.memory.level_to_body[0, i] * body_forward_velocity
+            + gust.memory.level_to_body[1, i] * body_right_velocity
+            + gust.memory.level_to_body[2, i] * body_down_velocity
         )
 
 
@@ -291,15 +291,15 @@ def update_gust_rotation(gust, y, attitude, dt):
         )
     heading_change = wrapped(attitude[2] - gust.memory.heading)
     sin_heading_change, cos_heading_change = np.sin(heading_change), np.cos(heading_change)
-    predicted_velocity_ahead = (
+    predicted_forward_velocity = (
         gust.memory.air_relative_velocity[0] * cos_heading_change
         + gust.memory.air_relative_velocity[1] * sin_heading_change
     )
-    predicted_velocity_right = (
+    predicted_right_velocity = (
         gust.memory.air_relative_velocity[1] * cos_heading_change
         - gust.memory.air_relative_velocity[0] * sin_heading_change
     )
-    predicted_velocity_down = gust.memory.air_relative_velocity[2]
+    predicted_down_velocity = gust.memory.air_relative_velocity[2]
     gust.memory.level_acceleration_before[0] = (
         level_acceleration[0] * cos_heading_change + level_acceleration[1] * sin_heading_change
     )
@@ -309,7 +309,7 @@ def update_gust_rotation(gust, y, attitude, dt):
     gust.memory.level_acceleration_before[2] = level_acceleration[2]
     measure_air_relative_velocity(gust, y, attitude)
     update_gust_velocity_and_speed(
-        gust, predicted_velocity_ahead, predicted_velocity_right, predicted_velocity_down, y[AIRSPEED], dt
+        gust, predicted_forward_velocity, predicted_right_velocity, predicted_down_velocity, y[AIRSPEED], dt
     )
     V = gust.output.speed_relative_to_mean_air
     update_gust_axes(gust, sin_heading_change, cos_heading_change)
@@ -333,14 +333,14 @@ def update_gust_rotation(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[1] = np.exp(
         -dt / pitching_lag_s
     ) * gust.memory.air_rotation_in_level_axes[1] + (
-        predicted_velocity_down - gust.memory.air_relative_velocity[2]
+        predicted_down_velocity - gust.memory.air_relative_velocity[2]
     ) / (V * pitching_lag_s)
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
     if unmeasured_yawing_share_by_turn < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
-            predicted_velocity_right - gust.memory.air_relative_velocity[1]
+            predicted_right_velocity - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
     else:
         gust.memory.gust_velocity_change_since_start[:], gust.memory.remaining_initial_gust_variance_share = (
@@ -351,11 +351,11 @@ def update_gust_rotation(gust, y, attitude, dt):
 
 @kernel
 def update_gust_velocity_and_speed(
-    gust, predicted_velocity_ahead, predicted_velocity_right, predicted_velocity_down, airspeed, dt
+    gust, predicted_forward_velocity, predicted_right_velocity, predicted_down_velocity, airspeed, dt
 ):
     """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
 
-    predicted_velocity_ahead, _right, _down, m/s: velocity relative to the air if the gust had not changed.
+    predicted_forward_velocity, _right, _down, m/s: velocity relative to the air if the gust had not changed.
     airspeed m/s: it is the speed if no gust is measured.
     """
     gust.output.speed_relative_to_mean_air = airspeed
@@ -365,17 +365,17 @@ def update_gust_velocity_and_speed(
     gust.memory.remaining_initial_gust_variance_share *= decay_factor * decay_factor
     gust.memory.gust_velocity_change_since_start[0] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[0]
-        + predicted_velocity_ahead
+        + predicted_forward_velocity
         - gust.memory.air_relative_velocity[0]
     )
     gust.memory.gust_velocity_change_since_start[1] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[1]
-        + predicted_velocity_right
+        + predicted_right_velocity
         - gust.memory.air_relative_velocity[1]
     )
     gust.memory.gust_velocity_change_since_start[2] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[2]
-        + predicted_velocity_down
+        + predicted_down_velocity
         - gust.memory.air_relative_velocity[2]
     )
     squared_speed_relative_to_mean_air = 0.0
@@ -537,11 +537,12 @@ def unmeasured_gust_intensity_share(gust, gust_axis):
 
 
 @kernel
-def low_frequency_power_ratio(gust, gust_axis):
+def intensity_scale_for_rolling_length(gust, gust_axis):
     """Power of the gust about a gust axis at low frequency, over that with the correlation length of the
     rolling gust.
 
-    It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
+    A gust of the rolling gust's length and with this share of the intensity has the same power at low
+    frequency. It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
     """
     return (
         (gust_correlation_length(gust, gust_axis) / gust.config.rolling_gust_correlation_length) ** 2
@@ -573,12 +574,14 @@ def unmeasured_gust_drift_intensity(gust, V, axis_i, axis_j, with_rolling_correl
     """
     drift_intensity_per_airspeed = 0.0
     for gust_axis in range(3):
-        power_ratio = low_frequency_power_ratio(gust, gust_axis) if with_rolling_correlation_length else 1.0
+        intensity_scale = (
+            intensity_scale_for_rolling_length(gust, gust_axis) if with_rolling_correlation_length else 1.0
+        )
         drift_intensity_per_airspeed += (
             gust_effect_product(gust, gust.output.gust_axes_in_body, axis_i, axis_j, gust_axis)
             * unmeasured_gust_intensity_share(gust, gust_axis)
             * gust.memory.gust_rotation_intensity_per_airspeed[gust_axis]
-            * power_ratio
+            * intensity_scale
         )
     return drift_intensity_per_airspeed * max(V, gust.output.speed_relative_to_mean_air)
 
@@ -726,7 +729,7 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
     gust["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
     gust["memory"]["gust_rotation_intensity_per_airspeed"], gust["memory"]["unmeasured_intensity_share"] = (
         gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
-        MIN_UNMEASURED_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
+        MIN_UNMEASURED_GUST_ROTATION_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
     gust["config"]["altitude_error_offset_m"] = sensor_errors["altitude"].worst
     gust["config"]["altitude_error_slope"] = sensor_errors["altitude"].slope

@@ -33,7 +33,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_INTENSITY_SHARES
+from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_GUST_ROTATION_SHARES
 
 UNEXPLAINED_ACCELERATION_MEMORY_S = 0.1
 MIN_GYRO_NOISE_STD_RAD_S = 1e-5  # what perfect instruments are taken for
@@ -71,30 +71,33 @@ class WhiteningFilter:
         K = np.linalg.solve(P[:3, :3] + self.R, P[:3]).T
         return P - K @ P[:3]
 
-    def whitened_response(self, phi: np.ndarray) -> np.ndarray:
-        """Compute the effect of accelerations phi (n, 3, ...) rad/s2 on the innovations, scaled to variance
+    def whitened_response(self, added_acceleration: np.ndarray) -> np.ndarray:
+        """Compute the effect of added_acceleration (n, 3, ...) rad/s2 on the innovations, scaled to variance
         one."""
         state_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
-        state_response, whitened = np.zeros((9, *phi.shape[2:])), np.empty_like(phi)
-        for k, acceleration in enumerate(phi):
+        state_response, whitened = (
+            np.zeros((9, *added_acceleration.shape[2:])),
+            np.empty_like(added_acceleration),
+        )
+        for k, acceleration in enumerate(added_acceleration):
             state_response = state_transition @ state_response
             state_response[:3] += self.dt * acceleration
             whitened[k] = whitener @ state_response[:3]
         return whitened
 
-    def deflection_coefficient(self, phi: np.ndarray) -> np.ndarray:
-        """d after each frame, (n,), of a fault phi (n, 3) rad/s2 that begins with the first of them."""
-        return np.sqrt(np.cumsum(np.square(self.whitened_response(phi)).sum(axis=1)))
+    def deflection_coefficient_by_frame(self, fault_acceleration: np.ndarray) -> np.ndarray:
+        """d after each frame, (n,), of fault_acceleration (n, 3) rad/s2: a fault from its first frame on."""
+        return np.sqrt(np.cumsum(np.square(self.whitened_response(fault_acceleration)).sum(axis=1)))
 
     def deflection_coefficient_with_unknowns(
-        self, phi: np.ndarray, regressors: np.ndarray, constant_std: np.ndarray
+        self, fault_acceleration: np.ndarray, regressors: np.ndarray, constant_std: np.ndarray
     ) -> float:
-        """d of a fault phi (n, 3) rad/s2 with unknown constants in all frames.
+        """d of fault_acceleration (n, 3) rad/s2 with unknown constants in all frames.
 
         The constants, of standard deviation constant_std (m,) > 0, multiply regressors (n, 3, m).
         """
-        whitened_fault = self.whitened_response(phi).ravel()
+        whitened_fault = self.whitened_response(fault_acceleration).ravel()
         whitened_regressors = (
             self.whitened_response(regressors).reshape(whitened_fault.size, constant_std.size) * constant_std
         )
@@ -117,7 +120,7 @@ def context_with_measured_gust(context: Context, gust_estimate_noise_rad_s2: np.
         return context
     errors_with_measured_gust = replace(
         declared,
-        gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_INTENSITY_SHARES),
+        gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_GUST_ROTATION_SHARES),
         model_rad_s2=np.hypot(declared.model_rad_s2, gust_estimate_noise_rad_s2),
     )
     return replace(context, declared=errors_with_measured_gust)

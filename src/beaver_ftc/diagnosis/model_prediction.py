@@ -129,13 +129,13 @@ def fill_frame_means(prediction, bound_record):
     sums = prediction.sums
     frame_means = prediction.frame_means
     for i in range(3):
-        mean_acceleration = frame_share_per_instant * sums.f[i]
+        mean_predicted_acceleration = frame_share_per_instant * sums.f[i]
         for s in range(prediction.u.size):
             frame_means.previous_G[i, s] = frame_means.G[i, s]
             frame_means.G[i, s] = frame_share_per_instant * sums.G[i, s]
             frame_means.Gu[i, s] = frame_share_per_instant * sums.Gu[i, s]
-            mean_acceleration += frame_means.Gu[i, s]
-        frame_means.acceleration[i] = mean_acceleration
+            mean_predicted_acceleration += frame_means.Gu[i, s]
+        frame_means.acceleration[i] = mean_predicted_acceleration
         bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
     frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
     frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max
@@ -181,9 +181,9 @@ def fill_effect_tolerance_for_fault_change(prediction):
 
 
 @kernel
-def evaluate_bound_and_frame_means(prediction, bound_record, measured, k, dt):
+def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_index, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
-    bound_record.model_error_map.time_s = k * dt
+    bound_record.model_error_map.time_s = frame_index * dt
     fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
     bound_record.eta_bar[:] = bound_record.eta_bar_now
     if bound_record.declared_errors.has_declared_errors:
@@ -191,7 +191,7 @@ def evaluate_bound_and_frame_means(prediction, bound_record, measured, k, dt):
             bound_record.gyro_error_change_bound[i] = changing_gyro_error_bound(
                 bound_record.declared_errors, i, measured.x[i]
             )
-    if k > 0:
+    if frame_index > 0:
         fill_frame_means(prediction, bound_record)
 
 

@@ -296,7 +296,7 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors
             "correlation",
             "information",
             "regressor_correlation",
-            "correlation_bound_by_coefficient_errors",
+            "max_correlation_by_coefficient_errors",
             "score",
         ):
             assert onset_tests_of(view["block"], name) == pytest.approx(

@@ -144,7 +144,7 @@ def test_the_worst_corner_takes_all_of_the_allowance():
     block = _shown(_block("two axes", STEP_FAULT, tolerance=tolerance), wrong, signatures, regressors)
     seen, slack = (
         by_onset(block, "correlation")[-1, 0],
-        by_onset(block, "correlation_bound_by_coefficient_errors")[-1, 0],
+        by_onset(block, "max_correlation_by_coefficient_errors")[-1, 0],
     )
     assert abs(seen) - slack == pytest.approx(abs(clean), rel=1e-9)
 
@@ -179,7 +179,7 @@ def _allowed(block):
     """What a bounded uncertainty may add to the correlation of the first hypothesis, (slots,)."""
     return np.array(
         [
-            likelihood.correlation_bound_by_uncertainty(
+            likelihood.max_correlation_by_uncertainty(
                 block["onset_tests"][0], k, *block["transient_uncertainty_response"]
             )
             for k in range(N_ONSET_SLOTS)

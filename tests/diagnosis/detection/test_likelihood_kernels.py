@@ -52,9 +52,9 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
     names = (
         "correlation",
         "information",
-        "correlation_bound_by_constant_uncertainty",
-        "correlation_bound_by_varying_uncertainty",
-        "correlation_bound_by_rate_limited_uncertainty",
+        "max_correlation_by_constant_uncertainty",
+        "max_correlation_by_varying_uncertainty",
+        "max_correlation_by_rate_limited_uncertainty",
         "correlation_by_calm_air",
         "remaining_growth_share",
         "signature_filter_state",
@@ -115,31 +115,31 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
         likelihood.accumulate_correlations(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
-    correlation_bound_by_constant_uncertainty, swings = (
+    max_correlation_by_constant_uncertainty, swings = (
         old @ np.abs(w) @ [0.1, 0.2],
         old @ changes @ [0.3, 0.4],
     )
-    correlation_bound_by_rate_limited_uncertainty = old @ np.abs(w) @ [0.3, 0.4] * 0.05
-    assert onset_tests["correlation_bound_by_constant_uncertainty"][lane] == pytest.approx(
-        correlation_bound_by_constant_uncertainty
+    max_correlation_by_rate_limited_uncertainty = old @ np.abs(w) @ [0.3, 0.4] * 0.05
+    assert onset_tests["max_correlation_by_constant_uncertainty"][lane] == pytest.approx(
+        max_correlation_by_constant_uncertainty
     )
-    assert onset_tests["correlation_bound_by_varying_uncertainty"][lane] == pytest.approx(swings)
-    assert onset_tests["correlation_bound_by_rate_limited_uncertainty"][lane] == pytest.approx(
-        correlation_bound_by_rate_limited_uncertainty
+    assert onset_tests["max_correlation_by_varying_uncertainty"][lane] == pytest.approx(swings)
+    assert onset_tests["max_correlation_by_rate_limited_uncertainty"][lane] == pytest.approx(
+        max_correlation_by_rate_limited_uncertainty
     )
     last = np.abs(w[-1]) @ [0.3, 0.4]
-    allowed = likelihood.correlation_bound_by_uncertainty(
+    allowed = likelihood.max_correlation_by_uncertainty(
         onset_tests, lane, *block["transient_uncertainty_response"]
     )
     assert allowed == pytest.approx(
-        correlation_bound_by_constant_uncertainty
-        + min(swings + last, correlation_bound_by_rate_limited_uncertainty)
+        max_correlation_by_constant_uncertainty
+        + min(swings + last, max_correlation_by_rate_limited_uncertainty)
     )
-    onset_tests["correlation_bound_by_rate_limited_uncertainty"][lane] = 99.0
-    allowed = likelihood.correlation_bound_by_uncertainty(
+    onset_tests["max_correlation_by_rate_limited_uncertainty"][lane] = 99.0
+    allowed = likelihood.max_correlation_by_uncertainty(
         onset_tests, lane, *block["transient_uncertainty_response"]
     )
-    assert allowed == pytest.approx(correlation_bound_by_constant_uncertainty + swings + last)
+    assert allowed == pytest.approx(max_correlation_by_constant_uncertainty + swings + last)
 
 
 @pytest.mark.parametrize("tolerance", [(), (0.1,), (0.1, 0.2), (0.1, 0.2, 0.3), (0.1, 0.2, 0.3, 0.4, 0.5)])
@@ -158,7 +158,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
         "signature_filter_state",
         "correlation",
         "information",
-        "correlation_bound_by_coefficient_errors",
+        "max_correlation_by_coefficient_errors",
     ):
         block["onset_tests"][name] = rng.normal(size=block["onset_tests"][name].shape)
     block["regressor_correlation"] = rng.normal(size=block["regressor_correlation"].shape)
@@ -177,7 +177,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
         )
     lane = {
         name: onset_tests_of(block, name)
-        for name in (*kept_by_name, "correlation_weight", "correlation_bound_by_coefficient_errors")
+        for name in (*kept_by_name, "correlation_weight", "max_correlation_by_coefficient_errors")
     }
     x, d = before["signature_filter_state"][:2], before["signature_filter_state"][2:]
     r = x + dt * (before["signature_for_onset"] - d)
@@ -191,7 +191,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     assert lane["regressor_correlation"][len(tolerance) :] == pytest.approx(
         before["regressor_correlation"][len(tolerance) :]
     )
-    assert lane["correlation_bound_by_coefficient_errors"] == pytest.approx(
+    assert lane["max_correlation_by_coefficient_errors"] == pytest.approx(
         np.array(tolerance) @ np.abs(overlaps)
     )
 
@@ -355,7 +355,7 @@ def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
         -7.0 * 9.0,
         81.0,
     )
-    lane["correlation_bound_by_constant_uncertainty"] = 6.0 * 9.0
+    lane["max_correlation_by_constant_uncertainty"] = 6.0 * 9.0
     likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, True)
     assert lane["llr_lower_bound"][0] == pytest.approx(certain)
     likelihood.evaluate_onset_tests(block, lane, N_ONSET_SLOTS, True, False)
@@ -396,7 +396,7 @@ def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_mos
     onsets, onset_tests, overlap = [1, 5], block["onset_tests"][0], block["regressor_correlation"][0]
     onset_tests["correlation"][onsets], onset_tests["information"][onsets] = (-3.0, -5.0), (4.0, 16.0)
     onset_tests["correlation"][7] = -99.0  # nothing is known of that onset
-    overlap[:2, 1], overlap[:2, 5], onset_tests["correlation_bound_by_constant_uncertainty"][onsets] = (
+    overlap[:2, 1], overlap[:2, 5], onset_tests["max_correlation_by_constant_uncertainty"][onsets] = (
         (1.0, -2.0),
         (-3.0, 4.0),
         rooms,

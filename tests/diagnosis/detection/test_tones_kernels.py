@@ -136,7 +136,7 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)
     mean = parity.derive_max_tone_mean_of_uncertainty(TONE_FREQUENCIES_RAD_S, PACE)
-    assert view["tone_tests"]["correlation_bound_by_uncertainty"] == pytest.approx(
+    assert view["tone_tests"]["max_correlation_by_uncertainty"] == pytest.approx(
         2.0 * passed * mean * (faded.sum() + beat)
     )
 
@@ -183,13 +183,13 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 def test_the_slack_of_one_coefficient_is_its_magnitude_and_at_most_a_twelfth_more(parts):
     record = new_fdi()["statistical"]["views"][0]["tone_tests"]
     record["regressor_correlation"][0, :, 4], size = parts, np.hypot(*parts)
-    parity.fill_correlation_bound_by_coefficient_errors(record, np.array([0.3]), 1)
+    parity.fill_max_correlation_by_coefficient_errors(record, np.array([0.3]), 1)
     assert (
         0.3 * size * (1.0 - 1e-12)
-        <= record["correlation_bound_by_coefficient_errors"][4]
+        <= record["max_correlation_by_coefficient_errors"][4]
         <= 0.3 * 1.0825 * size + 1e-300
     )
-    assert record["correlation_bound_by_coefficient_errors"][5] == 0.0
+    assert record["max_correlation_by_coefficient_errors"][5] == 0.0
 
 
 def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view, rng):
@@ -198,16 +198,14 @@ def test_slacks_of_several_coefficients_add_up_and_only_of_those_there_are(view,
     (
         record["regressor_correlation"][:2, 0],
         record["regressor_correlation"][:2, 1],
-        record["correlation_bound_by_coefficient_errors"],
+        record["max_correlation_by_coefficient_errors"],
     ) = (
         -3.0,
         0.0,
         7.0,
     )
-    parity.fill_correlation_bound_by_coefficient_errors(record, np.array([0.1, 0.2, 0.4]), 2)
-    assert record["correlation_bound_by_coefficient_errors"] == pytest.approx(
-        np.full(N_TONE_FREQUENCIES, 0.9)
-    )
+    parity.fill_max_correlation_by_coefficient_errors(record, np.array([0.1, 0.2, 0.4]), 2)
+    assert record["max_correlation_by_coefficient_errors"] == pytest.approx(np.full(N_TONE_FREQUENCIES, 0.9))
 
 
 def test_noise_as_declared_is_no_louder_than_a_chance_of_exp_of_minus_half_its_square(tone_config, rng):
@@ -232,7 +230,7 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
         80.0,
     )
     (
-        record["correlation_bound_by_coefficient_errors"][3],
+        record["max_correlation_by_coefficient_errors"][3],
         record["correlation"][0, 7],
         tone_config["larger_complex_part_variance_share"][:],
     ) = (
@@ -243,7 +241,7 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
     parity.fill_tone_score(record, tone_config, 6.0)
     root = sqrt(100.0 * tone_config["larger_complex_part_variance_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
-    record["correlation_bound_by_uncertainty"][3] = 200.0
+    record["max_correlation_by_uncertainty"][3] = 200.0
     parity.fill_tone_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["correlation"][:] = 0.0

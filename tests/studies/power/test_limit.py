@@ -55,7 +55,9 @@ def test_the_deflection_is_that_of_the_whole_flight_at_once(context):
     mean[:, before:] = DT * np.cumsum(phi, axis=0).T
     C = covariance(context, before + after)
     expected = np.sqrt(mean.ravel() @ np.linalg.solve(C, mean.ravel()))
-    assert WhiteningFilter(context).deflection_coefficient(phi)[-1] == pytest.approx(expected, rel=0.01)
+    assert WhiteningFilter(context).deflection_coefficient_by_frame(phi)[-1] == pytest.approx(
+        expected, rel=0.01
+    )
 
 
 def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
@@ -80,16 +82,16 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     whitening = WhiteningFilter(context)
     found = whitening.deflection_coefficient_with_unknowns(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)
-    assert found < 0.98 * whitening.deflection_coefficient(phi)[-1]
+    assert found < 0.98 * whitening.deflection_coefficient_by_frame(phi)[-1]
     nothing = whitening.deflection_coefficient_with_unknowns(phi, regressors[..., :0], sigma[:0])
-    assert nothing == pytest.approx(whitening.deflection_coefficient(phi)[-1])
+    assert nothing == pytest.approx(whitening.deflection_coefficient_by_frame(phi)[-1])
 
 
 def test_twice_the_fault_stands_out_twice_as_much_and_only_grows(context):
     phi = np.random.default_rng(0).normal(size=(50, 3))
     whitening = WhiteningFilter(context)
-    d = whitening.deflection_coefficient(phi)
-    assert whitening.deflection_coefficient(2.0 * phi) == pytest.approx(2.0 * d)
+    d = whitening.deflection_coefficient_by_frame(phi)
+    assert whitening.deflection_coefficient_by_frame(2.0 * phi) == pytest.approx(2.0 * d)
     assert (np.diff(d) >= 0.0).all()
 
 
@@ -97,7 +99,7 @@ def test_rougher_air_hides_more(context):
     phi = np.full((100, 3), 0.1)
     rough = replace(context, declared=replace(context.declared, gust_rad_s=3.0 * context.declared.gust_rad_s))
     still = replace(context, declared=replace(context.declared, gust_rad_s=np.zeros(3)))
-    found = [WhiteningFilter(one).deflection_coefficient(phi)[-1] for one in (rough, context, still)]
+    found = [WhiteningFilter(one).deflection_coefficient_by_frame(phi)[-1] for one in (rough, context, still)]
     assert found[0] < 0.6 * found[1] < 0.6 * found[2]
 
 
@@ -108,7 +110,7 @@ def test_of_a_flight_it_takes_what_the_surface_gave(context):
     seen = [measured for measured, _ in recording.seen]
     frames = round(at_s * 100)
     effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])
-    d = WhiteningFilter(recording.context).deflection_coefficient(effect)
+    d = WhiteningFilter(recording.context).deflection_coefficient_by_frame(effect)
     assert deflections(recording, "elevator", 0.7, (0.5, 1.0)) == pytest.approx([d[49], d[-1]])
     assert not effect[:, [0, 2]].any()
 

@@ -480,14 +480,18 @@ def form_fdae_residual(fdae, x):
 
 
 @kernel
-def alarm_axis(filter_bank, authority, statistical_alarm):
+def alarm_axis(filter_bank, authority, statistical_alarm_record):
     """The axis on which a detector in authority raises the alarm, or -1.
 
-    statistical_alarm: `ALARM` of the statistical detector.
+    statistical_alarm_record: `ALARM` of the statistical detector.
     """
     axis = bank_alarm_axis(filter_bank) if authority != STATISTICAL_DETECTOR else -1
-    if axis < 0 and authority != WORST_CASE_DETECTOR and statistical_alarm.score_over_alarm_level > 1.0:
-        axis = statistical_alarm.axis
+    if (
+        axis < 0
+        and authority != WORST_CASE_DETECTOR
+        and statistical_alarm_record.score_over_alarm_level > 1.0
+    ):
+        axis = statistical_alarm_record.axis
     return axis
 
 

@@ -295,11 +295,9 @@ def configure_forces(
         )
         force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
         force_record["innovation_per_air_rotation"] = scaled_force_slopes[3:]
-        scaled_force_slopes_through_slipstream = scaled_force_slopes.copy()
-        scaled_force_slopes_through_slipstream[AIRSPEED] += (
-            scaled_force_per_slipstream * slipstream_per_airspeed
-        )
-        innovation_variance_by_reading = (scaled_force_slopes_through_slipstream * reading_noise_std) ** 2
+        total_scaled_force_slopes = scaled_force_slopes.copy()
+        total_scaled_force_slopes[AIRSPEED] += scaled_force_per_slipstream * slipstream_per_airspeed
+        innovation_variance_by_reading = (total_scaled_force_slopes * reading_noise_std) ** 2
         innovation_noise_variance = (
             innovation_variance_by_reading.sum()
             + scaled_force_per_slipstream**2 * slipstream_variance_by_other_readings

@@ -126,15 +126,15 @@ ONSET_TESTS_RECORD = record(
     signature_filter_state=(4, N_ONSET_TESTS_PER_GROUP),
     correlation_weight=(2, N_ONSET_TESTS_PER_GROUP),  # w = S^-1 g_s of the frame
     correlation=N_ONSET_TESTS_PER_GROUP, information=N_ONSET_TESTS_PER_GROUP,  # N; D
-    correlation_bound_by_coefficient_errors=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
+    max_correlation_by_coefficient_errors=N_ONSET_TESTS_PER_GROUP,  # sum_j tol_j |R_j|
     # exp(-kappa t) of a growing loss; 1 until a loss has ended
     remaining_growth_share=N_ONSET_TESTS_PER_GROUP,
     signature_at_loss_end=(2, N_ONSET_TESTS_PER_GROUP),  # rad/s2
     # shares of |N| that a bounded uncertainty explains: constant; varying by TV(w); varying by its rate of
     # change
-    correlation_bound_by_constant_uncertainty=N_ONSET_TESTS_PER_GROUP,
-    correlation_bound_by_varying_uncertainty=N_ONSET_TESTS_PER_GROUP,
-    correlation_bound_by_rate_limited_uncertainty=N_ONSET_TESTS_PER_GROUP,
+    max_correlation_by_constant_uncertainty=N_ONSET_TESTS_PER_GROUP,
+    max_correlation_by_varying_uncertainty=N_ONSET_TESTS_PER_GROUP,
+    max_correlation_by_rate_limited_uncertainty=N_ONSET_TESTS_PER_GROUP,
     # shares of N: of lambda p; of a roughly visible gust
     correlation_by_calm_air=N_ONSET_TESTS_PER_GROUP, correlation_by_coarse_gust=N_ONSET_TESTS_PER_GROUP,
     score=N_ONSET_TESTS_PER_GROUP,
@@ -244,24 +244,24 @@ def fill_kalman_gains(block):
     """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
     for i in range(block.n_axes):
         for j in range(block.n_axes):
-            rate_gain, drift_gain = 0.0, 0.0
+            rate_gain_entry, drift_gain_entry = 0.0, 0.0
             for k in range(block.n_axes):
-                rate_gain += block.P_xx[i, k] * block.S_inverse[k, j]
-                drift_gain += block.P_xd[k, i] * block.S_inverse[k, j]
-            block.K_x[i, j], block.K_d[i, j] = rate_gain, drift_gain
+                rate_gain_entry += block.P_xx[i, k] * block.S_inverse[k, j]
+                drift_gain_entry += block.P_xd[k, i] * block.S_inverse[k, j]
+            block.K_x[i, j], block.K_d[i, j] = rate_gain_entry, drift_gain_entry
 
 
 @kernel
 def update_covariance(block):
     """Update the covariances for the measurement: P <- P - K S K'."""
-    K_x, K_d = block.K_x, block.K_d
+    rate_gain, drift_gain = block.K_x, block.K_d
     for j in range(2):  # a column follows from itself alone
         P_xx_0j, P_xx_1j = block.P_xx[0, j], block.P_xx[1, j]
         P_xd_0j, P_xd_1j = block.P_xd[0, j], block.P_xd[1, j]
         for i in range(block.n_axes):
-            block.P_dd[i, j] -= K_d[i, 0] * P_xd_0j + K_d[i, 1] * P_xd_1j
-            block.P_xx[i, j] -= K_x[i, 0] * P_xx_0j + K_x[i, 1] * P_xx_1j
-            block.P_xd[i, j] -= K_x[i, 0] * P_xd_0j + K_x[i, 1] * P_xd_1j
+            block.P_dd[i, j] -= drift_gain[i, 0] * P_xd_0j + drift_gain[i, 1] * P_xd_1j
+            block.P_xx[i, j] -= rate_gain[i, 0] * P_xx_0j + rate_gain[i, 1] * P_xx_1j
+            block.P_xd[i, j] -= rate_gain[i, 0] * P_xd_0j + rate_gain[i, 1] * P_xd_1j
 
 
 @kernel
@@ -294,9 +294,11 @@ def whiten(block, filter_state, acceleration, dt, out):
 @kernel
 def whiten_regressors(block, dt):
     """Whiten all regressors as `whiten` does; in a block of one axis all values of a second axis are zero."""
-    K_x, K_d, drift_decay_factor = block.K_x, block.K_d, block.drift_decay_factor
-    K_x00, K_x01, K_x10, K_x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
-    K_d00, K_d01, K_d10, K_d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
+    rate_gain, drift_gain, drift_decay_factor = block.K_x, block.K_d, block.drift_decay_factor
+    rate_gain_00, rate_gain_01 = rate_gain[0, 0], rate_gain[0, 1]
+    rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
+    drift_gain_00, drift_gain_01 = drift_gain[0, 0], drift_gain[0, 1]
+    drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
     regressor = block.regressor
     filter_state = block.regressor_filter_state
     response = block.regressor_response
@@ -304,13 +306,13 @@ def whiten_regressors(block, dt):
         response_0 = filter_state[j, 0] + dt * (regressor[j, 0] - filter_state[j, 2])
         response_1 = filter_state[j, 1] + dt * (regressor[j, 1] - filter_state[j, 3])
         response[j, 0], response[j, 1] = response_0, response_1
-        filter_state[j, 0] = response_0 - K_x00 * response_0 - K_x01 * response_1
-        filter_state[j, 1] = response_1 - K_x10 * response_0 - K_x11 * response_1
+        filter_state[j, 0] = response_0 - rate_gain_00 * response_0 - rate_gain_01 * response_1
+        filter_state[j, 1] = response_1 - rate_gain_10 * response_0 - rate_gain_11 * response_1
         filter_state[j, 2] = drift_decay_factor * filter_state[j, 2] + (
-            K_d00 * response_0 + K_d01 * response_1
+            drift_gain_00 * response_0 + drift_gain_01 * response_1
         )
         filter_state[j, 3] = drift_decay_factor * filter_state[j, 3] + (
-            K_d10 * response_0 + K_d11 * response_1
+            drift_gain_10 * response_0 + drift_gain_11 * response_1
         )
 
 
@@ -395,10 +397,10 @@ def reset_onset_slot(block, onset_slot):
         for k in range(onset_slot, n_onset_tests_in_group(block, group_index), N_ONSET_SLOTS):
             onset_tests.correlation[k] = onset_tests.information[k] = 0.0
             onset_tests.correlation_weight[0, k] = onset_tests.correlation_weight[1, k] = 0.0
-            onset_tests.correlation_bound_by_constant_uncertainty[
+            onset_tests.max_correlation_by_constant_uncertainty[
                 k
-            ] = onset_tests.correlation_bound_by_varying_uncertainty[k] = 0.0
-            onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = 0.0
+            ] = onset_tests.max_correlation_by_varying_uncertainty[k] = 0.0
+            onset_tests.max_correlation_by_rate_limited_uncertainty[k] = 0.0
             onset_tests.correlation_by_calm_air[k] = onset_tests.correlation_by_coarse_gust[k] = 0.0
             onset_tests.remaining_growth_share[k] = 1.0
             for i in range(4):
@@ -414,22 +416,28 @@ def fill_uncertainty_response(block, uncertainty_bound, dt):
 
     uncertainty_bound (3,) rad/s2: eta_bar.
     """
-    K_d, drift_share_lost_per_frame = block.K_d, 1.0 - block.drift_decay_factor
-    K_d_determinant = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if block.n_axes > 1 else K_d[0, 0]
+    drift_gain, drift_share_lost_per_frame = block.K_d, 1.0 - block.drift_decay_factor
+    drift_gain_determinant = (
+        drift_gain[0, 0] * drift_gain[1, 1] - drift_gain[0, 1] * drift_gain[1, 0]
+        if block.n_axes > 1
+        else drift_gain[0, 0]
+    )
     for i in range(block.n_axes):
         block.constant_uncertainty_response[i] = block.transient_uncertainty_response[i] = 0.0
         for j in range(block.n_axes):
-            K_d_cofactor = 1.0 if block.n_axes == 1 else (K_d[1 - i, 1 - i] if i == j else K_d[i, j])
+            drift_gain_cofactor = (
+                1.0 if block.n_axes == 1 else (drift_gain[1 - i, 1 - i] if i == j else drift_gain[i, j])
+            )
             block.transient_uncertainty_response[i] += (
                 TRANSIENT_RINGING_SUM_FACTOR
-                * abs(K_d_cofactor / K_d_determinant)
+                * abs(drift_gain_cofactor / drift_gain_determinant)
                 * uncertainty_bound[block.axes[j]]
             )
         if drift_share_lost_per_frame > 0.0:
             settled_response_per_uncertainty = (
                 dt
                 * drift_share_lost_per_frame
-                / (block.K_x[i, i] * drift_share_lost_per_frame + dt * K_d[i, i])
+                / (block.K_x[i, i] * drift_share_lost_per_frame + dt * drift_gain[i, i])
             )
             block.constant_uncertainty_response[i] = (
                 settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
@@ -443,23 +451,23 @@ def fill_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
     It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
     of the onset.
     """
-    signature_0, signature_1 = hypothesis.signature[0], hypothesis.signature[1]
+    frame_signature_0, frame_signature_1 = hypothesis.signature[0], hypothesis.signature[1]
     for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
         if hypothesis.kind == LOSS_END:
             if onset_tests.remaining_growth_share[k] > 0.0:
                 onset_tests.remaining_growth_share[k] = 0.0
-                onset_tests.signature_at_loss_end[0, k] = signature_0
-                onset_tests.signature_at_loss_end[1, k] = signature_1
+                onset_tests.signature_at_loss_end[0, k] = frame_signature_0
+                onset_tests.signature_at_loss_end[1, k] = frame_signature_1
             onset_tests.signature_for_onset[0, k] = onset_tests.signature_at_loss_end[0, k]
             onset_tests.signature_for_onset[1, k] = onset_tests.signature_at_loss_end[1, k]
         elif hypothesis.kind == GROWING_LOSS:
             onset_tests.remaining_growth_share[k] *= hypothesis.remaining_growth_decay_factor
             grown_share = 1.0 - onset_tests.remaining_growth_share[k]
-            onset_tests.signature_for_onset[0, k] = grown_share * signature_0
-            onset_tests.signature_for_onset[1, k] = grown_share * signature_1
+            onset_tests.signature_for_onset[0, k] = grown_share * frame_signature_0
+            onset_tests.signature_for_onset[1, k] = grown_share * frame_signature_1
         else:
-            onset_tests.signature_for_onset[0, k] = signature_0
-            onset_tests.signature_for_onset[1, k] = signature_1
+            onset_tests.signature_for_onset[0, k] = frame_signature_0
+            onset_tests.signature_for_onset[1, k] = frame_signature_1
 
 
 @kernel
@@ -469,9 +477,11 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
     evidence_decay_factor: factor by which earlier sums decay. In a block of one axis all values of a second
     axis are zero.
     """
-    K_x, K_d, S_inverse = block.K_x, block.K_d, block.S_inverse
-    K_x00, K_x01, K_x10, K_x11 = K_x[0, 0], K_x[0, 1], K_x[1, 0], K_x[1, 1]
-    K_d00, K_d01, K_d10, K_d11 = K_d[0, 0], K_d[0, 1], K_d[1, 0], K_d[1, 1]
+    rate_gain, drift_gain, S_inverse = block.K_x, block.K_d, block.S_inverse
+    rate_gain_00, rate_gain_01 = rate_gain[0, 0], rate_gain[0, 1]
+    rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
+    drift_gain_00, drift_gain_01 = drift_gain[0, 0], drift_gain[0, 1]
+    drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
     S_inv00, S_inv01, S_inv10, S_inv11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 0], S_inverse[1, 1]
     drift_decay_factor = block.drift_decay_factor
     whitened_innovation_0 = block.whitened_innovation[0]
@@ -494,16 +504,16 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
             signature_for_onset[1, k] - signature_filter_state[3, k]
         )
         signature_filter_state[0, k] = (
-            signature_response_0 - K_x00 * signature_response_0 - K_x01 * signature_response_1
+            signature_response_0 - rate_gain_00 * signature_response_0 - rate_gain_01 * signature_response_1
         )
         signature_filter_state[1, k] = (
-            signature_response_1 - K_x10 * signature_response_0 - K_x11 * signature_response_1
+            signature_response_1 - rate_gain_10 * signature_response_0 - rate_gain_11 * signature_response_1
         )
         signature_filter_state[2, k] = drift_decay_factor * signature_filter_state[2, k] + (
-            K_d00 * signature_response_0 + K_d01 * signature_response_1
+            drift_gain_00 * signature_response_0 + drift_gain_01 * signature_response_1
         )
         signature_filter_state[3, k] = drift_decay_factor * signature_filter_state[3, k] + (
-            K_d10 * signature_response_0 + K_d11 * signature_response_1
+            drift_gain_10 * signature_response_0 + drift_gain_11 * signature_response_1
         )
         weight_0 = S_inv00 * signature_response_0 + S_inv01 * signature_response_1
         weight_1 = S_inv10 * signature_response_0 + S_inv11 * signature_response_1
@@ -522,16 +532,16 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
             weight_0 - correlation_weight[0, k]
         ) + transient_response_1 * abs(weight_1 - correlation_weight[1, k])
         constant_bound_increment = constant_response_0 * abs(weight_0) + constant_response_1 * abs(weight_1)
-        onset_tests.correlation_bound_by_constant_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.correlation_bound_by_constant_uncertainty[k]
+        onset_tests.max_correlation_by_constant_uncertainty[k] = (
+            evidence_decay_factor * onset_tests.max_correlation_by_constant_uncertainty[k]
             + constant_bound_increment
         )
-        onset_tests.correlation_bound_by_varying_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.correlation_bound_by_varying_uncertainty[k]
+        onset_tests.max_correlation_by_varying_uncertainty[k] = (
+            evidence_decay_factor * onset_tests.max_correlation_by_varying_uncertainty[k]
             + varying_bound_increment
         )
-        onset_tests.correlation_bound_by_rate_limited_uncertainty[k] = (
-            evidence_decay_factor * onset_tests.correlation_bound_by_rate_limited_uncertainty[k]
+        onset_tests.max_correlation_by_rate_limited_uncertainty[k] = (
+            evidence_decay_factor * onset_tests.max_correlation_by_rate_limited_uncertainty[k]
             + uncertainty_change_over_bound_per_frame
             * (transient_response_0 * abs(weight_0) + transient_response_1 * abs(weight_1))
         )
@@ -543,17 +553,17 @@ def accumulate_regressor_correlation(
     block, onset_tests, regressor_correlation, n_tests, evidence_decay_factor
 ):
     """Add the frame to R_j of n onset tests, `regressor_correlation` (regressors, tests), and fill their
-    `correlation_bound_by_coefficient_errors`.
+    `max_correlation_by_coefficient_errors`.
 
     Regressors go in pairs: weight and bound then pass through memory half as often. LLVM makes vector
     instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
     did not, and the detector took a fifth longer (`make cost` shows it).
     """
     correlation_weight = onset_tests.correlation_weight
-    correlation_bound_by_coefficient_errors = onset_tests.correlation_bound_by_coefficient_errors
+    max_correlation_by_coefficient_errors = onset_tests.max_correlation_by_coefficient_errors
     regressor_response, regressor_tolerance = block.regressor_response, block.regressor_tolerance
     n_regressors = block.n_regressors
-    correlation_bound_by_coefficient_errors[:n_tests] = 0.0
+    max_correlation_by_coefficient_errors[:n_tests] = 0.0
     for j in range(0, n_regressors - 1, 2):
         response_a0 = regressor_response[j, 0]
         response_a1 = regressor_response[j, 1]
@@ -570,8 +580,8 @@ def accumulate_regressor_correlation(
                 weight_0 * response_b0 + weight_1 * response_b1
             )
             correlations_a[k], correlations_b[k] = R_a, R_b
-            correlation_bound_by_coefficient_errors[k] = (
-                correlation_bound_by_coefficient_errors[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
+            max_correlation_by_coefficient_errors[k] = (
+                max_correlation_by_coefficient_errors[k] + tolerance_a * abs(R_a) + tolerance_b * abs(R_b)
             )
     for j in range(n_regressors - n_regressors % 2, n_regressors):
         response_0, response_1 = regressor_response[j, 0], regressor_response[j, 1]
@@ -579,7 +589,7 @@ def accumulate_regressor_correlation(
             regressor_correlation[j, k] = evidence_decay_factor * regressor_correlation[j, k] + (
                 correlation_weight[0, k] * response_0 + correlation_weight[1, k] * response_1
             )
-            correlation_bound_by_coefficient_errors[k] += regressor_tolerance[j] * abs(
+            max_correlation_by_coefficient_errors[k] += regressor_tolerance[j] * abs(
                 regressor_correlation[j, k]
             )
 
@@ -623,7 +633,7 @@ def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
 
 
 @kernel
-def correlation_bound_by_uncertainty(onset_tests, k, transient_response_0, transient_response_1):
+def max_correlation_by_uncertainty(onset_tests, k, transient_response_0, transient_response_1):
     """The largest share of |N| in test k that a bounded uncertainty explains.
 
     transient_response_0, _1: the two entries of the block's `transient_uncertainty_response`.
@@ -631,9 +641,9 @@ def correlation_bound_by_uncertainty(onset_tests, k, transient_response_0, trans
     bound_by_last_weight_change = transient_response_0 * abs(
         onset_tests.correlation_weight[0, k]
     ) + transient_response_1 * abs(onset_tests.correlation_weight[1, k])
-    return onset_tests.correlation_bound_by_constant_uncertainty[k] + min(
-        onset_tests.correlation_bound_by_varying_uncertainty[k] + bound_by_last_weight_change,
-        onset_tests.correlation_bound_by_rate_limited_uncertainty[k],
+    return onset_tests.max_correlation_by_constant_uncertainty[k] + min(
+        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_by_last_weight_change,
+        onset_tests.max_correlation_by_rate_limited_uncertainty[k],
     )
 
 
@@ -644,34 +654,34 @@ def is_one_sided(kind):
 
 
 @kernel
-def max_log_likelihood_ratio(is_loss, evidence, information):
+def max_log_likelihood_ratio(is_loss_or_its_end, evidence, information):
     """Largest log-likelihood ratio of a fault against none, for evidence N and information D.
 
     It is N^2 / 2 D; for a loss, whose |theta| is at most 1, it is N - D / 2 if N > D.
     """
     llr = 0.5 * evidence * evidence / information
-    if is_loss and evidence > information:
+    if is_loss_or_its_end and evidence > information:
         llr = evidence - 0.5 * information
     return llr if evidence > 0.0 else 0.0  # not earlier: each way out would be a division of its own
 
 
 @kernel
 def normalised_evidence(
-    alarm_level, noise_share_of_alarm_level, evidence, evidence_bound_by_uncertainty, information
+    alarm_level, noise_share_of_alarm_level, evidence, max_evidence_by_uncertainty, information
 ):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
-    evidence_bound_by_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
+    max_evidence_by_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
     of the alarm; noise_share_of_alarm_level: share of the level that is reserved for noise in addition. The
     result is compared with the level.
     """
     evidence_std = sqrt(information)
     return evidence / (
         evidence_std
-        if evidence_bound_by_uncertainty <= 0.0
+        if max_evidence_by_uncertainty <= 0.0
         else max(
             evidence_std,
-            evidence_bound_by_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
+            max_evidence_by_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
         )
     )
 
@@ -693,32 +703,32 @@ def evaluate_onset_tests(block, onset_tests, n_tests, loss_bounds_ignore_uncerta
     uncertainty_weight_of_losses = 0.0 if loss_bounds_ignore_uncertainty else 1.0
     for k in range(n_tests):
         N, D = onset_tests.correlation[k], onset_tests.information[k]
-        evidence_explained_by_errors = onset_tests.correlation_bound_by_coefficient_errors[k] + max(
+        evidence_by_errors_and_air = onset_tests.max_correlation_by_coefficient_errors[k] + max(
             supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
         )
-        evidence_explained_by_errors += max(
+        evidence_by_errors_and_air += max(
             supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0
         )
-        is_loss, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
-        evidence = supporting_correlation_sign[k] * N if is_loss else abs(N)
-        evidence_bound_by_uncertainty = correlation_bound_by_uncertainty(
+        is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
+        evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
+        max_evidence_by_uncertainty = max_correlation_by_uncertainty(
             onset_tests, k, transient_response_0, transient_response_1
         )
-        evidence_error_bound = evidence_explained_by_errors + (
-            evidence_bound_by_uncertainty
-            if has_error_map and not is_loss
-            else uncertainty_weight_of_losses * evidence_bound_by_uncertainty
+        evidence_error_bound = evidence_by_errors_and_air + (
+            max_evidence_by_uncertainty
+            if has_error_map and not is_loss_or_its_end
+            else uncertainty_weight_of_losses * max_evidence_by_uncertainty
         )
         score = normalised_evidence(
             alarm_level,
             noise_share_of_alarm_level,
-            evidence - evidence_explained_by_errors,
-            evidence_bound_by_uncertainty,
+            evidence - evidence_by_errors_and_air,
+            max_evidence_by_uncertainty,
             D,
         )
-        llr = max_log_likelihood_ratio(is_loss, evidence, D)
-        llr_lower_bound = max_log_likelihood_ratio(is_loss, evidence - evidence_error_bound, D)
-        llr_upper_bound = max_log_likelihood_ratio(is_loss, evidence + evidence_error_bound, D)
+        llr = max_log_likelihood_ratio(is_loss_or_its_end, evidence, D)
+        llr_lower_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence - evidence_error_bound, D)
+        llr_upper_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence + evidence_error_bound, D)
         onset_tests.score[k] = score if has_information else 0.0
         onset_tests.llr_lower_bound[k] = llr_lower_bound if has_information else 0.0
         onset_tests.llr_upper_bound[k] = llr_upper_bound if has_information else 0.0

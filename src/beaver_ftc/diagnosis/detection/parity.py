@@ -125,8 +125,8 @@ def tone_tests_dtype(n_regressors: int) -> np.dtype:
         correlation=(2, N_TONE_FREQUENCIES), regressor_correlation=(n_regressors, 2, N_TONE_FREQUENCIES),
         # shares of |N| that errors of coefficients and a bounded uncertainty explain; for the latter, two
         # sums over the filtered bound: of the bound, and of its component at twice the frequency
-        correlation_bound_by_coefficient_errors=N_TONE_FREQUENCIES,
-        correlation_bound_by_uncertainty=N_TONE_FREQUENCIES,
+        max_correlation_by_coefficient_errors=N_TONE_FREQUENCIES,
+        max_correlation_by_uncertainty=N_TONE_FREQUENCIES,
         filtered_bound_sum=N_TONE_FREQUENCIES,
         filtered_bound_double_frequency_sum=(2, N_TONE_FREQUENCIES),
         correlation_variance=float,  # variance of N without a fault
@@ -172,10 +172,10 @@ def update_tone_tests(view, tone_config, alarm_level, inside_envelope, has_regre
         * tone_tests.correlation_variance
         + tone_tests.frames_since_update
     )
-    update_correlation_bound_by_uncertainty(
+    update_max_correlation_by_uncertainty(
         tone_tests, tone_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
     )
-    fill_correlation_bound_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
+    fill_max_correlation_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
     fill_tone_score(tone_tests, tone_config, alarm_level)
     tone_tests.normalised_innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
@@ -199,7 +199,7 @@ def advance_resonators(tone_config, resonator_state, input_sum):
 
 
 @kernel
-def tone_whitening_gain(K_x, K_d, drift_decay_factor, cos_phase_change, sin_phase_change, dt):
+def tone_whitening_gain(rate_gain, drift_gain, drift_decay_factor, cos_phase_change, sin_phase_change, dt):
     """Amplitude, rad/s, of the whitened response to a tone of amplitude 1 rad/s2, at constant filter gains.
 
     cos_phase_change, sin_phase_change: of the change of the tone's phase per frame, of dt s.
@@ -209,30 +209,30 @@ def tone_whitening_gain(K_x, K_d, drift_decay_factor, cos_phase_change, sin_phas
     ) + sin_phase_change * sin_phase_change
     denominator_real = (
         1.0
-        - (1.0 - K_x) * cos_phase_change
-        + dt * K_d * (cos_phase_change - drift_decay_factor) / squared_distance_to_drift_pole
+        - (1.0 - rate_gain) * cos_phase_change
+        + dt * drift_gain * (cos_phase_change - drift_decay_factor) / squared_distance_to_drift_pole
     )
-    denominator_imaginary = sin_phase_change * (1.0 - K_x) - (
-        dt * K_d * sin_phase_change / squared_distance_to_drift_pole
+    denominator_imaginary = sin_phase_change * (1.0 - rate_gain) - (
+        dt * drift_gain * sin_phase_change / squared_distance_to_drift_pole
     )
     return dt / np.sqrt(denominator_real * denominator_real + denominator_imaginary * denominator_imaginary)
 
 
 @kernel
-def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, uncertainty_bound, dt):
-    """Update `correlation_bound_by_uncertainty`: the most that an uncertainty |d| <= uncertainty_bound,
-    over the standard deviation of g, adds to |N|.
+def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normalised_uncertainty_bound, dt):
+    """Update `max_correlation_by_uncertainty`: the most that a bounded uncertainty adds to |N|.
 
+    normalised_uncertainty_bound: eta_bar, the bound on |d|, over the standard deviation of g.
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most. Its higher harmonics add less: together no more than a third of that again.
     """
     decayed_double_rotation = tone_config.decayed_double_rotation_per_update
     sum_decay_factor = tone_config.sum_decay_factor_per_update
-    uncertainty_bound_sum = uncertainty_bound * tone_tests.frames_since_update
-    for frequency_index in range(tone_tests.correlation_bound_by_uncertainty.size):
+    normalised_uncertainty_bound_sum = normalised_uncertainty_bound * tone_tests.frames_since_update
+    for frequency_index in range(tone_tests.max_correlation_by_uncertainty.size):
         cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
         sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
-        filtered_bound_since_update = uncertainty_bound_sum * tone_whitening_gain(
+        filtered_bound_since_update = normalised_uncertainty_bound_sum * tone_whitening_gain(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
         double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
@@ -249,7 +249,7 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
         tone_tests.filtered_bound_sum[frequency_index] = (
             sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound_since_update
         )
-        tone_tests.correlation_bound_by_uncertainty[frequency_index] = (
+        tone_tests.max_correlation_by_uncertainty[frequency_index] = (
             tone_config.max_tone_mean_of_unit_uncertainty[frequency_index]
             * (
                 tone_tests.filtered_bound_sum[frequency_index]
@@ -262,20 +262,20 @@ def update_correlation_bound_by_uncertainty(tone_tests, tone_config, block, unce
 
 
 @kernel
-def fill_correlation_bound_by_coefficient_errors(tone_tests, regressor_tolerance, n_regressors):
-    """Fill `correlation_bound_by_coefficient_errors`: the most that the declared errors of the first n
+def fill_max_correlation_by_coefficient_errors(tone_tests, regressor_tolerance, n_regressors):
+    """Fill `max_correlation_by_coefficient_errors`: the most that the declared errors of the first n
     coefficients add to |N|.
 
     The magnitude of R_j is at most its larger part plus (sqrt 2 - 1) times its smaller part.
     """
-    tone_tests.correlation_bound_by_coefficient_errors[:] = 0.0
+    tone_tests.max_correlation_by_coefficient_errors[:] = 0.0
     for j in range(n_regressors):
         regressor_correlation = tone_tests.regressor_correlation[j]
         coefficient_tolerance = regressor_tolerance[j]
-        for frequency_index in range(tone_tests.correlation_bound_by_coefficient_errors.size):
+        for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
             real_magnitude = abs(regressor_correlation[0, frequency_index])
             imaginary_magnitude = abs(regressor_correlation[1, frequency_index])
-            tone_tests.correlation_bound_by_coefficient_errors[frequency_index] += coefficient_tolerance * (
+            tone_tests.max_correlation_by_coefficient_errors[frequency_index] += coefficient_tolerance * (
                 max(real_magnitude, imaginary_magnitude)
                 + 0.41421356237309515 * min(real_magnitude, imaginary_magnitude)
             )
@@ -285,10 +285,10 @@ def fill_correlation_bound_by_coefficient_errors(tone_tests, regressor_tolerance
 def fill_tone_score(tone_tests, tone_config, alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
-    for frequency_index in range(tone_tests.correlation_bound_by_coefficient_errors.size):
+    for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
         evidence = (
             np.hypot(tone_tests.correlation[0, frequency_index], tone_tests.correlation[1, frequency_index])
-            - tone_tests.correlation_bound_by_coefficient_errors[frequency_index]
+            - tone_tests.max_correlation_by_coefficient_errors[frequency_index]
         )
         larger_part_variance = (
             tone_config.larger_complex_part_variance_share[frequency_index] * tone_tests.correlation_variance
@@ -299,7 +299,7 @@ def fill_tone_score(tone_tests, tone_config, alarm_level):
                 tone_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
-                tone_tests.correlation_bound_by_uncertainty[frequency_index],
+                tone_tests.max_correlation_by_uncertainty[frequency_index],
                 larger_part_variance,
             ),
         )
@@ -868,7 +868,7 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
         )
     if not with_forces:
         return
-    for force_index, plane_axes, moving_surface_indices in (
+    for force_index, plane_axes, plane_moving_surface_indices in (
         (NORMAL_COMPONENT, PITCH_PLANE, pitch_surface_indices),
         (SIDE_COMPONENT, YAW_PLANE, lateral_surface_indices),
     ):
@@ -881,19 +881,19 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
                 column_components,
                 [
                     other_surface_index
-                    for other_surface_index in moving_surface_indices
+                    for other_surface_index in plane_moving_surface_indices
                     if other_surface_index != s
                 ],
             )
         if separated_surface_indices:
             yield ParityDirection(
-                VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, moving_surface_indices
+                VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, plane_moving_surface_indices
             )
             yield ParityDirection(
                 AXIS_VIEW,
                 _sum_of_unit_vectors(plane_axes[1:]),
                 plane_axes,
-                moving_surface_indices,
+                plane_moving_surface_indices,
                 uses_inertial_flow_angle=True,
             )
 
@@ -924,8 +924,8 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     max_tested_losses_per_view = max(
         len(parity_direction.surfaces_tested_for_loss) for parity_direction in parity_directions
     )
-    error_map = aircraft.file.model_error_map
-    n_boxes = len(error_map.boxes) if error_map else 0
+    model_error_map = aircraft.file.model_error_map
+    n_boxes = len(model_error_map.boxes) if model_error_map else 0
     return StatisticalRecordSize(
         BlockCapacity(max_rate_regressors, 3 * max_losses_per_rate_block + 2),
         BlockCapacity(max_rate_regressors + max_force_regressors + 2, max_tested_losses_per_view + 1),

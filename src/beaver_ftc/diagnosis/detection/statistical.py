@@ -72,7 +72,7 @@ from beaver_ftc.diagnosis.detection.parity import (
 )
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
-    MIN_UNMEASURED_INTENSITY_SHARES,
+    MIN_UNMEASURED_GUST_ROTATION_SHARES,
     UNMEASURED_SHARE_BY_FORCE_ERROR,
     add_gust_estimate_noise,
     configure_gust_estimate,
@@ -263,7 +263,7 @@ def configure_statistical_detector(
                 "uses_accelerometers"
             ]
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
-                np.add(MIN_UNMEASURED_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
+                np.add(MIN_UNMEASURED_GUST_ROTATION_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
             )
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
@@ -299,12 +299,12 @@ def configure_statistical_detector(
 
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
-    blocks = axes_and_hypotheses_by_block(aircraft)
+    axes_and_hypotheses = axes_and_hypotheses_by_block(aircraft)
     loss_surface_indices = [
         aircraft.surfaces.index(surface_name) for surface_name in aircraft.class_of_losses
     ]
     statistical["test_config"]["n_score_columns"] = len(loss_surface_indices) + len(AXES)
-    for block, (axes, hypothesis_entries) in zip(statistical["block"], blocks, strict=True):
+    for block, (axes, hypothesis_entries) in zip(statistical["block"], axes_and_hypotheses, strict=True):
         block["n_axes"], block["n_hypotheses"] = len(axes), len(hypothesis_entries)
         block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
         block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
@@ -342,7 +342,7 @@ def drift_uncertainty_frequency_rad_s(statistical_settings: Statistical, aircraf
     """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
 
     The evidence that the uncertainty explains is bounded by its declared rate of change in any case
-    (`likelihood.correlation_bound_by_uncertainty`). The drift only sets how much of it the filters remove. If
+    (`likelihood.max_correlation_by_uncertainty`). The drift only sets how much of it the filters remove. If
     damage may take surfaces, a weaker drift detects most: motion that no loss explains is then rarely an
     error of the model.
     """
@@ -528,10 +528,14 @@ def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_c
         out[i] = whole_sum(moment_table, i, monomial_change_per_reading, u)
         if reading_index == QDYN:
             out[i] += whole_sum(moment_table, i, moment_table.power, u) / y[QDYN]
-    L = dynamic_force * design.b * out[0]
-    M = dynamic_force * design.c * out[1]
-    N = dynamic_force * design.b * out[2]
-    out[0], out[1], out[2] = design.Pl * L + design.Pn * N, design.Qm * M, design.Rl * L + design.Rn * N
+    rolling_moment_per_reading = dynamic_force * design.b * out[0]
+    pitching_moment_per_reading = dynamic_force * design.c * out[1]
+    yawing_moment_per_reading = dynamic_force * design.b * out[2]
+    out[0], out[1], out[2] = (
+        design.Pl * rolling_moment_per_reading + design.Pn * yawing_moment_per_reading,
+        design.Qm * pitching_moment_per_reading,
+        design.Rl * rolling_moment_per_reading + design.Rn * yawing_moment_per_reading,
+    )
 
 
 @kernel
@@ -945,16 +949,16 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
 
 
 @kernel
-def update_uncertainty_change(noise_model, blocks, error_map, u):
+def update_uncertainty_change(noise_model, blocks, model_error_map, u):
     """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
     surfaces."""
     max_travel_share_moved = 0.0
     for s in range(u.size):
-        travel_width_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
+        travel_width_rad = max(model_error_map.travel_high[s] - model_error_map.travel_low[s], MIN_TRAVEL_RAD)
         max_travel_share_moved = max(
-            max_travel_share_moved, abs(u[s] - error_map.surface_positions_before[s]) / travel_width_rad
+            max_travel_share_moved, abs(u[s] - model_error_map.surface_positions_before[s]) / travel_width_rad
         )
-        error_map.surface_positions_before[s] = u[s]
+        model_error_map.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
             noise_model.base_uncertainty_change_over_bound

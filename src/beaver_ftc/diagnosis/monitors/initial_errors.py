@@ -145,15 +145,15 @@ def set_error_bounds_at_start(initial_errors, readings):
     error_bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
     error_bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
     V = max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
-    standard_airspeed = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
+    airspeed_in_standard_atmosphere = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
         2.0 * max(readings[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(readings[ALTITUDE])
     )
     (
         max_reading_over_truth,
         min_reading_over_truth,
     ) = (  # of reading and truth, in the thickest and in the thinnest air
-        V / standard_airspeed * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
-        V / standard_airspeed * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
+        V / airspeed_in_standard_atmosphere * np.sqrt(1.0 + MAX_DENSITY_DEVIATION_SHARE),
+        V / airspeed_in_standard_atmosphere * np.sqrt(1.0 - MAX_DENSITY_DEVIATION_SHARE),
     )
     error_bound_at_start[AIRSPEED_HYPOTHESIS] = min(
         max(max_reading_over_truth - 1.0, 1.0 - min_reading_over_truth), MAX_AIRSPEED_READING_RATIO - 1.0
@@ -279,8 +279,8 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
     sideslip_magnitude = abs(reading[BETA])
     max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
-    secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
-    max_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
+    beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
+    max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
     a_normal = a[2] * cos_alpha - a[0] * sin_alpha
     a_side = a[1] * cos_beta - (a[0] * cos_alpha + a[2] * sin_alpha) * sin_beta
@@ -288,42 +288,46 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
         memory.acceleration_magnitude,
         np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2),
     )
-    # rad/s: rates about the flow's projection on the plane of symmetry, and across it
-    flow_roll_rate, flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
-    step_s = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
+    # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
+    flow_roll_rate, negative_flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
+    widened_step_s = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
     roll_yaw_rate = np.hypot(p, r)
     predicted_climb_m = memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    largest[ALPHA_HYPOTHESIS, SPEED_TEST] = largest[BETA_HYPOTHESIS, SPEED_TEST] = step_s * a_max
+    largest[ALPHA_HYPOTHESIS, SPEED_TEST] = largest[BETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * a_max
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    largest[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = step_s * secant * (a_max / V + roll_yaw_rate * abs(sin_beta))
+    largest[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+        widened_step_s * beta_secant * (a_max / V + roll_yaw_rate * abs(sin_beta))
+    )
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    largest[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * (roll_yaw_rate + a_max * abs(sin_beta) / V)
+    largest[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (roll_yaw_rate + a_max * abs(sin_beta) / V)
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
     largest[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
-        step_s * secant * max_secant * (abs(flow_roll_rate) + a_max / V)
+        widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + a_max / V)
     )
     # beta' with beta off: a turned by beta
-    largest[BETA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * a_max / V
+    largest[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * a_max / V
     # alpha', beta' with V off: a / truth = (1 + x) a / reading
     largest[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
-        step_s * secant * a_max / V
+        widened_step_s * beta_secant * a_max / V
     )
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
     # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    largest[PHI_HYPOTHESIS, SPEED_TEST] = step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    largest[PHI_HYPOTHESIS, SPEED_TEST] = (
+        widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    )
     largest[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
-        step_s * g * cos_theta * secant / V
+        widened_step_s * g * cos_theta * beta_secant / V
     )
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
     # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    largest[THETA_HYPOTHESIS, SPEED_TEST] = step_s * g
-    largest[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = step_s * secant * g / V
-    largest[THETA_HYPOTHESIS, BETA_FLOW_TEST] = step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    largest[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
+    largest[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
+    largest[THETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
     # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
     # (sin(theta), -cos(phi) cos(theta))
-    vertical_projection_length = np.hypot(sin_theta, cos_phi * cos_theta)
-    largest[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_projection_length
+    vertical_length_in_symmetry_plane = np.hypot(sin_theta, cos_phi * cos_theta)
+    largest[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_length_in_symmetry_plane
     # with beta off: (cos(beta), -sin(beta)) turned, times V
     largest[BETA_HYPOTHESIS, CLIMB_TEST] = (
         h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
@@ -353,25 +357,26 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
             )
         )
     )
-    # alpha: altitude' = V cos(beta) vertical_projection_length sin(gamma - alpha) + ..., where tan(gamma) =
-    # tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma - alpha)
-    max_mean_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
+    # alpha: altitude' = V cos(beta) vertical_length_in_symmetry_plane sin(gamma - alpha) + ..., where
+    # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
+    # alpha)
+    max_mean_path_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
     coupling[ALPHA_CLIMB_COUPLING_INDEX] = (
-        h * V * cos_beta * vertical_projection_length * np.cos(min(max_mean_angle, 0.5 * np.pi))
+        h * V * cos_beta * vertical_length_in_symmetry_plane * np.cos(min(max_mean_path_angle, 0.5 * np.pi))
     )
-    # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + flow_yaw_rate sin(e / 2)). beta off by
-    # e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of either
-    # sign, is an uncertainty of both
+    # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + negative_flow_yaw_rate sin(e / 2)). beta
+    # off by e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of
+    # either sign, is an uncertainty of both
     coupling[VANE_ROLL_RATE_COUPLING_INDEX] = h * flow_roll_rate
-    coupling[VANE_YAW_RATE_COUPLING_INDEX] = h * flow_yaw_rate
+    coupling[VANE_YAW_RATE_COUPLING_INDEX] = h * negative_flow_yaw_rate
     coupling[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * a_max / V
     coupling[BETA_FORCE_UNCERTAINTY_INDEX] = (
-        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * secant * max_secant * abs(a_normal) / V
+        h * np.sin(min(max_sideslip, 0.5 * np.pi)) * beta_secant * max_beta_secant * abs(a_normal) / V
     )
     # V: a across the flow, over the airspeed
-    coupling[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * a_normal * secant / V
+    coupling[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * a_normal * beta_secant / V
     coupling[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * a_side / V
 
 
@@ -498,10 +503,10 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
     filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
-    max_half_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
+    max_half_alpha_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
-        np.cos(max_half_error) * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
-        - np.sin(max_half_error) * abs(filtered_coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX])
+        np.cos(max_half_alpha_error) * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
+        - np.sin(max_half_alpha_error) * abs(filtered_coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX])
         - filtered_coupling_effect_per_unit[ALPHA_FORCE_UNCERTAINTY_INDEX]
     )
     tighten_error_bound(
@@ -556,7 +561,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         ),
         abs(filtered_coupling_effect_per_unit[AIRSPEED_SIDE_FORCE_COUPLING_INDEX]),
     )
-    max_change_effect = (
+    max_error_change_effect_on_density = (
         2.0
         * max_reading_over_truth
         * max_effect_of_any_error(redundancy, SPEED_TEST, pole_index)
@@ -566,7 +571,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         initial_errors,
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
-        + max_change_effect,
+        + max_error_change_effect_on_density,
         abs(filtered_coupling_effect_per_unit[AIRSPEED_DENSITY_COUPLING_INDEX]),
     )
 
@@ -588,17 +593,20 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis_inde
     """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
     pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
     test = redundancy.test[test_index]
-    error_bound = (
+    error_bound_with_change = (
         initial_errors.error_bound[hypothesis_index] + initial_errors.error_change_bound[hypothesis_index]
     )
     if test_index >= RPM_TEST:
         return test.residual_bound_ratio > 1.0
     bound_factor = 1.0 + (
-        error_bound if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST else 0.0
+        error_bound_with_change
+        if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST
+        else 0.0
     )
     for m in range(redundancy.config.filter_decay.size):
         max_error_effect = (
-            error_bound * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
+            error_bound_with_change
+            * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
         )
         if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + max_error_effect:
             return True

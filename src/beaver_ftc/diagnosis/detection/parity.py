@@ -145,7 +145,7 @@ def is_within_envelope(tone_config, y):
 
 
 @kernel
-def update_tone_tests(view, tone_config, alarm_level, inside_envelope, has_regressors, dt):
+def update_tone_tests(view, tone_config, detector_alarm_level, inside_envelope, has_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
     has_regressors: whether the regressors of the block count. Without `inside_envelope` the frame counts as
@@ -176,7 +176,7 @@ def update_tone_tests(view, tone_config, alarm_level, inside_envelope, has_regre
         tone_tests, tone_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
     )
     fill_max_correlation_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
-    fill_tone_score(tone_tests, tone_config, alarm_level)
+    fill_tone_score(tone_tests, tone_config, detector_alarm_level)
     tone_tests.normalised_innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
 
@@ -282,7 +282,7 @@ def fill_max_correlation_by_coefficient_errors(tone_tests, regressor_tolerance, 
 
 
 @kernel
-def fill_tone_score(tone_tests, tone_config, alarm_level):
+def fill_tone_score(tone_tests, tone_config, detector_alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
     for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
@@ -303,7 +303,7 @@ def fill_tone_score(tone_tests, tone_config, alarm_level):
                 larger_part_variance,
             ),
         )
-    tone_tests.score = max_score * alarm_level / tone_config.alarm_level
+    tone_tests.score = max_score * detector_alarm_level / tone_config.alarm_level
 
 
 def derive_max_tone_mean_of_uncertainty(

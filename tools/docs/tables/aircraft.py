@@ -94,8 +94,8 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
 def _read_beside(rate: str, _: str, losses: str, page: str, ours: str, ratio: str, *ends: str) -> str:
     return (
         f"The last row of Table 3 reads: at {rate} false alarms an hour, Page's test finds {page} % of "
-        f"the {losses} losses, and ours finds {ours} %. Ours finds {ratio} % of the number that Page's "
-        f"test finds (95 % interval: {ends[0]} to {ends[1]} %)."
+        f"the {losses} losses, and our diagnosis finds {ours} %. Our diagnosis finds {ratio} % of the number "
+        f"that Page's test finds (95 % interval: {ends[0]} to {ends[1]} %)."
     )
 
 

@@ -25,7 +25,9 @@ from tools.gtm.specification import DATABASE
 PICTURE = "images/gtm-envelope.png"
 LAWS = ("fault-tolerant", "oracle", "nominal")
 FLIGHTS, CALM = 600, 120
-OURS_AND_PAGE = "The flights of Table 2, beside Page's test. Columns as explained above; numbers of flights."
+OURS_AND_PAGE = (
+    "Our diagnosis and Page's test in the flights of Table 2. Columns as explained above; numbers of flights."
+)
 CALM_AIR = "Detection with exact sensors in calm air. Columns as in Tables 2 and 3; numbers of flights."
 SWEEP = Path(__file__).parents[3] / "examples" / "gtm" / "damaged-turns.yaml"
 FLOWN_KT = (80, 95, 110)

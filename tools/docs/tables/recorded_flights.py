@@ -31,8 +31,8 @@ OWN = {  # column of benchmarks/own_logs.py: head on the page
 SHOWN = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 DELAYS = (
     '*Table 2. Delays on the failures of ALFA. "found": failures found, of all failures of this surface. '
-    '"delay": mean time from failure to alarm of the failures found, s. "within 5 s": aileron and rudder '
-    "failures found within 5 s, of all of them. Empty: not published.*"
+    '"delay": mean time from failure to alarm, for the failures found, s. "within 5 s": failures found '
+    "within 5 s, of all aileron and rudder failures. Empty: not published.*"
 )
 
 

@@ -101,7 +101,7 @@ def robustness_power_probe() -> str:
 AIRS = {"none": "still", "light": "light"}
 SURFACES = ("aileron", "rudder", "elevator")
 SOON = {"1": "*Table 2. Share of the faults that are found within 1 s, %; rows as explained above.*",
-        "5": "*Table 3. The same within 5 s, %.*"}  # fmt: skip
+        "5": "*Table 3. Share of the faults that are found within 5 s, %.*"}  # fmt: skip
 
 
 def _power_of(document: Document) -> str:
@@ -139,9 +139,10 @@ def _duels(comparison: list[Document]) -> str:
     better, worse = (verdicts.count(verdict) for verdict in ("better", "worse"))
     rest = len(verdicts) - better - worse
     return (
-        "*Both* was compared with each rival, on each surface and in each air, by the faults found within "
-        f"1 s. Of these {len(verdicts)} comparisons *both* finds more in {better} and fewer in {worse}. In "
-        f"the other {rest} the difference is not significant."
+        "The scheme *both* was compared with each rival, for each surface and each kind of air. The "
+        f"comparison counts the faults found within 1 s. In {better} of these {len(verdicts)} comparisons "
+        f"*both* finds significantly more faults, and in {worse} significantly fewer. In the other {rest} "
+        "the difference is not significant."
     )
 
 

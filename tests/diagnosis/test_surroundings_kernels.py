@@ -69,7 +69,7 @@ def test_a_gust_is_what_forces_and_gravity_do_not_explain(seed):
         level.apply(record["memory"]["specific_force"]) + np.array([0.0, 0.0, 9.8])
     )
     expected = Rotation.from_euler("z", then[2] - now[2]).apply(expected)
-    gusts.update_gust_rotation(record, y_now, now, dt)
+    gusts.update_gust_rotation_rates(record, y_now, now, dt)
     change = expected - through_air(y_now, now)
     tau_q, tau_r = 4.0 * SPAN / (np.pi * 47.0), 3.0 * SPAN / (np.pi * 47.0)
     pitching = 0.02 * np.exp(-dt / tau_q) + change[2] / (47.0 * tau_q)
@@ -144,7 +144,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
             gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
-        gusts.fill_frame_mean_gust(record, 1.0)
+        gusts.fill_frame_mean_gust_acceleration(record, 1.0)
         assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
@@ -509,7 +509,7 @@ def test_the_estimate_is_that_of_whoever_counts():
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(gust_angular_acceleration_sum=(0.4, -0.8, 1.2))
-    gusts.fill_frame_mean_gust(record, share)
+    gusts.fill_frame_mean_gust_acceleration(record, share)
     assert record["output"]["mean_gust_acceleration"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
 
 

@@ -270,7 +270,7 @@ def unmeasured_yawing_share_by_heading_rate(gust, V, heading_rate):
 
 
 @kernel
-def update_gust_rotation(gust, y, attitude, dt):
+def update_gust_rotation_rates(gust, y, attitude, dt):
     """Update `air_rotation_in_level_axes` (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
     y (5,) and attitude (3,) rad as measured now; `specific_force` and attitude in memory are those dt s ago.
@@ -409,9 +409,9 @@ def set_gust_rotation_intensity(gust, measured_altitude_m):
 
 @kernel
 def update_gust_estimate(gust, y, attitude, dt, frame_index):
-    """Start at frame 0, and update the gust at later frames; arguments as in `update_gust_rotation`."""
+    """Start at frame 0, and update the gust at later frames; arguments as in `update_gust_rotation_rates`."""
     if frame_index > 0:
-        update_gust_rotation(gust, y, attitude, dt)
+        update_gust_rotation_rates(gust, y, attitude, dt)
     else:
         start_gust_estimate(gust, y, attitude)
 
@@ -464,7 +464,7 @@ def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
 
     Arguments as in `fill_gust_effect`; attitude (3,) rad.
     """
-    update_gust_rotation(gust, y, attitude, dt)
+    update_gust_rotation_rates(gust, y, attitude, dt)
     fill_gust_effect(gust, design, x, y, u)
     for i in range(3):
         gust.memory.gust_angular_acceleration_sum[i] += gust.output.gust_acceleration[i]
@@ -603,21 +603,21 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
     )
     for i in range(3):
         for j in range(3):
-            rolling_effect_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
-            yawing_effect_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
+            rolling_effect_rate_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 0)
+            yawing_effect_rate_product = gust_effect_product(gust, gust.memory.gust_axes_rate, i, j, 2)
             gust.memory.acceleration_variance_by_axes_turn_now[i, j] += (
                 dt
                 * V
                 * (
-                    rolling_intensity_per_squared_axes_rate * rolling_effect_product
-                    + yawing_intensity_per_squared_axes_rate * yawing_effect_product
+                    rolling_intensity_per_squared_axes_rate * rolling_effect_rate_product
+                    + yawing_intensity_per_squared_axes_rate * yawing_effect_rate_product
                 )
             )
     gust.memory.n_frames_left_with_axes_turn_variance = 3
 
 
 @kernel
-def fill_frame_mean_gust(gust, frame_share_per_instant):
+def fill_frame_mean_gust_acceleration(gust, frame_share_per_instant):
     """Fill `mean_gust_acceleration` and `acceleration_variance_by_axes_turn` for the elapsed frame.
 
     frame_share_per_instant: one over the number of instants. Axes may turn in the middle of a frame. A part

@@ -157,8 +157,7 @@ def test_the_outcome_in_a_sentence():
         "contain nothing that can be measured."
     )
     assert words.summary(DOCUMENT).endswith(
-        "10 of 12 flights with a fault have the same alarm, the same name and the same time as with "
-        "adaptation."
+        "the alarm, the named surface and the times stay the same in 10 of 12 flights with a fault."
     )
 
 

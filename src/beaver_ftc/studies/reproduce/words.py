@@ -165,7 +165,7 @@ def headline(document: Document) -> str:
     tested, built = document["testable"], document["construction"]
     settings = len(document["sensitivity"])
     some, count, background = built["hold"], built["statements"], document["background"]
-    holding = "All of these hold" if some == count else f"{some} of these {count} hold"
+    holding = f"All {count} hold" if some == count else f"{some} of these {count} hold"
     return (
         f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} of "
         f"them can be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and "
@@ -182,8 +182,8 @@ def adaptation_sentence(document: Document) -> str:
     found = document["adaptation"]
     return (
         "Each isolation estimator adapts its estimate of the fault in flight. Without this adaptation "
-        f"(gain 0), {found['same']} of {found['flights']} flights with a fault have the same alarm, the same "
-        "name and the same time as with adaptation."
+        f"(gain 0), the alarm, the named surface and the times stay the same in {found['same']} of "
+        f"{found['flights']} flights with a fault."
     )
 
 

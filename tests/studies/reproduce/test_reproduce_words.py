@@ -141,7 +141,9 @@ def test_both_schemes_and_both_designs_in_rows():
     assert ours[1:4] == ("ours", "-", "-")
     assert ours[6] == "aircraft lost"
     assert beside.sentences(both) == ["rudder: isolation after 0.2 s, ours never"]
-    assert beside.alarms_sentence(both).endswith("published uncertainty: 0 by the paper and 3 by ours.")
+    assert beside.alarms_sentence(both).endswith(
+        "published uncertainty: 0 with the scheme of the paper, 3 with ours."
+    )
     assert truth_and_design.term_rows(designs) == [("Cm", "Cm_0, Cm_dpt", "Cm_0", "Cm_dpt")]
     assert truth_and_design.flown_rows(designs) == [
         ("as printed", "0.02", "none", "0.5", "11.2", "2", "0.123 s", "-"),

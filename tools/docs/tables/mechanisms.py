@@ -64,7 +64,8 @@ def _grouped(document: Document) -> str:
     """The sentence of each mechanism, below the title of its group."""
     groups: dict[str, list[str]] = {title: [] for title in GROUPS.values()}
     for row in document["mechanisms"]:
-        groups[GROUPS[_signs(row)]].append(f"- {shown.finding(row)}")
+        found = shown.finding(row)
+        groups[GROUPS[_signs(row)]].append(f"- {found[0].upper()}{found[1:]}")
     return "\n\n".join("\n".join([f"{title}:", "", *says]) for title, says in groups.items() if says)
 
 

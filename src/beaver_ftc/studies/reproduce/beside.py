@@ -141,8 +141,8 @@ def sentences(document: Document) -> list[str]:
 
 def alarms_sentence(document: Document) -> str:
     """The false alarms in a sentence."""
-    said = " and ".join(f"{count} by {whose}" for whose, count in document["false_alarms"].items())
+    said = ", ".join(f"{count} with {whose}" for whose, count in document["false_alarms"].items())
     return (
         f"False alarms in {document['healthy_flights']} healthy flights at the corners and edges of the "
-        f"published uncertainty: {said.replace('by paper', 'by the paper')}."
+        f"published uncertainty: {said.replace('with paper', 'with the scheme of the paper')}."
     )

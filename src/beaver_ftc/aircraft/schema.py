@@ -271,8 +271,8 @@ _Share = Annotated[Number, Field(ge=-1, le=1, json_schema_extra={"unit": "1"})]
 
 
 class TrimSection(Section):
-    """What trim changes in addition to the main surface of each axis: the power setting, and surfaces that
-    move together."""
+    """Quantities that trim changes besides the main surface of each axis: the power setting, and surfaces
+    that move together."""
 
     throttle: Property = Field(
         description="property of the power setting", examples=["engine/manifold-pressure-inhg"]
@@ -331,8 +331,8 @@ _Forces = Annotated[tuple[_Force, ...], Field(min_length=2, max_length=MAX_THRUS
 
 
 class ThrustSection(Section):
-    """Steady force of the engine along the body x axis. It depends on airspeed and on the setting that trim
-    moves.
+    """Steady force of the engine along the body x axis. The force depends on airspeed and on the setting
+    that trim moves.
 
     airspeed_mps: true airspeeds, m/s
     setting: values of the property that `trim.throttle` names
@@ -379,8 +379,8 @@ class EngineSection(Section):
 
 
 class EffectorSection(Section):
-    """An engine with a lever of its own. The law moves this lever. If the force of the engine does not act
-    through the centre of gravity, it turns the aircraft.
+    """An engine with a lever of its own. The law moves this lever. If the force of the engine does not go
+    through the centre of gravity, the force also causes a moment.
 
     throttle: property that moves the lever of this engine alone. Its value is added to the common lever, in
     the unit of the setting
@@ -396,7 +396,7 @@ class EffectorSection(Section):
 
 
 class ModelErrorSection(Section):
-    """Largest error of each angular acceleration. `derive` measures it after the fit of the terms."""
+    """Largest error of each angular acceleration. `derive` measures this error after the fit of the terms."""
 
     p: Number = number(0.0, unit="rad/s2", says="roll", ge=0, le=100, examples=[0.01])
     q: Number = number(0.0, unit="rad/s2", says="pitch", ge=0, le=100, examples=[0.01])
@@ -414,7 +414,7 @@ Errors = Annotated[tuple[Shares, ...], Field(min_length=1, max_length=MAX_AGES)]
 
 
 class ErrorBox(Section):
-    """A box of states, and the largest error in it. An error is a table with one row for each time in
+    """A box of states, and the largest error in this box. An error is a table with one row for each time in
     `until_s`, and one column for each part in `travel_share`.
 
     airspeed_mps: true airspeed, m/s

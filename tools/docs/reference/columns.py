@@ -106,14 +106,14 @@ print(log.t_s[ratio > 1].iloc[0])
 
 ## How to read a table
 
-- **column**: the name. A name that ends in a unit has this unit. A word in capitals stands for several names
-  (Table 1). For example, `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
+- **column**: the name. If the name ends with a unit, the values have this unit. A word in capitals stands
+  for several words (Table 1). For example, `AXIS_rad_s` stands for `p_rad_s`, `q_rad_s` and `r_rad_s`.
 - **type**: number, whole number, text, or true or false.
 - **unit**: `1` is a pure number. An empty cell means that the column has no unit.
 - **what it is**: the meaning. The [glossary](reference/glossary.md) explains the terms, and the
   [nomenclature](reference/nomenclature.md) has symbols and signs.
 
-*Table 1. Words in capitals, and the names for which each stands.*
+*Table 1. Words in capitals, and the names that each word stands for.*
 
 | word | stands for |
 | --- | --- |
@@ -155,7 +155,9 @@ def _contents(texts: Mapping[str, Mapping[str, str]]) -> str:
         for text in (texts[name] for name in TABLES)
     ]
     listed = markdown_table(("table", "written by", "one row for each"), rows)
-    caption = "*Table 2. The tables of this page, the commands that write each, and the meaning of a row.*"
+    caption = (
+        "*Table 2. The tables of this page, the commands that write each table, and the meaning of a row.*"
+    )
     return f"## Contents\n\n{caption}\n\n{listed}"
 
 

@@ -208,12 +208,13 @@ _NOTES = """## Status 1 of each command
 |`mechanisms`|a false alarm of a worst-case detector has no reason|
 |`separate`|a doublet was flown, and both candidates remain|
 
-A command without expectations and without a check, such as `list`, ends with status 0 when it is done.
+A command without expectations and without a check, such as `list`, ends with status 0 after it has finished
+its work.
 
 ## After Ctrl-C
 
-After Ctrl-C, a command ends with status 130. The one exception is `sitl`: it writes the results of the flight
-until then, with the verdict INTERRUPTED, and ends with status 1.
+After Ctrl-C, a command ends with status 130. There is one exception, `sitl`. It writes the results of the
+flight until Ctrl-C, with the verdict INTERRUPTED, and ends with status 1.
 
 ## Use in a script
 
@@ -234,9 +235,9 @@ fi
 def statuses_page() -> str:
     """The exit statuses: what `beaver-ftc --help` says of each, and the errors that end with it."""
     says = (
-        "With which exit status does a command end, and what does it mean? This page is for writers of "
-        "scripts and of CI jobs (continuous integration). A script reads this number to find out whether the "
-        "command was successful."
+        "Which exit status does a command have, and what does the status mean? This page is for writers of "
+        "scripts and of CI jobs (continuous integration). A script reads the exit status to find out whether "
+        "the command was successful."
     )
     _, _, listed = PARSER.help.partition("Exit status: ")
     found = re.findall(r"(\d+) ([^,.]+)", " ".join(listed.split()))

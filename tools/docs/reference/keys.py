@@ -70,20 +70,20 @@ _READ = """## How to read a table
 
 The file is YAML. Each section of the file has a table below, with a row for each key:
 
-- *what it is*: meaning of the key. A text after "Left out:" says what happens if the key is not in the file.
-- *type*: kind of value. A link leads to the table of a section below this key. A mapping of names to
+- *what it is*: meaning of the key. The text after "Left out:" says what happens without the key.
+- *type*: kind of value. A link goes to the table of a section below this key. A mapping of names to
   numbers is written `{aileron: 0.1, rudder: 0.2}`.
-- *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction, so that 0.4 is 40 %.
-- *range*: allowed values. A key of the type "choice" has one of the listed values.
-- *default*: value if the key is not in the file. "required": the key must be in the file. "left out": there
+- *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction: 0.4 is 40 %.
+- *range*: allowed values. The value of a key of the type "choice" is one of the listed values.
+- *default*: value that is used without the key. "required": the key must be in the file. "left out": there
   is no value. "none": the value is empty. "see section": the keys of the section have their own defaults.
-- *example*: the key with a value that is accepted. Some examples need a second key; the column *what it is*
+- *example*: the key with an allowed value. Some examples need a second key. The column *what it is*
   then names this key.
 
-In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose, or that the
-aircraft has. A key in brackets, such as [Zhang2005], is an entry of the [sources](../REFERENCES.md). The
-[glossary](reference/glossary.md) explains the terms, and the [nomenclature](reference/nomenclature.md)
-explains symbols, axes and signs."""
+In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose or that the
+aircraft has. A key in brackets, such as [Zhang2005], refers to an entry of the
+[sources](../REFERENCES.md). The [glossary](reference/glossary.md) explains the terms, and the
+[nomenclature](reference/nomenclature.md) explains symbols, axes and signs."""
 _CONTENTS = "*Table 1. The sections of the file, by their key at the top of the file.*"
 
 
@@ -429,8 +429,8 @@ KINDS = {
     "plan-keys": Kind(
         plan_json_schema,
         "Plan keys",
-        "Which keys can a plan of evidence have? A plan lists requirements, and the flights that test them. "
-        "This page lists every key, for readers who write a plan "
+        "Which keys can a plan of evidence have? A plan lists requirements, and the flights that test these "
+        "requirements. This page lists every key, for readers who write a plan "
         f"([how to write one](how-to/evidence.md)). {_AS_SCHEMA.format(' --plan')}",
         "This plan has one requirement of each kind. JAM-1 has expectations, RATE-1 has a formula, and "
         "STAT-1 has a limit for the result of a study.",
@@ -443,13 +443,15 @@ KINDS = {
     "aircraft-keys": Kind(
         AircraftFile.model_json_schema,
         "Aircraft file keys",
-        "Which keys can an `aircraft.yaml` have? The file describes an aircraft for diagnosis and law: "
-        "its surfaces, mass, the terms of the design model, and limits. The command `derive` writes the file "
-        "([your own aircraft](tutorials/own-aircraft.md)). This page is for readers who read or change it.",
-        "This file has the required sections and a few terms of the Beaver. The file of a real aircraft has "
-        "more terms, and the error of its model. The names after `command`, `position` and `effective` are "
-        "properties of the JSBSim model.",
-        "[Derived aircraft](explanation/derived-aircraft.md) explains how terms and errors are found.",
+        "Which keys can the file `aircraft.yaml` have? The file describes an aircraft for the diagnosis and "
+        "the laws: its surfaces, mass, the terms of the design model, and limits. The command `derive` writes "
+        "the file ([your own aircraft](tutorials/own-aircraft.md)). This page is for readers who read or "
+        "change this file.",
+        "This file has the required sections and a few terms of the Beaver. The file of a complete aircraft "
+        "has more terms, and also the error of its model. The names after `command`, `position` and "
+        "`effective` are properties of the JSBSim model.",
+        "[Derived aircraft](explanation/derived-aircraft.md) explains how `derive` finds the terms and the "
+        "errors.",
         links=_AIRCRAFT_LINKS,
     ),
     "vehicle-keys": Kind(

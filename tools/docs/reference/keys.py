@@ -444,7 +444,7 @@ KINDS = {
         AircraftFile.model_json_schema,
         "Aircraft file keys",
         "Which keys can the file `aircraft.yaml` have? The file describes an aircraft for the diagnosis and "
-        "the laws: its surfaces, mass, the terms of the design model, and limits. The command `derive` writes "
+        "the laws: its surfaces, mass, terms of the design model, and limits. The command `derive` writes "
         "the file ([your own aircraft](tutorials/own-aircraft.md)). This page is for readers who read or "
         "change this file.",
         "This file has the required sections and a few terms of the Beaver. The file of a complete aircraft "

@@ -300,5 +300,5 @@ def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = 
         model.whitened_intercept(noise_ma_coefficients), model.intercept_past_response_noise()[3],
         settings.effective_sample_share, settings.t_degrees_of_freedom, scale_memory_samples,
         _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE, max_squared_residual,
-        model.noise_inflation(noise_ma_coefficients),
+        model.covariance_inflation_of_noise_model(noise_ma_coefficients),
     )  # fmt: skip

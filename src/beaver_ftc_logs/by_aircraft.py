@@ -280,10 +280,11 @@ def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraf
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
     signals, commands = input_arrays[1], input_arrays[2]
     for signal_index, name in enumerate(("alpha_rad", "beta_rad")):
-        median_angle = _median_without_nan(np.abs(signals[:, signal_index]))
-        if median_angle > 0.5 * pi:
+        median_angle_magnitude = _median_without_nan(np.abs(signals[:, signal_index]))
+        if median_angle_magnitude > 0.5 * pi:
             raise BadInput(
-                f"{flight_name}: flow.{name} is {median_angle:.3g} in the middle, allowed: rad; `unit: deg`?"
+                f"{flight_name}: flow.{name} is {median_angle_magnitude:.3g} in the middle, "
+                "allowed: rad; `unit: deg`?"
             )
     is_flying = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
     density_kg_m3 = 2.0 * signals[is_flying, 3] / signals[is_flying, 2] ** 2
@@ -414,7 +415,9 @@ def _add_rows_after_doubtful_alarm(
     rows_by_reason = rows_by_reason | {
         "the alarm was raised where nothing can be said": is_after_doubtful_alarm & ~has_reason
     }
-    return {reason: is_row for reason, is_row in rows_by_reason.items() if is_row.any()}
+    return {
+        reason: has_this_reason for reason, has_this_reason in rows_by_reason.items() if has_this_reason.any()
+    }
 
 
 def _verdict_document(
@@ -468,12 +471,12 @@ def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[s
     is_credible_without_alarm = (rows.faulty == 0) & (rows.credible == 1)
     if not is_credible_without_alarm.any():
         return []
-    smallest_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
+    median_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, smallest_excluded_losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, median_excluded_losses.tolist(), strict=True)
     ]
 
 

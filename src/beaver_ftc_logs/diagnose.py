@@ -181,7 +181,7 @@ def _withdraw_isolation_after_engine_failure(
     if unpowered_energy_height_rate_mps is None or samples.energy_height_rate_mps is None:
         return rows
     energy_height_rate_mps = samples.energy_height_rate_mps
-    isolated_names = energy.withdraw_surfaces_after_engine_failure(
+    isolated_names = energy.withdraw_surfaces_where_engine_may_have_failed(
         rows.t_s,
         rows.faulty,
         rows.isolated_surfaces,

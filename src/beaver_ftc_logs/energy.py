@@ -33,7 +33,7 @@ def compute_energy_height_rate_mps(
     )
 
 
-def withdraw_surfaces_after_engine_failure(
+def withdraw_surfaces_where_engine_may_have_failed(
     t_s: Floats,
     faulty: np.ndarray,
     isolated_surfaces: np.ndarray,

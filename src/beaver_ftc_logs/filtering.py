@@ -70,13 +70,15 @@ def _posterior_averaged_over_noise_models(
 ) -> tuple[Floats, Floats, Floats]:
     """The average over the noise models. The bank is run with each up to the last sample at which its weight
     is not negligible: within a second most become far less likely than another, and stay so."""
-    flights_and_models = [
+    whitened_flights_and_models = [
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
     sample_log_likelihoods_by_model = [
-        _noise_model_log_likelihood(flight, single_model, single_model.noise_models[0])
-        for flight, single_model in flights_and_models
+        _noise_model_log_likelihood(
+            flight, model_with_one_noise_model, model_with_one_noise_model.noise_models[0]
+        )
+        for flight, model_with_one_noise_model in whitened_flights_and_models
     ]
     noise_model_probabilities = _model_probabilities_with_forgetting(
         sample_log_likelihoods_by_model, model.rate_hz
@@ -91,10 +93,12 @@ def _posterior_averaged_over_noise_models(
     bank_runs = [
         _run_bank_on_flight(
             first_samples(flight, n_samples),
-            single_model.with_noise_model(flight.noise_ma_coefficients),
+            model_with_one_noise_model.with_noise_model(flight.noise_ma_coefficients),
             bank,
         )
-        for (flight, single_model), n_samples in zip(flights_and_models, n_run_samples_by_model, strict=True)
+        for (flight, model_with_one_noise_model), n_samples in zip(
+            whitened_flights_and_models, n_run_samples_by_model, strict=True
+        )
         if n_samples
     ]
     return _average_bank_runs(
@@ -173,10 +177,10 @@ def any_fault_log_odds_gains(posterior: Floats, bank: HypothesisBank) -> Floats:
 def page_cusum(evidence_increments, max_sum):
     """Page's sum of evidence_increments (n,): never below zero, where it starts again, and never above
     max_sum, (n,)."""
-    page_value, page_sums = 0.0, np.zeros(len(evidence_increments))
+    page_sum, page_sums = 0.0, np.zeros(len(evidence_increments))
     for k in range(len(evidence_increments)):
-        page_value = min(max(page_value + evidence_increments[k], 0.0), max_sum)
-        page_sums[k] = page_value
+        page_sum = min(max(page_sum + evidence_increments[k], 0.0), max_sum)
+        page_sums[k] = page_sum
     return page_sums
 
 
@@ -243,7 +247,7 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
 
 
 def recent_noise_variance_scale(
-    residual: Floats, is_usable: np.ndarray, covariance: Floats, rate_hz: float
+    residual: Floats, is_usable: np.ndarray, noise_covariance: Floats, rate_hz: float
 ) -> Floats:
     """Return the ratio of the variance of a flight's residual (n, 3) in the last seconds to that of the
     fitted noise, (n,): of single samples, or of sums of several if that is larger.
@@ -251,17 +255,17 @@ def recent_noise_variance_scale(
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
     """
-    whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(covariance)).T
+    whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(noise_covariance)).T
     cumulated_residual = np.cumsum(np.vstack([np.zeros((1, 3)), whitened_residual]), axis=0)
     cumulated_usable_count = np.concatenate([[0], np.cumsum(is_usable)])
     window_end = np.arange(1, len(whitened_residual) + 1)
     max_variance_ratio = np.zeros(len(whitened_residual))
     for span_s in _RESIDUAL_SUM_SPANS_S:
-        window_begin = np.maximum(window_end - max(round(span_s * rate_hz), 1), 0)
+        span_begin = np.maximum(window_end - max(round(span_s * rate_hz), 1), 0)
         squared_sum_per_sample_and_axis = (
-            (cumulated_residual[window_end] - cumulated_residual[window_begin]) ** 2
+            (cumulated_residual[window_end] - cumulated_residual[span_begin]) ** 2
         ).sum(axis=1) / (
-            3.0 * np.maximum(cumulated_usable_count[window_end] - cumulated_usable_count[window_begin], 1)
+            3.0 * np.maximum(cumulated_usable_count[window_end] - cumulated_usable_count[span_begin], 1)
         )
         cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum_per_sample_and_axis)])
         window_begin = np.maximum(window_end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
@@ -309,7 +313,7 @@ def run_bank(
             state_model.initial_covariance,
         )  # while nothing answers, nothing is learnt
         if is_usable[k]:
-            hypothesis_probabilities, clipped_squared_residual, sample_log_likelihoods[k] = (
+            hypothesis_probabilities, mean_clipped_squared_residual, sample_log_likelihoods[k] = (
                 _correct_hypotheses(
                     prior_probabilities,
                     state_means,
@@ -328,7 +332,7 @@ def run_bank(
             )
             noise_variance_scale *= np.exp(
                 (1.0 - hypothesis_probabilities[no_response_index])
-                * (clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
+                * (mean_clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
                 / noise.scale_memory_samples
             )
             noise_variance_scale = min(
@@ -495,16 +499,16 @@ def _correct_hypotheses(
 
 @kernel
 def _state_sensitivity(
-    effectiveness, response_share_scaled_by_gain, group_responses, intercept_rad_s, n_states
+    effectiveness, response_share_scaled_by_group_gain, group_responses, intercept_rad_s, n_states
 ):
     """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which
     multiplies the intercept and all group_responses (G, 3) times effectiveness (G,); and to each group's own
-    gain, which multiplies the share response_share_scaled_by_gain (G,) of its response."""
+    gain, which multiplies the share response_share_scaled_by_group_gain (G,) of its response."""
     sensitivity = np.zeros((n_states, 3))
     sensitivity[:3] = np.eye(3)
     sensitivity[3] = intercept_rad_s
     for g in range(len(effectiveness)):
-        sensitivity[4 + g] = response_share_scaled_by_gain[g] * group_responses[g]
+        sensitivity[4 + g] = response_share_scaled_by_group_gain[g] * group_responses[g]
         sensitivity[3] += effectiveness[g] * group_responses[g]
     return sensitivity
 

@@ -76,10 +76,10 @@ _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
 same way, the first on seed 1 of five aircraft."""
-_GYRO_NOISE_INFLATION_OTHER_LAWS, _GUST_NOISE_INFLATION_OTHER_LAWS = 1.7, 2.5
+_GYRO_NOISE_VARIANCE_FACTOR_OTHER_LAWS, _GUST_NOISE_VARIANCE_FACTOR_OTHER_LAWS = 1.7, 2.5
 """In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
 Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
-_MAX_WINDOW_NOISE_INFLATION = 200.0
+_MAX_WINDOW_COVARIANCE_INFLATION = 200.0
 """Largest noise factor of a window of ten seconds: of few flights one can be far from all others (1,550 of
 seed 205, else 5)."""
 _COMMAND_DELAY_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
@@ -169,22 +169,23 @@ def fit_with_same_order(usable_flights: Sequence[FlightWithUsableRows], model: M
     refitted_model = _fit_model_of_order(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
-    noise_inflation_by_ma_coefficients = {
+    covariance_inflation_by_ma_coefficients = {
         tuple(noise_model.ma_coefficients): noise_model.covariance_inflation
         for noise_model in model.noise_models
     }
-    return _with_noise_inflation(
-        refitted_model.model_copy(update={"settings": model.settings}), noise_inflation_by_ma_coefficients
+    return _with_covariance_inflation(
+        refitted_model.model_copy(update={"settings": model.settings}),
+        covariance_inflation_by_ma_coefficients,
     )
 
 
-def _with_noise_inflation(
-    model: Model, noise_inflation_by_ma_coefficients: dict[tuple[float, ...], float]
+def _with_covariance_inflation(
+    model: Model, covariance_inflation_by_ma_coefficients: dict[tuple[float, ...], float]
 ) -> Model:
     noise_models = [
         noise_model.model_copy(
             update={
-                "covariance_inflation": noise_inflation_by_ma_coefficients.get(
+                "covariance_inflation": covariance_inflation_by_ma_coefficients.get(
                     tuple(noise_model.ma_coefficients), 1.0
                 )
             }
@@ -551,22 +552,22 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
                 )
                 window_inflations_by_ma_coefficients.setdefault(
                     held_out.samples.noise_ma_coefficients, []
-                ).append(min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_NOISE_INFLATION))
-    noise_inflation_by_ma_coefficients = {
+                ).append(min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_COVARIANCE_INFLATION))
+    covariance_inflation_by_ma_coefficients = {
         ma_coefficients: max(float(np.mean(window_inflations)), 1.0)
         for ma_coefficients, window_inflations in window_inflations_by_ma_coefficients.items()
     }
     if model.vehicle.other_laws:
-        noise_inflation_by_ma_coefficients = {
+        covariance_inflation_by_ma_coefficients = {
             ma_coefficients: inflation
             * (
-                _GYRO_NOISE_INFLATION_OTHER_LAWS
+                _GYRO_NOISE_VARIANCE_FACTOR_OTHER_LAWS
                 if _is_gyro_noise_spectrum(ma_coefficients)
-                else _GUST_NOISE_INFLATION_OTHER_LAWS
+                else _GUST_NOISE_VARIANCE_FACTOR_OTHER_LAWS
             )
-            for ma_coefficients, inflation in noise_inflation_by_ma_coefficients.items()
+            for ma_coefficients, inflation in covariance_inflation_by_ma_coefficients.items()
         }
-    return _with_noise_inflation(model, noise_inflation_by_ma_coefficients)
+    return _with_covariance_inflation(model, covariance_inflation_by_ma_coefficients)
 
 
 def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
@@ -589,13 +590,13 @@ def _normalized_squared_gain_error_and_rank(
     lies between flights, and how many gains there are."""
     information, score_vector = gain_responses.T @ gain_responses, gain_responses.T @ residual
     gain_errors = np.linalg.lstsq(information, score_vector, rcond=_RANK_TOLERANCE)[0]
-    identity_plus_prior_information = (
+    identity_plus_prior_times_information = (
         np.eye(len(gain_errors)) + prior_gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
     squared_error = max(
         float(
             score_vector
-            @ np.linalg.lstsq(identity_plus_prior_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
+            @ np.linalg.lstsq(identity_plus_prior_times_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
         ),
         0.0,
     )
@@ -724,7 +725,7 @@ def add_fitted_ranges_and_alarm_threshold(
     ]
     (
         max_noise_variance_scale,
-        max_column_mistake_gain_per_sample,
+        max_sample_log_likelihood_gain_of_mistake,
         held_out_peaks_and_hours,
         squared_gain_deviations,
     ) = (
@@ -742,8 +743,8 @@ def add_fitted_ranges_and_alarm_threshold(
             )
             max_noise_variance_scale = max(max_noise_variance_scale, held_out_max_noise_variance_scale)
             if len(held_out_peaks_and_hours) < _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES:
-                max_column_mistake_gain_per_sample = max(
-                    max_column_mistake_gain_per_sample,
+                max_sample_log_likelihood_gain_of_mistake = max(
+                    max_sample_log_likelihood_gain_of_mistake,
                     _max_column_mistake_log_likelihood_gain(fold_model, held_out),
                 )
             held_out_peaks_and_hours.append(peaks_and_hours)
@@ -797,7 +798,7 @@ def add_fitted_ranges_and_alarm_threshold(
             "fitted_ranges": fitted_ranges.model_copy(
                 update={
                     "alarm_peak_tail": peak_tail,
-                    "max_column_mistake_log_likelihood_gain": max_column_mistake_gain_per_sample,
+                    "max_column_mistake_log_likelihood_gain": max_sample_log_likelihood_gain_of_mistake,
                 }
             ),
             "settings": model.settings.model_copy(update=alarm_settings),
@@ -890,10 +891,14 @@ def _choose_alarm_threshold(
 def _max_column_mistake_log_likelihood_gain(model: Model, held_out: FlightWithUsableRows) -> float:
     """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
     rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    min_gain_per_sample_by_correction, _ = trust.log_likelihood_gain_of_corrections(
+    sample_log_likelihood_gain_by_correction, _ = trust.log_likelihood_gain_of_corrections(
         replace(held_out.samples, rates=rates), model
     )
-    return max(0.0, *min_gain_per_sample_by_correction.values()) if min_gain_per_sample_by_correction else 0.0
+    return (
+        max(0.0, *sample_log_likelihood_gain_by_correction.values())
+        if sample_log_likelihood_gain_by_correction
+        else 0.0
+    )
 
 
 def _total_healthy_minutes(held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours]) -> float:
@@ -982,7 +987,7 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
     n_groups, n_command_lags = len(model.groups), model.n_command_lags
     first_command_row = len(rate_regression.coefficients) - n_groups * n_command_lags
     noise_sd = np.sqrt(np.maximum(np.diag(rate_regression.residual_covariance), MIN_DIVISOR))
-    relative_sd_of_summed_response, response_factor_information = (
+    relative_error_sd_of_summed_response, response_factor_information = (
         np.zeros(n_groups),
         np.full(n_groups, MIN_DIVISOR),
     )
@@ -998,14 +1003,14 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
         response_sum_over_noise_sd = (
             rate_regression.coefficients[group_coefficient_rows].sum(axis=0) / noise_sd
         )
-        summed_response_variance = np.einsum(
+        summed_response_error_variance = np.einsum(
             "la,lm,ma->a",
             standard_errors_over_noise_sd,
             coefficient_error_correlation,
             standard_errors_over_noise_sd,
         )
-        relative_sd_of_summed_response[group_index] = np.sqrt(
-            response_sum_over_noise_sd**2 @ np.maximum(summed_response_variance, 0.0)
+        relative_error_sd_of_summed_response[group_index] = np.sqrt(
+            response_sum_over_noise_sd**2 @ np.maximum(summed_response_error_variance, 0.0)
         ) / max(float(response_sum_over_noise_sd @ response_sum_over_noise_sd), MIN_DIVISOR)
         response_over_its_errors = (
             rate_regression.coefficients[group_coefficient_rows]
@@ -1021,7 +1026,7 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
     return np.minimum(
         1.0 / np.sqrt(response_factor_information)
         if model.vehicle.other_laws
-        else relative_sd_of_summed_response,
+        else relative_error_sd_of_summed_response,
         _MAX_GAIN_SD,
     )
 
@@ -1034,7 +1039,7 @@ def gain_standard_error_by_column(
     K. As much wider as the noise of parts left out. gain_variance_between_laws: variance of a gain between
     laws: a law ties commands to these columns.
     """
-    max_noise_inflation, noise_sd = (
+    max_covariance_inflation, noise_sd = (
         max((noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0),
         np.sqrt(np.diag(rate_regression.residual_covariance)),
     )
@@ -1055,7 +1060,9 @@ def gain_standard_error_by_column(
             coefficients_over_standard_errors,
         ) - np.count_nonzero(coefficients)
         gain_standard_error_of_column[name] = min(
-            float(np.sqrt(max_noise_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)),
+            float(
+                np.sqrt(max_covariance_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)
+            ),
             _MAX_COLUMN_GAIN_SD,
         )
     return gain_standard_error_of_column

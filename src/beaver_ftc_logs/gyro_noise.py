@@ -30,8 +30,10 @@ def residual_predictor_by_yule_walker(
     )
     past_residual_covariance = covariance_blocks.transpose(0, 2, 1, 3).reshape(3 * n_lags, 3 * n_lags)
     cross_covariance = np.concatenate([_autocovariance_at_lag(autocovariance, -int(i) - 1) for i in lags])
-    coefficients = np.linalg.solve(past_residual_covariance, cross_covariance)
-    return np.asarray(coefficients), np.asarray(autocovariance[0] - cross_covariance.T @ coefficients)
+    predictor_coefficients = np.linalg.solve(past_residual_covariance, cross_covariance)
+    return np.asarray(predictor_coefficients), np.asarray(
+        autocovariance[0] - cross_covariance.T @ predictor_coefficients
+    )
 
 
 def _residual_autocovariance(

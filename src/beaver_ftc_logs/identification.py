@@ -73,7 +73,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     much of it, the flight itself shows (`filtering.recent_noise_variance_scale`)."""
     if not model.noise_models:
         return model
-    known_ma_coefficients, max_inflation = (
+    known_ma_coefficients, max_covariance_inflation = (
         [tuple(one.ma_coefficients) for one in model.noise_models],
         max(one.covariance_inflation for one in model.noise_models),
     )
@@ -89,7 +89,9 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
             residuals = np.vstack([fitting.one_step_residuals(model, one)[1] for one in whitened_flights])
             noise_models.append(
                 NoiseModel(
-                    average=list(ma_coefficients), noise=np.cov(residuals.T).tolist(), wider=max_inflation
+                    average=list(ma_coefficients),
+                    noise=np.cov(residuals.T).tolist(),
+                    wider=max_covariance_inflation,
                 )
             )
     for gyro_noise_rad_s in UNSEEN_GYRO_NOISE_RAD_S:
@@ -97,7 +99,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
             model, quietest_covariance, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
         )
         ar_and_covariance = {"before": ar_coefficients.tolist(), "noise": residual_covariance.tolist()}
-        noise_models.append(NoiseModel(average=[1.0], wider=max_inflation, **ar_and_covariance))
+        noise_models.append(NoiseModel(average=[1.0], wider=max_covariance_inflation, **ar_and_covariance))
     return model.model_copy(update={"noise_models": noise_models})
 
 
@@ -369,7 +371,7 @@ def check_explained_variance(
         for axis, explained_share in mean_explained_share_by_axis.items()
         if explained_share <= 0.0
     }:
-        minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in usable_flights) / 60.0
+        usable_minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in usable_flights) / 60.0
         stillest_surface_and_sd = min(
             _command_sd_by_surface(usable_flights, model).items(), key=lambda pair: pair[1]
         )
@@ -378,7 +380,7 @@ def check_explained_variance(
             f"{', '.join(unexplained_axes)} than the "
             f"mean does ({_values_by_axis_text(unexplained_axes)}), allowed: a model that "
             "explains more; what would "
-            f"help: more than these {minutes:.1f} min, commands that move more "
+            f"help: more than these {usable_minutes:.1f} min, commands that move more "
             f"({stillest_surface_and_sd[0]} has a standard "
             f"deviation of {stillest_surface_and_sd[1]:.2g}), or the commands that this vehicle follows"
             f"{_remarks_on_rates(usable_flights, model)}"
@@ -387,12 +389,12 @@ def check_explained_variance(
 
 def _check_command_units_alike(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     """Raise BadInput where a flight's command is in another unit than that of the first."""
-    first_ranges = FittedRanges(
+    first_flight_ranges = FittedRanges(
         commands=trust.central_ranges(flights[0].commands), rates=trust.central_ranges(flights[0].rates)
     )
     for flight in flights[1:]:
         trust.check_command_units(
-            flight.name, flight.commands, flight.rates, first_ranges, list(vehicle.surfaces)
+            flight.name, flight.commands, flight.rates, first_flight_ranges, list(vehicle.surfaces)
         )
 
 
@@ -437,12 +439,12 @@ def collinear_regressors(
     names_and_factors = sorted(
         zip(regressor_names(model), inflation_factors.tolist(), strict=True), key=lambda pair: -pair[1]
     )
-    collinear = [
+    collinear_names_and_factors = [
         (name, factor if isfinite(factor) else None)
         for name, factor in names_and_factors
         if factor > _MIN_COLLINEAR_VARIANCE_INFLATION
     ]
-    return [{"regressor": name, "inflation": factor} for name, factor in collinear]
+    return [{"regressor": name, "inflation": factor} for name, factor in collinear_names_and_factors]
 
 
 def regressor_names(model: Model) -> list[str]:

@@ -401,8 +401,8 @@ class Model(Section):
         return self.model_copy(update={"noise_models": [noise_model]})
 
     def with_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its `noise_inflation`;
-        the model itself where none was fitted.
+        """The model with the noise fitted for flights of this moving average, times its
+        `covariance_inflation_of_noise_model`; the model itself where none was fitted.
 
         ma_coefficients: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
@@ -416,12 +416,12 @@ class Model(Section):
         return self.model_copy(
             update={
                 "residual_covariance": (
-                    self.noise_inflation(ma_coefficients) * matching_covariances[0]
+                    self.covariance_inflation_of_noise_model(ma_coefficients) * matching_covariances[0]
                 ).tolist()
             }
         )
 
-    def noise_inflation(self, ma_coefficients: Sequence[float]) -> float:
+    def covariance_inflation_of_noise_model(self, ma_coefficients: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
         return next(
             (

@@ -120,13 +120,13 @@ def _fit_angle_to_rate(
         np.arange(0, len(t_s) - window_samples, window_samples),
         np.arange(window_samples, len(t_s), window_samples),
     )
-    is_window_gap_free = (t_s[window_end] - t_s[window_begin]) < 2.0 * _INTEGRATION_WINDOW_S
+    is_window_usable = (t_s[window_end] - t_s[window_begin]) < 2.0 * _INTEGRATION_WINDOW_S
     if pitch_rad is not None:
         cumulated_steep_count = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
-        is_window_gap_free &= cumulated_steep_count[window_end] == cumulated_steep_count[window_begin]
+        is_window_usable &= cumulated_steep_count[window_end] == cumulated_steep_count[window_begin]
     angle_changes, rate_integrals = (
-        (angle[window_end] - angle[window_begin])[is_window_gap_free],
-        (rate_term_integrals[window_end] - rate_term_integrals[window_begin])[is_window_gap_free],
+        (angle[window_end] - angle[window_begin])[is_window_usable],
+        (rate_term_integrals[window_end] - rate_term_integrals[window_begin])[is_window_usable],
     )
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
@@ -137,13 +137,16 @@ def _fit_angle_to_rate(
         angle_changes - rate_integrals[:, 1:] @ coefficients[1:],
         rate_integrals[:, 0],
     )
-    rate_power, angle_power = float(rate_integrals @ rate_integrals), float(angle_changes @ angle_changes)
-    if len(rate_integrals) < _MIN_WINDOWS or not rate_power * angle_power > 0.0:
+    rate_integral_power, angle_change_power = (
+        float(rate_integrals @ rate_integrals),
+        float(angle_changes @ angle_changes),
+    )
+    if len(rate_integrals) < _MIN_WINDOWS or not rate_integral_power * angle_change_power > 0.0:
         return None
     cross_power = float(rate_integrals @ angle_changes)
     return AngleRateFit(
-        slope=np.sign(cross_power) * np.sqrt(angle_power / rate_power),
-        correlation=cross_power / np.sqrt(rate_power * angle_power),
+        slope=np.sign(cross_power) * np.sqrt(angle_change_power / rate_integral_power),
+        correlation=cross_power / np.sqrt(rate_integral_power * angle_change_power),
         n_windows=len(rate_integrals),
         max_angle_magnitude=float(np.nanmax(np.abs(angle))),
         max_rate_magnitude=float(np.nanmax(np.abs(rate_terms[0]))),

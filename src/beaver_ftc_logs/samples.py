@@ -157,14 +157,16 @@ def scale_by_dynamic_pressure(
     surface, (S,) or one, and, as further signals, rates and signals times V / reference - 1, since damping
     and stability grow with it; as at the reference where the airspeed is unknown."""
     airspeed = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
-    pressure_ratio = np.clip(
+    dynamic_pressure_ratio = np.clip(
         np.nan_to_num(airspeed / reference_airspeed_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
     )[:, None]
-    airspeed_products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(pressure_ratio) - 1.0)
+    airspeed_products = np.column_stack([samples.rates, samples.signals]) * (
+        np.sqrt(dynamic_pressure_ratio) - 1.0
+    )
     signals_and_products = np.column_stack([samples.signals, airspeed_products])
     return replace(
         samples,
-        commands=samples.commands * pressure_ratio ** (0.5 * np.array(airspeed_powers)),
+        commands=samples.commands * dynamic_pressure_ratio ** (0.5 * np.array(airspeed_powers)),
         signals=signals_and_products,
     )
 
@@ -548,13 +550,18 @@ def first_samples(samples: Samples, n_samples: int) -> Samples:
 
 def _select_rows(samples: Samples, rows: slice) -> Samples:
     """Some of the samples, copied."""
-    selected = {
+    selected_fields = {
         name: values[rows].copy()
         for name in _PER_SAMPLE_FIELDS
         if (values := getattr(samples, name)) is not None
     }
     time_since_change_s = {name: values[rows].copy() for name, values in samples.time_since_change_s.items()}
-    return replace(samples, log_stamps_s=selected["t_s"], time_since_change_s=time_since_change_s, **selected)
+    return replace(
+        samples,
+        log_stamps_s=selected_fields["t_s"],
+        time_since_change_s=time_since_change_s,
+        **selected_fields,
+    )
 
 
 def _concatenate_samples(name: str, flights: list[Samples], n_log_parts: int) -> Samples:

@@ -11,8 +11,8 @@ from beaver_ftc_logs.recording import Column, Floats
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
-_MIN_CLIPPED_ROWS, _MIN_CLIPPED_TOTAL_ROWS = 3, 10
-_MIN_SPIKE_STEPS, _MAX_SPIKE_SHARE = 40.0, 0.01
+_MIN_CLIPPED_CONSECUTIVE_ROWS, _MIN_CLIPPED_TOTAL_ROWS = 3, 10
+_MIN_SPIKE_STEP_OVER_MEDIAN, _MAX_SPIKE_SHARE = 40.0, 0.01
 
 Mask = NDArray[np.bool_]
 
@@ -46,31 +46,31 @@ def is_clipped(values: Floats) -> Mask:
         at_maximum_since_row = np.maximum.accumulate(
             np.where(_differs_from_previous(signed_values) | ~is_at_maximum, row_index, 0)
         )
-        maximum_number = np.cumsum(
+        running_maximum_ordinal = np.cumsum(
             _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
         n_rows_at_maximum = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(
-            is_at_maximum, maximum_number
+            is_at_maximum, running_maximum_ordinal
         )
         is_clipped_row |= (
             is_at_maximum
-            & (row_index - at_maximum_since_row >= _MIN_CLIPPED_ROWS - 1)
+            & (row_index - at_maximum_since_row >= _MIN_CLIPPED_CONSECUTIVE_ROWS - 1)
             & (n_rows_at_maximum >= _MIN_CLIPPED_TOTAL_ROWS)
         )
     return is_clipped_row
 
 
 def _count_rows_at_previous_maxima(
-    is_at_maximum: Mask, maximum_number: NDArray[np.int64]
+    is_at_maximum: Mask, running_maximum_ordinal: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
-    reached. maximum_number (n,): number of the present largest value, counted from 1."""
+    reached. running_maximum_ordinal (n,): number of the present largest value, counted from 1."""
     cumulated_rows_at_maximum = np.cumsum(is_at_maximum)
-    first_row_of_maximum = np.flatnonzero(np.diff(maximum_number, prepend=0))
+    first_row_of_each_maximum = np.flatnonzero(np.diff(running_maximum_ordinal, prepend=0))
     return (
-        (cumulated_rows_at_maximum - is_at_maximum)[first_row_of_maximum][maximum_number - 1]
-        if len(first_row_of_maximum)
-        else np.zeros(len(maximum_number), dtype=np.int64)
+        (cumulated_rows_at_maximum - is_at_maximum)[first_row_of_each_maximum][running_maximum_ordinal - 1]
+        if len(first_row_of_each_maximum)
+        else np.zeros(len(running_maximum_ordinal), dtype=np.int64)
     )
 
 
@@ -84,8 +84,8 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     median_step = (
         float(np.median(np.abs(value_steps[value_steps != 0.0]))) if (value_steps != 0.0).any() else 0.0
     )
-    is_spike = (np.abs(value_steps[:-1]) > _MIN_SPIKE_STEPS * median_step) & (
-        np.abs(value_steps[1:]) > _MIN_SPIKE_STEPS * median_step
+    is_spike = (np.abs(value_steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step) & (
+        np.abs(value_steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step
     )
     is_spike &= value_steps[:-1] * value_steps[1:] < 0.0
     spike_rows = finite_rows[1:-1][is_spike]

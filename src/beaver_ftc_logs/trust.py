@@ -53,10 +53,10 @@ def compute_fitted_ranges(
     flights: Sequence[tuple[Samples, Mask]],
     model: Model,
     gain_standard_error: Floats,
-    noise_variance_scale: float,
+    max_noise_variance_scale: float,
 ) -> FittedRanges:
     """Compute the ranges in which a model was fitted. flights: with the samples used; gain_standard_error
-    (G,) and noise_variance_scale: of parts not fitted."""
+    (G,) and max_noise_variance_scale: of parts not fitted."""
     surface_groups = regression.surface_indices_by_group(model)
     rates = np.vstack([samples.rates[is_used] for samples, is_used in flights])
     commands = np.vstack([samples.commands[is_used] for samples, is_used in flights])
@@ -75,7 +75,7 @@ def compute_fitted_ranges(
         tied=effect_share_explained_by_others(flights, model).tolist(),
         gain_sd=gain_standard_error.tolist(),
         still_s=_longest_unchanged_time_s_by_column(flights),
-        scale=noise_variance_scale,
+        scale=max_noise_variance_scale,
         energy_climb=_estimate_unpowered_energy_height_rate_mps(flights),
         minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
     )
@@ -335,7 +335,7 @@ class _GainBoundsOverFlight(NamedTuple):
     group_gain_lower_bounds: list[float]
     column_gain_upper_bounds: dict[str, float]
     min_noise_variance_scale: float
-    log_likelihood_by_part: Floats
+    sample_log_likelihood_by_part: Floats
 
 
 def check_columns_as_identified(samples: Samples, model: Model) -> None:
@@ -348,19 +348,21 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     knows the effect of no surface says nothing of any flight, and refuses none."""
     if not any(is_group_effect_known(model)):
         return
-    flights_and_models = [
+    whitened_flights_and_models = [
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
     flights_and_likelihoods = [
-        (one, likelihoods)
-        for one in flights_and_models or [(samples, model)]
-        if (likelihoods := _log_likelihood_by_flight_part(*one))
+        (one, likelihoods_and_sample_count)
+        for one in whitened_flights_and_models or [(samples, model)]
+        if (likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(*one))
     ]
     if not flights_and_likelihoods:
         return
-    likeliest_flight, likeliest_model = max(flights_and_likelihoods, key=lambda one: one[1][0].mean())[0]
-    gain_bounds = _bound_gains_over_flight_parts(likeliest_flight, likeliest_model)
+    likeliest_whitened_flight, likeliest_model = max(
+        flights_and_likelihoods, key=lambda one: one[1][0].mean()
+    )[0]
+    gain_bounds = _bound_gains_over_flight_parts(likeliest_whitened_flight, likeliest_model)
     if gain_bounds is None:
         return
     mistakes = _column_mistake_texts(samples, model, gain_bounds)
@@ -370,7 +372,8 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
         )
         if (
             other_gain_bounds is not None
-            and other_gain_bounds.log_likelihood_by_part.mean() > gain_bounds.log_likelihood_by_part.mean()
+            and other_gain_bounds.sample_log_likelihood_by_part.mean()
+            > gain_bounds.sample_log_likelihood_by_part.mean()
         ):
             other_mistakes = _column_mistake_texts(samples, model, other_gain_bounds)
             mistakes = {
@@ -379,7 +382,7 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
                 if mistake_key in other_mistakes
             }
     mistake_text = next(iter(mistakes.values()), None) or _likelier_column_mistake_text(
-        likeliest_flight, likeliest_model
+        likeliest_whitened_flight, likeliest_model
     )
     if mistake_text is not None:
         allowed_text = "allowed: columns, signs and units as in the flights of the model"
@@ -460,27 +463,30 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
     more as flights were that the model was not fitted on, whose columns are right, and by as much again for
     another law (`FittedRanges.misread`).
     """
-    min_gain_per_sample_by_correction, n_effective_part_samples = log_likelihood_gain_of_corrections(
+    sample_log_likelihood_gain_by_correction, n_effective_part_samples = log_likelihood_gain_of_corrections(
         samples, model
     )
-    if not min_gain_per_sample_by_correction:
+    if not sample_log_likelihood_gain_by_correction:
         return None
-    correction_text, max_gain_per_sample = max(
-        min_gain_per_sample_by_correction.items(), key=lambda one: one[1]
+    correction_text, max_log_likelihood_gain_per_sample = max(
+        sample_log_likelihood_gain_by_correction.items(), key=lambda one: one[1]
     )
-    max_gain_per_sample_without_mistake = (
+    allowed_log_likelihood_gain_per_sample = (
         2.0 * model.fitted_ranges.max_column_mistake_log_likelihood_gain
         if model.fitted_ranges is not None
         else 0.0
     )
     if (
-        max_gain_per_sample * n_effective_part_samples
-        <= np.log(len(min_gain_per_sample_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
-        + max_gain_per_sample_without_mistake * n_effective_part_samples
+        max_log_likelihood_gain_per_sample * n_effective_part_samples
+        <= np.log(len(sample_log_likelihood_gain_by_correction) / _MAX_FALSE_MISTAKE_PROBABILITY)
+        + allowed_log_likelihood_gain_per_sample * n_effective_part_samples
     ):
         return None
-    log10_ratio = max_gain_per_sample * n_effective_part_samples / np.log(10.0)
-    return f"each part of the flight is at least 10^{log10_ratio:.0f} times as likely with {correction_text}"
+    log10_likelihood_ratio = max_log_likelihood_gain_per_sample * n_effective_part_samples / np.log(10.0)
+    return (
+        f"each part of the flight is at least 10^{log10_likelihood_ratio:.0f} times as likely with "
+        f"{correction_text}"
+    )
 
 
 def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
@@ -489,22 +495,28 @@ def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[
     corrections = list(
         logs_with_one_mistake_corrected(samples, model.vehicle, surfaces_of_unknown_effect(model))
     )
-    likelihoods_and_sample_count = _log_likelihood_by_flight_part(samples, model)
+    likelihoods_and_sample_count = _sample_log_likelihood_by_flight_part(samples, model)
     if likelihoods_and_sample_count is None:
         return {}, 0.0
-    log_likelihood_by_part, n_effective_part_samples = likelihoods_and_sample_count
-    min_gain_per_sample_by_correction = {}
+    sample_log_likelihood_by_part, n_effective_part_samples = likelihoods_and_sample_count
+    sample_log_likelihood_gain_by_correction = {}
     for correction in corrections:
-        corrected_likelihoods = _log_likelihood_by_flight_part(correction.samples, model)
-        min_gain_per_sample_by_correction[correction.correction_text] = (
+        corrected_likelihoods_and_count = _sample_log_likelihood_by_flight_part(correction.samples, model)
+        sample_log_likelihood_gain_by_correction[correction.correction_text] = (
             -np.inf
-            if corrected_likelihoods is None
-            else float((corrected_likelihoods[0] + correction.log_jacobian - log_likelihood_by_part).min())
+            if corrected_likelihoods_and_count is None
+            else float(
+                (
+                    corrected_likelihoods_and_count[0]
+                    + correction.log_jacobian
+                    - sample_log_likelihood_by_part
+                ).min()
+            )
         )
-    return min_gain_per_sample_by_correction, n_effective_part_samples
+    return sample_log_likelihood_gain_by_correction, n_effective_part_samples
 
 
-def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:
+def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floats, float] | None:
     """Log likelihood of a sample of each part of the flight, as in `_GainBoundsOverFlight`, and the effective
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
@@ -537,10 +549,10 @@ def _log_likelihood_by_flight_part(samples: Samples, model: Model) -> tuple[Floa
 def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, float, float]:
     """Return the matrix that whitens the residual of a flight of a colour, (3, 3), as how many white samples
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
-    noise_inflation = model.noise_inflation(samples.noise_ma_coefficients)
+    noise_covariance_inflation = model.covariance_inflation_of_noise_model(samples.noise_ma_coefficients)
     noise_covariance_root = np.linalg.cholesky(
         model.with_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
-        / noise_inflation
+        / noise_covariance_inflation
     )
     log_noise_sd_product = float(
         np.log(np.diag(noise_covariance_root)).sum()
@@ -548,7 +560,7 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
     )
     return (
         np.linalg.inv(noise_covariance_root).T,
-        model.settings.effective_sample_share / noise_inflation,
+        model.settings.effective_sample_share / noise_covariance_inflation,
         log_noise_sd_product,
     )
 
@@ -597,21 +609,21 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         regressors, whitened_targets = _trim_and_gain_regression_data(
             part_rows, unexplained_rates, responses_and_contributions, whitening_matrix
         )
-        part_upper_bounds, squared_residuals = regression.coefficient_upper_bounds(
+        part_coefficient_upper_bounds, squared_residuals = regression.coefficient_upper_bounds(
             regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
         )
-        negated_part_lower_bounds, _ = regression.coefficient_upper_bounds(
+        negated_part_coefficient_lower_bounds, _ = regression.coefficient_upper_bounds(
             -regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share
         )
-        part_column_upper_bounds, _ = regression.coefficient_upper_bounds(
+        part_upper_bounds_with_columns, _ = regression.coefficient_upper_bounds(
             regressors, whitened_targets, effective_sample_share
         )
         gain_upper_bounds, gain_lower_bounds = (
-            np.maximum(gain_upper_bounds, part_upper_bounds[3:]),
-            np.minimum(gain_lower_bounds, -negated_part_lower_bounds[3:]),
+            np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:]),
+            np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:]),
         )
         column_gain_upper_bounds = np.maximum(
-            column_gain_upper_bounds, 1.0 + part_column_upper_bounds[3 + n_groups :]
+            column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
         )  # what the past does is taken off already
         noise_variance_scales.append(_noise_variance_scale(squared_residuals))
     return _GainBoundsOverFlight(
@@ -752,23 +764,23 @@ def _rate_column_names(model: Model) -> list[str]:
 def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str, float]:
     """For how long each column may stand still, s: a measured rate hardly, another thrice as long as in the
     flights of the model; a rate of which these are known, from a third of MIN_STILL_S on."""
-    fitted_time_s_by_column = (
+    fitted_unchanged_time_s_by_column = (
         model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
     )
-    usual_time_s_by_column = {
+    usual_unchanged_time_s_by_column = {
         column_name: 0.0 if column_name in _rate_column_names(model) else np.inf
         for column_name in samples.time_since_change_s
-    } | fitted_time_s_by_column
-    least_limit_s_by_column = {
+    } | fitted_unchanged_time_s_by_column
+    min_unchanged_time_limit_s_by_column = {
         column_name: MIN_STILL_S / 3.0
-        if column_name in fitted_time_s_by_column and column_name in _rate_column_names(model)
+        if column_name in fitted_unchanged_time_s_by_column and column_name in _rate_column_names(model)
         else MIN_STILL_S
-        for column_name in usual_time_s_by_column
+        for column_name in usual_unchanged_time_s_by_column
     }
     return {
         column_name: max(
-            least_limit_s_by_column[column_name],
-            _MAX_UNCHANGED_TIME_FACTOR * usual_time_s_by_column[column_name],
+            min_unchanged_time_limit_s_by_column[column_name],
+            _MAX_UNCHANGED_TIME_FACTOR * usual_unchanged_time_s_by_column[column_name],
         )
         for column_name in samples.time_since_change_s
     }
@@ -798,8 +810,10 @@ def credibility_entry(rows_by_reason: Mapping[str, Mask], is_credible: NDArray[n
     """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
     their shares."""
     share_of_reason = {reason: float(rows.mean()) for reason, rows in rows_by_reason.items()}
-    reasons_by_share = sorted(share_of_reason, key=lambda reason: -share_of_reason[reason])
+    reasons_largest_share_first = sorted(share_of_reason, key=lambda reason: -share_of_reason[reason])
     return {
         "share": float(is_credible.mean()) if len(is_credible) else 0.0,
-        "reasons": [{"says": reason, "share": share_of_reason[reason]} for reason in reasons_by_share],
+        "reasons": [
+            {"says": reason, "share": share_of_reason[reason]} for reason in reasons_largest_share_first
+        ],
     }

@@ -50,7 +50,7 @@ def test_a_gap_ends_what_is_known():
 
 def named_of(faulty, falls, since_s=0.0):
     names = np.where(faulty == 1, "left", "").astype(object)
-    return energy.withdraw_surfaces_after_engine_failure(
+    return energy.withdraw_surfaces_where_engine_may_have_failed(
         T_S, faulty, names, np.where(falls, -2.0, 0.5), -1.0, T_S - since_s
     )
 
@@ -77,11 +77,13 @@ def test_energy_that_has_fallen_since_the_evidence_began_names_no_surface_until_
     falls = (T_S >= 8.0) & (T_S < 10.0)
     climb = np.where(falls, -2.0, np.where(T_S < 16.0, -0.5, 0.5))  # neither without power, nor with it
     names = np.where(faulty == 1, "left", "").astype(object)
-    named = energy.withdraw_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S - 6.0)
+    named = energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S - 6.0)
     assert set(named[(T_S >= 12.0) & (T_S < 15.9)]) == {"unknown"}
     assert set(named[T_S > 16.05]) == {"left"}
     assert set(
-        energy.withdraw_surfaces_after_engine_failure(T_S, faulty, names, climb, -1.0, T_S)[T_S > 17.05]
+        energy.withdraw_surfaces_where_engine_may_have_failed(T_S, faulty, names, climb, -1.0, T_S)[
+            T_S > 17.05
+        ]
     ) == {"left"}
 
 
@@ -92,8 +94,8 @@ def test_a_name_uses_nothing_later(rows, data):
     names, t_s = np.where(faulty == 1, "left", "").astype(object), np.arange(len(rows)) * 0.5
     cut = data.draw(st.integers(1, len(rows)))
     since_s = np.maximum(t_s - 2.0, 0.0)
-    whole = energy.withdraw_surfaces_after_engine_failure(t_s, faulty, names, climb, -1.0, since_s)
-    short = energy.withdraw_surfaces_after_engine_failure(
+    whole = energy.withdraw_surfaces_where_engine_may_have_failed(t_s, faulty, names, climb, -1.0, since_s)
+    short = energy.withdraw_surfaces_where_engine_may_have_failed(
         t_s[:cut], faulty[:cut], names[:cut], climb[:cut], -1.0, since_s[:cut]
     )
     assert whole[:cut].tolist() == short.tolist()

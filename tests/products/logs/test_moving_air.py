@@ -189,13 +189,15 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
         model = plain.model_copy(update={"noise_models": [colour], "vehicle": vehicle})
         flight = replace(small.flight(model, 400, seed=5), noise_ma_coefficients=average)
         usable_flights = [fitting.FlightWithUsableRows(flight, np.ones(400, dtype=bool))]
-        found.append(fitting._with_inflated_noise(usable_flights, model).noise_inflation(average))
+        found.append(
+            fitting._with_inflated_noise(usable_flights, model).covariance_inflation_of_noise_model(average)
+        )
     assert found[0] >= 1.0
     assert found[1] == pytest.approx(factor * found[0])
     monkeypatch.setattr(fitting, "_normalized_squared_gain_error_and_rank", lambda *_: (1e6, 1))
-    assert fitting._with_inflated_noise(usable_flights, model).noise_inflation(average) == pytest.approx(
-        200.0 * factor
-    )
+    assert fitting._with_inflated_noise(usable_flights, model).covariance_inflation_of_noise_model(
+        average
+    ) == pytest.approx(200.0 * factor)
 
 
 @pytest.fixture(scope="module")
@@ -216,7 +218,8 @@ def test_columns_are_compared_in_white(moving, colour):
         for one in moving.noise_models
     ]
     likeliest = max(
-        zip(found, moving.noise_models, strict=True), key=lambda pair: pair[0].log_likelihood_by_part.mean()
+        zip(found, moving.noise_models, strict=True),
+        key=lambda pair: pair[0].sample_log_likelihood_by_part.mean(),
     )
     assert likeliest[0].min_noise_variance_scale == pytest.approx(1.0, abs=0.3)
     assert all(1.0 < gain < 1.6 for gain in likeliest[0].group_gain_upper_bounds)

@@ -208,7 +208,7 @@ def test_where_an_engine_may_have_failed_nothing_is_said_of_the_surface(monkeypa
         given.append(of[3:])
         return np.array(["left", UNKNOWN_OFFSET, "right"], dtype=object)
 
-    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_after_engine_failure", renamed)
+    monkeypatch.setattr(diagnose.energy, "withdraw_surfaces_where_engine_may_have_failed", renamed)
     model = SimpleNamespace(fitted_ranges=SimpleNamespace(unpowered_energy_height_rate_mps=-1.5))
     found = diagnose._withdraw_isolation_after_engine_failure(
         SimpleNamespace(energy_height_rate_mps="climb"), model, rows

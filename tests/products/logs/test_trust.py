@@ -423,7 +423,7 @@ def test_a_mistake_is_told_where_it_explains_every_part_more_than_chance(monkeyp
     likely = np.array([0.9, 0.3, 0.5, 0.7])
     parts = {"as it is": (np.zeros(4), counted), "short": None, "other": (likely, counted)}
     read = [CorrectedLog(*one) for one in (("A", "short"), ("B", "other", 0.1))]
-    monkeypatch.setattr(trust, "_log_likelihood_by_flight_part", lambda samples, _: parts[samples])
+    monkeypatch.setattr(trust, "_sample_log_likelihood_by_flight_part", lambda samples, _: parts[samples])
     monkeypatch.setattr(trust, "logs_with_one_mistake_corrected", lambda *_: read)
     told = None if says is None else f"each part of the flight is at least 10^{says} times as likely with B"
     assert trust._likelier_column_mistake_text("as it is", small.model()) == told

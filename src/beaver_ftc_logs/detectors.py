@@ -354,12 +354,12 @@ def diagnose_with_detector(detector_name: str, samples: Samples, model: Model) -
     check_log_fits_model(samples, model)
     if detector_name == BANK_OF_FILTERS_DETECTOR:
         return diagnose(samples, model)
-    samples_without_frozen_rates = with_rates_unknown_where_frozen_or_clipped(samples, model)
+    samples_without_frozen_or_clipped_rates = with_rates_unknown_where_frozen_or_clipped(samples, model)
     if detector_name in _FLIGHT_DETECTORS:
         return finalize_rows_at_log_stamps(
-            samples, model, _FLIGHT_DETECTORS[detector_name](samples_without_frozen_rates, model)
+            samples, model, _FLIGHT_DETECTORS[detector_name](samples_without_frozen_or_clipped_rates, model)
         )
     detector: Detector = made(DETECTORS, detector_name)
     return finalize_rows_at_log_stamps(
-        samples, model, run_loop_detector(detector, samples_without_frozen_rates, model)
+        samples, model, run_loop_detector(detector, samples_without_frozen_or_clipped_rates, model)
     )

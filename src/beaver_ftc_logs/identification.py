@@ -436,12 +436,12 @@ def collinear_regressors(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
     inflation_factors = variance_inflation_factors(regressors[:, 1:])
-    names_and_factors = sorted(
+    names_and_inflation_factors = sorted(
         zip(regressor_names(model), inflation_factors.tolist(), strict=True), key=lambda pair: -pair[1]
     )
     collinear_names_and_factors = [
         (name, factor if isfinite(factor) else None)
-        for name, factor in names_and_factors
+        for name, factor in names_and_inflation_factors
         if factor > _MIN_COLLINEAR_VARIANCE_INFLATION
     ]
     return [{"regressor": name, "inflation": factor} for name, factor in collinear_names_and_factors]

@@ -307,14 +307,14 @@ def check_command_units(
         rate_width_ratios.min() > 1.0 / _MAX_ALIKE_MOTION_FACTOR
         and rate_width_ratios.max() < _MAX_ALIKE_MOTION_FACTOR
     )
-    max_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
+    max_command_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
         1.0 if do_rates_move_alike else max(rate_width_ratios.max(), 1.0)
     )
     command_width_ratios = _range_widths(central_ranges(commands)) / np.maximum(
         _range_widths(fitted_ranges.command_ranges), MIN_DIVISOR
     )
     for surface, width_ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
-        if max_width_ratio < width_ratio < 1e4 or (
+        if max_command_width_ratio < width_ratio < 1e4 or (
             do_rates_move_alike and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
         ):
             raise BadInput(

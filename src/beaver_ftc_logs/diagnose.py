@@ -93,13 +93,13 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     """The diagnosis of each sample. Raises BadInput where the log's rate or unit is not the model's."""
     check_log_fits_model(samples, model)
     bank = build_hypothesis_bank(model)
-    samples_without_frozen_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
-    posterior, _, _ = hypothesis_posterior(samples_without_frozen_rates, model, bank)
+    samples_without_frozen_or_clipped_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
+    posterior, _, _ = hypothesis_posterior(samples_without_frozen_or_clipped_rates, model, bank)
     has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = diagnosis_rows_from_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
         rows = _withdraw_contradicted_isolation(
-            samples_without_frozen_rates, model, rows, model.settings.alarm_threshold
+            samples_without_frozen_or_clipped_rates, model, rows, model.settings.alarm_threshold
         )
     return finalize_rows_at_log_stamps(samples, model, rows, has_no_response)
 

@@ -8,6 +8,7 @@ import yaml
 
 from beaver_ftc_live.challenge import folders, grading
 from beaver_ftc_logs import sample_logs
+from samples import AT_NIGHT
 
 from .documents import files_of_pages, python_blocks, yaml_blocks
 from .installation import ROOT, Installation
@@ -23,7 +24,7 @@ def lay_out(line: str, folder: Path, installation: Installation) -> None:
     """Put into the folder what the command names."""
     for name, text in files_of_pages().items():
         if any(word in line for word in (name, f"{name.removesuffix('.py')}:")):
-            (folder / name).write_text(text)
+            (folder / name).write_text(text if AT_NIGHT else text.replace("runs: 200\n", "runs: 50\n"))
             for other in files_of_pages():  # the base of a sweep, the detector of a scenario
                 if other in text:
                     (folder / other).write_text(files_of_pages()[other])

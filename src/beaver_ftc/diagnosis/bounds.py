@@ -154,7 +154,7 @@ def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
 
 
 def fill_error_map(
-    error_map: np.void,
+    model_error_map: np.void,
     aircraft: Aircraft,
     one_surface_may_be_anywhere: bool,
     several_surfaces_may_be_anywhere: bool,
@@ -165,30 +165,30 @@ def fill_error_map(
     if declared_error_map is None:
         return
     n_travel_levels, n_time_rows = len(declared_error_map.travel_share), len(declared_error_map.until_s)
-    error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
-    error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
-    error_map["n_boxes"] = len(declared_error_map.boxes)
-    error_map["n_travel_levels"], error_map["n_time_rows"] = n_travel_levels, n_time_rows
-    error_map["until_s"][:n_time_rows] = declared_error_map.until_s
-    error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
-    travel_share_of_surface = np.array(
+    model_error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
+    model_error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
+    model_error_map["n_boxes"] = len(declared_error_map.boxes)
+    model_error_map["n_travel_levels"], model_error_map["n_time_rows"] = n_travel_levels, n_time_rows
+    model_error_map["until_s"][:n_time_rows] = declared_error_map.until_s
+    model_error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
+    mapped_travel_share_of_surface = np.array(
         [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
-    error_map["travel_low"] = travel_share_of_surface * [
+    model_error_map["travel_low"] = mapped_travel_share_of_surface * [
         travel.min_rad for travel in aircraft.travel.values()
     ]
-    error_map["travel_high"] = travel_share_of_surface * [
+    model_error_map["travel_high"] = mapped_travel_share_of_surface * [
         travel.max_rad for travel in aircraft.travel.values()
     ]
     for box_index, box in enumerate(declared_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
-        error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
-        error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
+        model_error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
+        model_error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
         errors_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        error_map["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
+        model_error_map["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
             errors_by_axis, axis=-1
         )
-        error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
+        model_error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
 
 
 @kernel
@@ -219,26 +219,26 @@ def slipstream_error_bound(declared_errors, y):
     dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_power_error_kw and by the
     density density_power_error_kw for all of it; and the share that dynamic pressure and airspeed are off.
     """
-    relative_pressure_error_bound = (
+    relative_qdyn_error_bound = (
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + QDYN, y[QDYN]) / y[QDYN]
     )
     relative_airspeed_error_bound = (
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + AIRSPEED, y[AIRSPEED])
         / y[AIRSPEED]
     )
-    max_reading_over_truth = 1.0 / (
-        (1.0 - min(relative_pressure_error_bound, 0.9)) * (1.0 - min(relative_airspeed_error_bound, 0.9))
+    max_qdyn_airspeed_reading_over_truth = 1.0 / (
+        (1.0 - min(relative_qdyn_error_bound, 0.9)) * (1.0 - min(relative_airspeed_error_bound, 0.9))
     )
-    relative_density_error_bound = (1.0 + relative_pressure_error_bound) / (
+    relative_density_error_bound = (1.0 + relative_qdyn_error_bound) / (
         1.0 - min(relative_airspeed_error_bound, 0.9)
     ) ** 2 - 1.0
     power_error_bound_kw = (
         declared_errors.engine_power_error_kw
         + declared_errors.density_power_error_kw * relative_density_error_bound * density_ratio(y)
     )
-    return max_reading_over_truth * KW_TO_DPT * power_error_bound_kw / (y[QDYN] * y[AIRSPEED]) + (
-        max_reading_over_truth - 1.0
-    ) * abs(y[DPT] - DPT_0)
+    return max_qdyn_airspeed_reading_over_truth * KW_TO_DPT * power_error_bound_kw / (
+        y[QDYN] * y[AIRSPEED]
+    ) + (max_qdyn_airspeed_reading_over_truth - 1.0) * abs(y[DPT] - DPT_0)
 
 
 @kernel
@@ -279,18 +279,18 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
     for i in range(3):
         term_magnitude_sum, max_term_magnitude_sum = 0.0, 0.0
         for k in range(moment_table.free_from[i], moment_table.surface_to[i]):
-            term_value_magnitude, s = abs(moment_table.value[k]), moment_table.surface[k]
+            term_coefficient_magnitude, s = abs(moment_table.value[k]), moment_table.surface[k]
             term_magnitude_sum += (
-                term_value_magnitude
+                term_coefficient_magnitude
                 * declared_errors.monomial_magnitude[moment_table.monomial[k]]
                 * (declared_errors.magnitude_u[s] if s >= 0 else 1.0)
             )
-            max_factor_magnitude = declared_errors.max_monomial_magnitude[moment_table.monomial[k]] * (
+            max_signal_factor_magnitude = declared_errors.max_monomial_magnitude[moment_table.monomial[k]] * (
                 declared_errors.max_magnitude_u[s] if s >= 0 else 1.0
             )
             max_term_magnitude_sum += (
-                term_value_magnitude + declared_errors.coefficient_tolerance[k]
-            ) * max_factor_magnitude
+                term_coefficient_magnitude + declared_errors.coefficient_tolerance[k]
+            ) * max_signal_factor_magnitude
         wing_area_times_length = design.S * (design.c if i == 1 else design.b)
         declared_errors.moment_magnitude[i] = (
             wing_area_times_length * measured_dynamic_pressure * term_magnitude_sum
@@ -335,12 +335,12 @@ def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
     moment_table = design.moments
     for k in range(moment_table.free_to[axis], moment_table.surface_to[axis]):
         if moment_table.surface[k] == s:
-            term_value_magnitude = abs(moment_table.value[k])
+            term_coefficient_magnitude = abs(moment_table.value[k])
             term_magnitude_sum_per_rad += (
-                term_value_magnitude * declared_errors.monomial_magnitude[moment_table.monomial[k]]
+                term_coefficient_magnitude * declared_errors.monomial_magnitude[moment_table.monomial[k]]
             )
             max_term_magnitude_sum_per_rad += (
-                term_value_magnitude + declared_errors.coefficient_tolerance[k]
+                term_coefficient_magnitude + declared_errors.coefficient_tolerance[k]
             ) * declared_errors.max_monomial_magnitude[moment_table.monomial[k]]
     wing_area_times_length = design.S * (design.c if axis == 1 else design.b)
     force_times_length = wing_area_times_length * declared_errors.magnitude_y[QDYN]
@@ -358,7 +358,7 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
     The declared bound is affine in |u_s|; this is its slope. Call `add_declared_error_bound` first: it fills
     the scratch fields.
     """
-    inertia_tolerance = declared_errors.inertia_tolerance
+    inertia_coefficient_tolerance = declared_errors.inertia_tolerance
     error_bounds_per_rad = declared_errors.acceleration_error_per_rad
     roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 0, s
@@ -370,19 +370,34 @@ def fill_acceleration_error_per_rad(declared_errors, design, s):
         declared_errors, design, 2, s
     )
     error_bounds_per_rad[0, s] = product_error_bound(
-        design.Pl, inertia_tolerance[2], roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad
+        design.Pl,
+        inertia_coefficient_tolerance[2],
+        roll_moment_magnitude_per_rad,
+        max_roll_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[0, s] += product_error_bound(
-        design.Pn, inertia_tolerance[3], yaw_moment_magnitude_per_rad, max_yaw_moment_magnitude_per_rad
+        design.Pn,
+        inertia_coefficient_tolerance[3],
+        yaw_moment_magnitude_per_rad,
+        max_yaw_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[1, s] = product_error_bound(
-        design.Qm, inertia_tolerance[7], pitch_moment_magnitude_per_rad, max_pitch_moment_magnitude_per_rad
+        design.Qm,
+        inertia_coefficient_tolerance[7],
+        pitch_moment_magnitude_per_rad,
+        max_pitch_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[2, s] = product_error_bound(
-        design.Rl, inertia_tolerance[10], roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad
+        design.Rl,
+        inertia_coefficient_tolerance[10],
+        roll_moment_magnitude_per_rad,
+        max_roll_moment_magnitude_per_rad,
     )
     error_bounds_per_rad[2, s] += product_error_bound(
-        design.Rn, inertia_tolerance[11], yaw_moment_magnitude_per_rad, max_yaw_moment_magnitude_per_rad
+        design.Rn,
+        inertia_coefficient_tolerance[11],
+        yaw_moment_magnitude_per_rad,
+        max_yaw_moment_magnitude_per_rad,
     )
 
 
@@ -405,92 +420,103 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
     )
     monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
     fill_moment_magnitudes_and_error_bounds(declared_errors, design)
-    inertia_tolerance = declared_errors.inertia_tolerance
+    inertia_coefficient_tolerance = declared_errors.inertia_tolerance
     eta_bar[0] += inertia_times_moment_error_bound(
-        declared_errors, 0, design.Pl, inertia_tolerance[2]
-    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Pn, inertia_tolerance[3])
+        declared_errors, 0, design.Pl, inertia_coefficient_tolerance[2]
+    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Pn, inertia_coefficient_tolerance[3])
     eta_bar[0] += inertia_times_rates_error_bound(
-        declared_errors, 0, 1, design.Ppq, inertia_tolerance[0]
-    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Pqr, inertia_tolerance[1])
+        declared_errors, 0, 1, design.Ppq, inertia_coefficient_tolerance[0]
+    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Pqr, inertia_coefficient_tolerance[1])
     eta_bar[1] += inertia_times_moment_error_bound(
-        declared_errors, 1, design.Qm, inertia_tolerance[7]
-    ) + inertia_times_rates_error_bound(declared_errors, 0, 2, design.Qpr, inertia_tolerance[5])
+        declared_errors, 1, design.Qm, inertia_coefficient_tolerance[7]
+    ) + inertia_times_rates_error_bound(declared_errors, 0, 2, design.Qpr, inertia_coefficient_tolerance[5])
     eta_bar[1] += inertia_times_rates_error_bound(
-        declared_errors, 0, 0, design.Qpp, inertia_tolerance[4]
-    ) + inertia_times_rates_error_bound(declared_errors, 2, 2, design.Qrr, inertia_tolerance[6])
+        declared_errors, 0, 0, design.Qpp, inertia_coefficient_tolerance[4]
+    ) + inertia_times_rates_error_bound(declared_errors, 2, 2, design.Qrr, inertia_coefficient_tolerance[6])
     eta_bar[2] += inertia_times_moment_error_bound(
-        declared_errors, 0, design.Rl, inertia_tolerance[10]
-    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Rn, inertia_tolerance[11])
+        declared_errors, 0, design.Rl, inertia_coefficient_tolerance[10]
+    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Rn, inertia_coefficient_tolerance[11])
     eta_bar[2] += inertia_times_rates_error_bound(
-        declared_errors, 0, 1, design.Rpq, inertia_tolerance[8]
-    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Rqr, inertia_tolerance[9])
+        declared_errors, 0, 1, design.Rpq, inertia_coefficient_tolerance[8]
+    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Rqr, inertia_coefficient_tolerance[9])
 
 
 @kernel
-def is_inside_box(error_map, box_index):
+def is_inside_box(model_error_map, box_index):
     """Whether the state is in this box of the map."""
     is_inside = True
-    for i in range(error_map.coordinates.size):
-        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
+    for i in range(model_error_map.coordinates.size):
+        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(model_error_map.coordinates[i]))
         is_inside = (
             is_inside
-            and error_map.box_low[box_index, i] - rounding_margin
-            <= error_map.coordinates[i]
-            <= error_map.box_high[box_index, i] + rounding_margin
+            and model_error_map.box_low[box_index, i] - rounding_margin
+            <= model_error_map.coordinates[i]
+            <= model_error_map.box_high[box_index, i] + rounding_margin
         )
     return is_inside
 
 
 @kernel
-def is_coordinate_outside_all_boxes(error_map, coordinate_index):
+def is_coordinate_outside_all_boxes(model_error_map, state_coordinate_index):
     """Whether this coordinate of the state is outside the range that the boxes span together."""
     map_low, map_high = np.inf, -np.inf
-    for box_index in range(error_map.n_boxes):
-        map_low = min(map_low, error_map.box_low[box_index, coordinate_index])
-        map_high = max(map_high, error_map.box_high[box_index, coordinate_index])
-    rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[coordinate_index]))
+    for box_index in range(model_error_map.n_boxes):
+        map_low = min(map_low, model_error_map.box_low[box_index, state_coordinate_index])
+        map_high = max(map_high, model_error_map.box_high[box_index, state_coordinate_index])
+    rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (
+        1.0 + abs(model_error_map.coordinates[state_coordinate_index])
+    )
     return (
-        not map_low - rounding_margin <= error_map.coordinates[coordinate_index] <= map_high + rounding_margin
+        not map_low - rounding_margin
+        <= model_error_map.coordinates[state_coordinate_index]
+        <= map_high + rounding_margin
     )
 
 
 @kernel
-def map_travel_level_index_for_positions(error_map, u):
+def map_travel_level_index_for_positions(model_error_map, u):
     """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
     travel may be used."""
-    if error_map.several_surfaces_may_be_anywhere:
-        return error_map.n_travel_levels - 1
+    if model_error_map.several_surfaces_may_be_anywhere:
+        return model_error_map.n_travel_levels - 1
     max_travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
-            travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
+            travel_limit = model_error_map.travel_high[s] if u[s] > 0.0 else model_error_map.travel_low[s]
             max_travel_share = max(max_travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return map_travel_level_index_for_share(error_map, max_travel_share)
+    return map_travel_level_index_for_share(model_error_map, max_travel_share)
 
 
 @kernel
-def map_travel_level_index_for_share(error_map, travel_share):
+def map_travel_level_index_for_share(model_error_map, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
-    last_level_index = error_map.n_travel_levels - 1
+    last_level_index = model_error_map.n_travel_levels - 1
     for j in range(last_level_index):
-        if travel_share <= error_map.travel_share_by_level[j]:
+        if travel_share <= model_error_map.travel_share_by_level[j]:
             return j
     return last_level_index
 
 
 @kernel
-def max_travel_share_used(error_map, s, position_interval, travel_share_before, n_instants):
+def max_travel_share_used(model_error_map, s, mean_position_interval, travel_share_before, n_instants):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
-    position_interval: (low, high) rad, of the mean position over the instants; travel_share_before: the share
-    at the start of the frame, where the surface may still be at the first instant.
+    mean_position_interval: (low, high) rad, of the mean position over the instants; travel_share_before: the
+    share at the start of the frame, where the surface may still be at the first instant.
     """
-    max_share_used, (position_low, position_high) = 0.0, position_interval
-    if position_high > 0.0:
-        max_share_used = position_high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
-    if position_low < 0.0:
+    max_share_used, (mean_position_low, mean_position_high) = 0.0, mean_position_interval
+    if mean_position_high > 0.0:
+        max_share_used = (
+            mean_position_high / model_error_map.travel_high[s]
+            if model_error_map.travel_high[s] != 0.0
+            else 1.0
+        )
+    if mean_position_low < 0.0:
         max_share_used = max(
-            max_share_used, position_low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0
+            max_share_used,
+            mean_position_low / model_error_map.travel_low[s]
+            if model_error_map.travel_low[s] != 0.0
+            else 1.0,
         )
     if n_instants > 1:
         max_share_used = max(
@@ -500,60 +526,62 @@ def max_travel_share_used(error_map, s, position_interval, travel_share_before, 
 
 
 @kernel
-def error_map_time_row_index(error_map):
+def error_map_time_row_index(model_error_map):
     """The row of the map for the present flight time, -1 if the map ends before."""
-    for time_row_index in range(error_map.n_time_rows):
-        if error_map.time_s <= error_map.until_s[time_row_index]:
+    for time_row_index in range(model_error_map.n_time_rows):
+        if model_error_map.time_s <= model_error_map.until_s[time_row_index]:
             return time_row_index
     return -1
 
 
 @kernel
-def look_up_map_error(error_map, x, y, u):
+def look_up_map_error(model_error_map, x, y, u):
     """Fill `coordinates` and `error_bound_now`, the mapped error at this state; x (3,) rad/s, y (4 +
     declared,), u (n,) rad."""
-    coordinates = error_map.coordinates
+    coordinates = model_error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    travel_level_index = map_travel_level_index_for_positions(error_map, u)
-    time_row_index = error_map_time_row_index(error_map)
-    for box_index in range(error_map.n_boxes if time_row_index >= 0 else 0):
-        if is_inside_box(error_map, box_index):
-            error_map.is_outside_all_boxes = 0
-            error_map.error_bound_now[:] = error_map.error_bound[
+    travel_level_index = map_travel_level_index_for_positions(model_error_map, u)
+    time_row_index = error_map_time_row_index(model_error_map)
+    for box_index in range(model_error_map.n_boxes if time_row_index >= 0 else 0):
+        if is_inside_box(model_error_map, box_index):
+            model_error_map.is_outside_all_boxes = 0
+            model_error_map.error_bound_now[:] = model_error_map.error_bound[
                 time_row_index, box_index, travel_level_index
             ]
-            error_map.box_index, error_map.time_row_index = box_index, time_row_index
-            error_map.engine_asymmetry_bound_now = error_map.engine_asymmetry_bound[box_index]
+            model_error_map.box_index, model_error_map.time_row_index = box_index, time_row_index
+            model_error_map.engine_asymmetry_bound_now = model_error_map.engine_asymmetry_bound[box_index]
             return
-    error_map.is_outside_all_boxes = 1
-    error_map.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
-    error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
+    model_error_map.is_outside_all_boxes = 1
+    model_error_map.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
+    model_error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
 
 
 @kernel
-def additional_error_at_travel_level(error_map, travel_level_index, axis):
+def additional_error_at_travel_level(model_error_map, travel_level_index, axis):
     """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
     travel, rad/s2."""
-    if error_map.is_outside_all_boxes:
+    if model_error_map.is_outside_all_boxes:
         return 0.0
     return max(
-        error_map.error_bound[error_map.time_row_index, error_map.box_index, travel_level_index, axis]
-        - error_map.error_bound_now[axis],
+        model_error_map.error_bound[
+            model_error_map.time_row_index, model_error_map.box_index, travel_level_index, axis
+        ]
+        - model_error_map.error_bound_now[axis],
         0.0,
     )
 
 
 @kernel
-def add_map_error(error_map, x, y, u, eta_bar):
+def add_map_error(model_error_map, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
-    look_up_map_error(error_map, x, y, u)
+    look_up_map_error(model_error_map, x, y, u)
     for i in range(3):
-        eta_bar[i] += error_map.error_bound_now[i]
+        eta_bar[i] += model_error_map.error_bound_now[i]
 
 
 @kernel
-def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth_rate_rad_s, eta_bar):
+def add_published_bound(x, design, inertia_coupling_share, constant_error_bound, earth_rate_rad_s, eta_bar):
     """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
@@ -564,17 +592,17 @@ def add_published_bound(x, design, inertia_coupling, constant_error_bound, earth
     sum_of_rate_magnitudes = abs(p) + abs(q) + abs(r)
     max_roll_coupling, max_pitch_coupling, max_yaw_coupling = max_rate_coupling_by_axis(design)
     eta_bar[0] += (
-        inertia_coupling[0] * abs(design.Pqr * q * r)
+        inertia_coupling_share[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_roll_coupling)
     )
     eta_bar[1] += (
-        inertia_coupling[1] * abs(design.Qpr * p * r)
+        inertia_coupling_share[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_pitch_coupling)
     )
     eta_bar[2] += (
-        inertia_coupling[2] * abs(design.Rpq * p * q)
+        inertia_coupling_share[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_yaw_coupling)
     )
@@ -637,13 +665,13 @@ def fill_uncertainty_bound_now(bound_record, design, measured, u):
                 fill_acceleration_error_per_rad(bound_record.declared_errors, design, s)
     if bound_record.model_error_map.n_boxes > 0:
         add_map_error(bound_record.model_error_map, x, y, u, bound_record.eta_bar_now)
-    max_rate_magnitudes = (
+    rates_for_published_bound = (
         bound_record.declared_errors.max_magnitude_x
         if bound_record.declared_errors.has_declared_errors
         else x
     )
     add_published_bound(
-        max_rate_magnitudes,
+        rates_for_published_bound,
         design,
         bound_record.inertia_coupling,
         bound_record.constant_error_bound,
@@ -658,7 +686,7 @@ POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds 
 
 
 @lru_cache(maxsize=64)
-def max_inertia_coefficient_errors(inertia_tolerance: float, mass: MassProperties) -> np.ndarray:
+def max_inertia_coefficient_errors(relative_inertia_tolerance: float, mass: MassProperties) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
     Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
@@ -668,7 +696,7 @@ def max_inertia_coefficient_errors(inertia_tolerance: float, mass: MassPropertie
     max_coefficient_changes = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
         changed_inertias = {
-            inertia_name: getattr(mass, inertia_name) * (1 + inertia_tolerance * sign)
+            inertia_name: getattr(mass, inertia_name) * (1 + relative_inertia_tolerance * sign)
             for inertia_name, sign in zip(_INERTIA_NAMES, signs, strict=True)
         }
         changed_coefficients = np.array(inertia_coefficients(replace(mass, **changed_inertias)))
@@ -754,7 +782,7 @@ def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", 
     )
 
 
-def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> tuple[float, ...]:
+def detection_poles_for_noise(sensors: SensorErrors, constant_error_bound_rad_s2: float) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of POLE_DESIGN_DELAYS_S, despite gyro
     noise.
 
@@ -764,7 +792,7 @@ def detection_poles_for_noise(sensors: SensorErrors, constant_rad_s2: float) -> 
     gyro_error_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
     return (
         tuple(
-            _detection_pole_per_s(delay_s, gyro_error_change_bound, constant_rad_s2)
+            _detection_pole_per_s(delay_s, gyro_error_change_bound, constant_error_bound_rad_s2)
             for delay_s in POLE_DESIGN_DELAYS_S
         )
         if gyro_error_change_bound > 0
@@ -799,23 +827,25 @@ def declared_errors_for_plugin(
         sensor_errors.each(quantity) for quantity in ("noise", "steady", "resolution")
     )
     coefficient_errors = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
-    gust_rad_s, gust_time_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
+    gust_rotation_std_rad_s, gust_correlation_time_s = declared.air.rotation(
+        float(y[2]), aircraft.geometry.span_m
+    )
     air_data_std = np.sqrt(reading_noise_std**2 + reading_bias**2 + reading_resolution**2 / 12.0)[
         _FIRST_AIR_DATA_SIGNAL_INDEX:
     ]
-    deflection_rad = declared.actuators.deflection_rad
+    deflection_error_rad = declared.actuators.deflection_rad
     return DeclaredErrors(
         noise=reading_noise_std,
         bias=reading_bias,
         resolution=reading_resolution,
         slope=sensor_errors.each("slope"),
-        gust_rad_s=gust_rad_s,
-        gust_time_s=gust_time_s,
+        gust_rad_s=gust_rotation_std_rad_s,
+        gust_time_s=gust_correlation_time_s,
         gust_effect=acceleration_per_air_rotation(DesignFunctions(design.copy()), y),
         coefficients=coefficient_errors,
         inertia=declared.inertia,
-        deflection_rad=deflection_rad,
-        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficient_errors, deflection_rad),
+        deflection_rad=deflection_error_rad,
+        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficient_errors, deflection_error_rad),
         bandwidth_rad_s=np.array([getattr(actuators, s).bandwidth_rad_s for s in aircraft.surfaces]),
         rate_limit_rad_s=np.radians([getattr(actuators, s).rate_limit_deg_s for s in aircraft.surfaces]),
     )
@@ -837,7 +867,7 @@ def model_error_std(
     u: np.ndarray,
     air_data_std: np.ndarray,
     coefficient_errors: np.ndarray,
-    deflection_rad: float,
+    deflection_error_rad: float,
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
@@ -850,7 +880,7 @@ def model_error_std(
         for air_data_error_vector in air_data_error_vectors
     ]
     acceleration_deviations += [
-        _design_acceleration_at_zero_rates(design, y, u + deflection_rad * e) - nominal_acceleration
+        _design_acceleration_at_zero_rates(design, y, u + deflection_error_rad * e) - nominal_acceleration
         for e in np.eye(u.size)
     ]
     for term_index in np.flatnonzero(coefficient_errors):
@@ -873,11 +903,11 @@ def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps
     vane."""
     cross_axis_share = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
-    vane_noise_std = [
+    vane_and_attitude_noise_std = [
         hypot(sensor_errors[vane].random, sensor_errors[attitude_angle].random)
         for vane, attitude_angle in vane_attitude_pairs
     ]
-    return np.array(vane_noise_std) + cross_axis_share * (
+    return np.array(vane_and_attitude_noise_std) + cross_axis_share * (
         sensor_errors["V"].random / airspeed_mps + sensor_errors["phi"].random
     )
 
@@ -912,12 +942,12 @@ def moment_term_tolerances(
     coefficient_magnitudes = np.abs(design["moments"]["value"][: len(aircraft.moments)])
     inertia_coefficient_errors = max_inertia_coefficient_errors(declared.inertia, mass)
     nominal_inertia_coefficients = np.abs(inertia_coefficients(mass))
-    own_axis_coefficient_indices = (2, 7, 11)  # what multiplies a moment there
+    own_axis_inertia_coefficient_indices = (2, 7, 11)  # what multiplies a moment there
     relative_term_tolerances = np.full(
         coefficient_magnitudes.shape,
         max(
             inertia_coefficient_errors[i] / nominal_inertia_coefficients[i]
-            for i in own_axis_coefficient_indices
+            for i in own_axis_inertia_coefficient_indices
         ),
     )
     relative_term_tolerances += [

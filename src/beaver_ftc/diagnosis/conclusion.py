@@ -208,16 +208,16 @@ def assess_surfaces(assessment, config, conclusion, types, layout, estimators, s
 def assess_surface_at_fault(assessment, types, layout, estimators, s):
     """Fill the assessment of surface s, which the diagnosis of every type accommodates."""
     surface = types.surface[s]
-    is_at_fault, accommodation_mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
+    can_be_at_fault, accommodation_mode = verdict.can_be_at_fault(surface), surface.accommodation.mode
     if accommodation_mode == SCALE_COMMAND:
         assessment.effectiveness[s] = verdict.remaining_effectiveness(types, layout, estimators, s)
     elif accommodation_mode == GIVE_UP:
         assessment.effectiveness[s], assessment.apply_immediately[s] = 0.0, 1
         assessment.deflection_offset[s] = (
-            surface.last_observation.healthy_position + verdict.deflection_error(surface, is_at_fault)
+            surface.last_observation.healthy_position + verdict.deflection_error(surface, can_be_at_fault)
         )
     elif accommodation_mode == SUBTRACT_OFFSET:
-        assessment.deflection_offset[s] = verdict.deflection_error(surface, is_at_fault)
+        assessment.deflection_offset[s] = verdict.deflection_error(surface, can_be_at_fault)
     elif accommodation_mode == WAIT_FOR_SURFACE:
         assessment.deflection_lag[s] = observed_deflection_error(surface)
         assessment.any_surface_lags = 1

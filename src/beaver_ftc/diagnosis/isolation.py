@@ -138,12 +138,14 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
         fie.max_abs_deflection_in_last_frame,
         max(abs(fie.theta_min), abs(fie.theta_max)),
     )
-    effect_error_bound, error_map, position_range = (
+    effect_error_bound, model_error_map, mean_position_interval = (
         fault_effect.error_bound[axis],
         bound_record.model_error_map,
         (fie.theta_min, fie.theta_max),
     )
-    map_level_index = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
+    travel_level_index = map_travel_level_index_at_position(
+        model_error_map, fie, mean_position_interval, n_substeps
+    )
     measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
     first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
@@ -152,25 +154,27 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
             - bound_record.surface_error_at_command[axis, s],
             0.0,
         )
-        extra_error_bound += bound_record.additional_error_by_travel_level[map_level_index, axis]
-        position_low, position_high = consistent_theta_interval(
+        extra_error_bound += bound_record.additional_error_by_travel_level[travel_level_index, axis]
+        mean_position_low, mean_position_high = consistent_theta_interval(
             measured_effect,
             bound_record.frame_innovation_bound[axis] + effect_error_bound + extra_error_bound,
             fault_effect.regressor[axis],
             fie.theta_min,
             fie.theta_max,
         )
-        if position_low > position_high:
+        if mean_position_low > mean_position_high:
             break
-        max_abs_deflection, position_range = (
-            min(max_abs_deflection, max(abs(position_low), abs(position_high))),
-            (position_low, position_high),
+        max_abs_deflection, mean_position_interval = (
+            min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high))),
+            (mean_position_low, mean_position_high),
         )
-        map_level_index = map_travel_level_index_at_position(error_map, fie, position_range, n_substeps)
+        travel_level_index = map_travel_level_index_at_position(
+            model_error_map, fie, mean_position_interval, n_substeps
+        )
     fie.max_abs_deflection_in_last_frame = max_abs_deflection
-    if error_map.one_surface_may_be_anywhere:
+    if model_error_map.one_surface_may_be_anywhere:
         fie.max_travel_share_in_last_frame = max_travel_share_used(
-            error_map, s, position_range, fie.max_travel_share_in_last_frame, n_substeps
+            model_error_map, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
         fault_effect.error_bound[i] += max(
@@ -178,22 +182,26 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
             - bound_record.surface_error_at_command[i, s],
             0.0,
         )
-        fault_effect.error_bound[i] += bound_record.additional_error_by_travel_level[map_level_index, i]
+        fault_effect.error_bound[i] += bound_record.additional_error_by_travel_level[travel_level_index, i]
 
 
 @kernel
-def map_travel_level_index_at_position(error_map, fie, position_range, n_substeps):
-    """The level of the error map that covers a surface at a mean position within `position_range`, (low,
-    high) rad.
+def map_travel_level_index_at_position(model_error_map, fie, mean_position_interval, n_substeps):
+    """The level of the error map that covers a surface whose mean position is in `mean_position_interval`,
+    (low, high) rad.
 
     It is 0 without a map.
     """
-    if not error_map.one_surface_may_be_anywhere:
+    if not model_error_map.one_surface_may_be_anywhere:
         return 0
     return map_travel_level_index_for_share(
-        error_map,
+        model_error_map,
         max_travel_share_used(
-            error_map, fie.surface, position_range, fie.max_travel_share_in_last_frame, n_substeps
+            model_error_map,
+            fie.surface,
+            mean_position_interval,
+            fie.max_travel_share_in_last_frame,
+            n_substeps,
         ),
     )
 
@@ -406,25 +414,31 @@ def configure_isolation(
 
 
 @kernel
-def fill_effect_of_hypothesis(hypothesis_kind, surface_index, G, Gu, acceleration_at_zero_theta, regressor):
+def fill_effect_of_hypothesis(
+    hypothesis_kind, surface_index, G, Gu_by_surface, acceleration_at_zero_theta, regressor
+):
     """Fill acceleration_at_zero_theta (3,) rad/s2 and regressor (3,) rad/s2 per unit of theta, for one fault.
 
-    G (3, n) rad/s2 per rad; Gu (3, n) rad/s2, the acceleration each commanded surface would give if healthy.
+    G (3, n) rad/s2 per rad; Gu_by_surface (3, n) rad/s2, the acceleration each commanded surface would give
+    if healthy.
     """
     for i in range(3):
         if hypothesis_kind == POSITION:
-            acceleration_at_zero_theta[i], regressor[i] = -Gu[i, surface_index], G[i, surface_index]
+            acceleration_at_zero_theta[i], regressor[i] = (
+                -Gu_by_surface[i, surface_index],
+                G[i, surface_index],
+            )
         else:
-            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu[i, surface_index]
+            acceleration_at_zero_theta[i], regressor[i] = 0.0, Gu_by_surface[i, surface_index]
 
 
 @kernel
 def update_fault_effect_and_reach(
-    isolation, fie, filter_bank, bound_record, config, G, Gu, effect_error_bound
+    isolation, fie, filter_bank, bound_record, config, G, Gu_by_surface, effect_error_bound
 ):
     """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
 
-    G (3, n) rad/s2 per rad; Gu (3, n) rad/s2: effect of each surface; means over the frame.
+    G (3, n) rad/s2 per rad; Gu_by_surface (3, n) rad/s2: effect of each surface; means over the frame.
     effect_error_bound (3, n) rad/s2: error of the mean if a fault changes within the frame.
     """
     fault_effect = fie.frame_mean_effect
@@ -432,7 +446,7 @@ def update_fault_effect_and_reach(
         fie.hypothesis_kind,
         fie.surface,
         G,
-        Gu,
+        Gu_by_surface,
         fault_effect.acceleration_at_zero_theta,
         fault_effect.regressor,
     )
@@ -447,13 +461,13 @@ def update_fault_effect_and_reach(
 
 @kernel
 def update_all_fault_effects_and_reach(
-    isolation, filter_bank, bound_record, config, is_detected, G, Gu, effect_error_bound
+    isolation, filter_bank, bound_record, config, is_detected, G, Gu_by_surface, effect_error_bound
 ):
     """Call `update_fault_effect_and_reach` for every estimator, if a later stage reads the effects."""
     if isolation.config.uses_reach_test or config.diagnoses_all_types or is_detected:
         for fie in isolation.estimator[: isolation.config.n_estimators]:
             update_fault_effect_and_reach(
-                isolation, fie, filter_bank, bound_record, config, G, Gu, effect_error_bound
+                isolation, fie, filter_bank, bound_record, config, G, Gu_by_surface, effect_error_bound
             )
 
 
@@ -595,16 +609,16 @@ def least_squares_step(fie, axis, residual, forgetting_factor, theta_min, theta_
     """
     noise_variance = fie.filtered_uncertainty_bound[axis] ** 2
     variance_times_regressor = fie.theta_variance[axis] * fie.filtered_regressor[axis]
-    innovation_variance = noise_variance + fie.filtered_regressor[axis] * variance_times_regressor
-    if innovation_variance <= 0.0:
+    residual_variance = noise_variance + fie.filtered_regressor[axis] * variance_times_regressor
+    if residual_variance <= 0.0:
         return 0.0
     previous_theta = fie.theta[axis]
     fie.theta[axis] = min(
-        max(previous_theta + variance_times_regressor / innovation_variance * residual, theta_min), theta_max
+        max(previous_theta + variance_times_regressor / residual_variance * residual, theta_min), theta_max
     )
     prior_variance = (fie.theta_max - fie.theta_min) ** 2 / 12.0
     fie.theta_variance[axis] = min(
-        fie.theta_variance[axis] * noise_variance / innovation_variance / forgetting_factor, prior_variance
+        fie.theta_variance[axis] * noise_variance / residual_variance / forgetting_factor, prior_variance
     )
     return fie.theta[axis] - previous_theta
 

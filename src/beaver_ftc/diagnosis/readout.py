@@ -173,8 +173,8 @@ class SensorMonitor(NamedTuple):
     """The sensor monitor. enabled; alarmed: an alarm of its own stands.
 
     worst_test_index: of the test with the largest ratio of residual to bound; worst_residual_bound_ratio:
-    that ratio; worst_test: the numbers of that test. isolated_sensor: index, -1 for none; is_replaced
-    (sensors,): whether a reading is not used any more. sample_time_s: between two samples.
+    that ratio; worst_test: the numbers of that test. isolated_sensor: index, -1 for none;
+    is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
     gust_change_bound_mps (poles,): bound on the changes of a gust through the filters. predicted_reading,
     reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm, manifold pressure
     inHg, which the engine's sensors should read.
@@ -186,7 +186,7 @@ class SensorMonitor(NamedTuple):
     worst_residual_bound_ratio: float
     worst_test: SensorTest
     isolated_sensor: int
-    is_replaced: np.ndarray
+    is_reading_unused: np.ndarray
     sample_time_s: float
     gust_change_bound_mps: np.ndarray
     predicted_reading: np.ndarray

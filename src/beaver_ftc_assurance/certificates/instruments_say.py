@@ -40,7 +40,7 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
         if value > limit:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
     sensor = monitor.isolated_sensor
-    if sensor >= 0 and monitor.is_replaced[sensor] and not failed:
+    if sensor >= 0 and monitor.is_reading_unused[sensor] and not failed:
         because = f"there was no reading of {sensor_words(SENSORS[sensor])}, and no column that says so"
         return {"missing": [sensor], "because": because}
     return {"because": BECAUSE_BETWEEN_ROWS}

@@ -550,10 +550,10 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test["filtered_bound"][FIRST_TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
     test["residual"][FIRST_TURN_TEST + 1] = size * limit + H * 0.5
-    watching.exclude_gyros_if_attitude_disagrees(monitor)
+    watching.rule_out_gyros_if_W_and_attitude_differ(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
-    watching.exclude_gyros_if_attitude_disagrees(monitor)
+    watching.rule_out_gyros_if_W_and_attitude_differ(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx(size * limit * kept)
     assert monitor["memory"]["filtered_turn_difference_bound"][1] == pytest.approx(

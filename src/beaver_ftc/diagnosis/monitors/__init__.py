@@ -59,10 +59,10 @@ def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
 
 def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
-    error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    declared_error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if (
-        error_map is None
-        or not error_map.knows_engines
+        declared_error_map is None
+        or not declared_error_map.knows_engines
         or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals)
     ):
         return
@@ -86,14 +86,14 @@ def disable_if_differential_thrust(engine_monitor, lever_offsets):
 
 
 @kernel
-def detect_engine_failure(engine_monitor, yawing_moment_bound, y):
-    """Whether an engine has failed, by these signals y or before; yawing_moment_bound: on |Cn - a CT|
+def detect_engine_failure(engine_monitor, engine_asymmetry_bound, y):
+    """Whether an engine has failed, by these signals y or before; engine_asymmetry_bound: on |Cn - a CT|
     here."""
     config = engine_monitor.config
     if config.n_engines > 0 and not engine_monitor.memory.disabled_by_differential_thrust:
         thrust_coefficient = y[config.thrust_index]
         if abs(
             y[config.yawing_moment_index] - config.mean_thrust_arm_over_span * thrust_coefficient
-        ) > yawing_moment_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust_coefficient):
+        ) > engine_asymmetry_bound + config.yawing_moment_tolerance_per_thrust * abs(thrust_coefficient):
             engine_monitor.output.engine_failed = 1
     return engine_monitor.output.engine_failed == 1

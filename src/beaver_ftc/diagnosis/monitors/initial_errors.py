@@ -201,7 +201,7 @@ def update_error_change_bounds(redundancy, initial_errors):
 @kernel
 def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     """Fill `max_effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
-    `coupling_effect_per_unit_error` (N_COUPLINGS,).
+    `coupling_effect_per_unit_error` (N_INITIAL_ERROR_COUPLINGS,).
 
     Both are taken at the sample before, from which this sample, readings (N_SENSORS,), is predicted.
     """

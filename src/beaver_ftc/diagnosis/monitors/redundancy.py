@@ -108,7 +108,7 @@ THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
 ALPHA_HYPOTHESIS, BETA_HYPOTHESIS, AIRSPEED_HYPOTHESIS, PHI_HYPOTHESIS, THETA_HYPOTHESIS = range(5)
-N_INITIAL_ERROR_HYPOTHESES, N_COUPLINGS = 5, 14
+N_INITIAL_ERROR_HYPOTHESES, N_INITIAL_ERROR_COUPLINGS = 5, 14
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
 # sample, the first for each second of it. residual_per_gust_speed: effect on the residual of 1 m/s that a
@@ -160,8 +160,8 @@ INITIAL_ERRORS_RECORD = record(
     max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
     filtered_max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
     # effects of a unit with their sign
-    coupling_effect_per_unit_error=N_COUPLINGS,
-    filtered_coupling_effect_per_unit_error=(N_COUPLINGS, N_POLES),
+    coupling_effect_per_unit_error=N_INITIAL_ERROR_COUPLINGS,
+    filtered_coupling_effect_per_unit_error=(N_INITIAL_ERROR_COUPLINGS, N_POLES),
     is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 
@@ -309,7 +309,7 @@ def min_frozen_samples(noise_std: float, resolution: float) -> int:
 
 
 def gust_speed_and_change_bounds(
-    turbulence: Dryden, airspeed_mps: float, sample_time_s: float
+    turbulence: Dryden, trim_airspeed_mps: float, sample_time_s: float
 ) -> tuple[float, np.ndarray]:
     """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
 
@@ -318,7 +318,7 @@ def gust_speed_and_change_bounds(
     """
     sigma_mps, velocity_walk_intensity = (
         turbulence.sigma_mps,
-        turbulence.velocity_walk(airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
+        turbulence.velocity_walk(trim_airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
     )
     variances_per_intensity_s = [
         sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S
@@ -374,12 +374,12 @@ POSITION_INTEGRATION_ERROR_FACTOR = 4.0 / 3.0
 @kernel
 def fill_quaternion(phi, theta, psi, out):
     """Fill out (4,): the rotation from body to level axes, scalar first; Euler angles rad."""
-    cos_phi, cos_theta, cos_psi = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
-    sin_phi, sin_theta, sin_psi = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
-    out[0] = cos_phi * cos_theta * cos_psi + sin_phi * sin_theta * sin_psi
-    out[1] = sin_phi * cos_theta * cos_psi - cos_phi * sin_theta * sin_psi
-    out[2] = cos_phi * sin_theta * cos_psi + sin_phi * cos_theta * sin_psi
-    out[3] = cos_phi * cos_theta * sin_psi - sin_phi * sin_theta * cos_psi
+    cos_half_phi, cos_half_theta, cos_half_psi = np.cos(phi / 2), np.cos(theta / 2), np.cos(psi / 2)
+    sin_half_phi, sin_half_theta, sin_half_psi = np.sin(phi / 2), np.sin(theta / 2), np.sin(psi / 2)
+    out[0] = cos_half_phi * cos_half_theta * cos_half_psi + sin_half_phi * sin_half_theta * sin_half_psi
+    out[1] = sin_half_phi * cos_half_theta * cos_half_psi - cos_half_phi * sin_half_theta * sin_half_psi
+    out[2] = cos_half_phi * sin_half_theta * cos_half_psi + sin_half_phi * cos_half_theta * sin_half_psi
+    out[3] = cos_half_phi * cos_half_theta * sin_half_psi - sin_half_phi * sin_half_theta * cos_half_psi
 
 
 @kernel
@@ -495,12 +495,12 @@ def predict_readings(redundancy):
     the present body axes.
     """
     memory, h = redundancy.memory, redundancy.config.sample_time_s
-    rates, predicted_reading, scratch_vector = (
+    previous_rates, predicted_reading, scratch_vector = (
         memory.previous_reading[:3],
         memory.predicted_reading,
         memory.scratch[:3],
     )
-    advance_quaternion(memory.previous_quaternion, rates, h, memory.predicted_quaternion)
+    advance_quaternion(memory.previous_quaternion, previous_rates, h, memory.predicted_quaternion)
     q0, q1, q2, q3 = (
         memory.predicted_quaternion[0],
         memory.predicted_quaternion[1],
@@ -510,15 +510,15 @@ def predict_readings(redundancy):
     predicted_reading[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     predicted_reading[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
     predicted_reading[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    theta, phi, body_velocity = (
+    previous_theta, previous_phi, body_velocity = (
         memory.previous_reading[THETA],
         memory.previous_reading[PHI],
         memory.body_velocity,
     )
     climb_rate = (
-        body_velocity[0] * np.sin(theta)
-        - body_velocity[1] * np.sin(phi) * np.cos(theta)
-        - body_velocity[2] * np.cos(phi) * np.cos(theta)
+        body_velocity[0] * np.sin(previous_theta)
+        - body_velocity[1] * np.sin(previous_phi) * np.cos(previous_theta)
+        - body_velocity[2] * np.cos(previous_phi) * np.cos(previous_theta)
     )
     predicted_reading[ALTITUDE] = memory.previous_reading[ALTITUDE] + h * climb_rate
     memory.earlier_acceleration_magnitudes[1], memory.earlier_acceleration_magnitudes[0] = (
@@ -534,8 +534,8 @@ def predict_readings(redundancy):
     memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
         scratch_vector[i] = body_velocity[i] + h * scratch_vector[i]
-    rotate_to_turned_axes(rates, h, scratch_vector, body_velocity)
-    rotate_to_turned_axes(rates, h, memory.body_acceleration, memory.previous_body_acceleration)
+    rotate_to_turned_axes(previous_rates, h, scratch_vector, body_velocity)
+    rotate_to_turned_axes(previous_rates, h, memory.body_acceleration, memory.previous_body_acceleration)
     predicted_speed = vector_length(body_velocity)
     predicted_reading[AIRSPEED] = predicted_speed
     predicted_reading[ALPHA] = np.arctan2(body_velocity[2], body_velocity[0])
@@ -890,20 +890,20 @@ def compare_duplicate_sensors(redundancy, readings, is_fresh):
     quantities, one of the two is broken."""
     memory = redundancy.memory
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
-        sensor_index, reading_index = (
+        duplicate_sensor_index, duplicated_reading_index = (
             DUPLICATE_SENSOR_INDEX[duplicate_index],
             DUPLICATED_READING_INDEX[duplicate_index],
         )
         test = redundancy.test[N_COMPUTED_TESTS + duplicate_index]
         test.residual_bound_ratio = 0.0
-        if is_fresh[sensor_index - N_IN_EQUATIONS]:
-            test.residual = readings[sensor_index] - readings[reading_index]
-            if PHI <= reading_index <= PSI:
+        if is_fresh[duplicate_sensor_index - N_IN_EQUATIONS]:
+            test.residual = readings[duplicate_sensor_index] - readings[duplicated_reading_index]
+            if PHI <= duplicated_reading_index <= PSI:
                 test.residual = wrapped(test.residual)
             test.filtered_bound[0] = (
                 DUPLICATE_TOLERANCE[duplicate_index]
-                + memory.reading_error_bound[sensor_index]
-                + memory.reading_error_bound[reading_index]
+                + memory.reading_error_bound[duplicate_sensor_index]
+                + memory.reading_error_bound[duplicated_reading_index]
                 + COMPARISON_ROUNDING
             )
             test.residual_bound_ratio = abs(test.residual) / test.filtered_bound[0]

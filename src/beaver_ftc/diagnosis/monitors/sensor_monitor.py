@@ -225,12 +225,12 @@ def flow_reading_jumped(monitor, readings):
         - 2.0 * previous_reading[flow_sensor]
         + memory.reading_two_samples_ago[flow_sensor]
     )
-    min_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
+    min_reading_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
     max_accelerometer_effect = INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_m_s2
     return (
         abs(alarm_test.residual)
         > alarm_test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
-        and abs(reading_second_difference) >= min_jump > max_accelerometer_effect
+        and abs(reading_second_difference) >= min_reading_jump > max_accelerometer_effect
     )
 
 
@@ -249,11 +249,11 @@ def sum_flow_residuals(monitor, readings):
             )
             continue
         memory.flow_residual_sum_since_alarm[j] += test.residual
-        hypothesis_index = initial_error_hypothesis_of_test(SPEED_TEST + j)
+        flow_hypothesis_index = initial_error_hypothesis_of_test(SPEED_TEST + j)
         memory.flow_bound_sum_since_alarm[j] += config.sample_time_s * test.bound_per_s
         memory.initial_error_effect_sum_since_alarm[j] += (
-            initial_errors.error_bound_at_alarm[hypothesis_index]
-            * initial_errors.max_effect_per_unit_error[hypothesis_index, SPEED_TEST + j]
+            initial_errors.error_bound_at_alarm[flow_hypothesis_index]
+            * initial_errors.max_effect_per_unit_error[flow_hypothesis_index, SPEED_TEST + j]
         )
         memory.min_flow_reading_since_alarm[j], memory.max_flow_reading_since_alarm[j] = (
             min(memory.min_flow_reading_since_alarm[j], flow_reading),
@@ -304,7 +304,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
     other_test_index = DENSITY_TEST if alarm_test_index == SPEED_TEST else CLIMB_TEST
     if alarm_test_index == BETA_FLOW_TEST or monitor.memory.tests_exceeded_since_alarm[other_test_index]:
         return False
-    hypothesis_index = initial_error_hypothesis_of_test(alarm_test_index)
+    flow_hypothesis_index = initial_error_hypothesis_of_test(alarm_test_index)
     for m in range(redundancy.config.filter_decay.size):
         expected_residual, speed_test = (
             abs(monitor.memory.filtered_climb_error_m[m]),
@@ -318,10 +318,10 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
                 * (abs(speed_test.filtered_residual[m]) - speed_test.filtered_bound[m])
                 / max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
             )
-            expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[hypothesis_index], 1.0)
+            expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[flow_hypothesis_index], 1.0)
         if expected_residual > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
             redundancy.test[other_test_index].filtered_bound[m]
-            + max_error_effect_at_alarm(initial_errors, hypothesis_index, other_test_index, m)
+            + max_error_effect_at_alarm(initial_errors, flow_hypothesis_index, other_test_index, m)
         ):
             return True
     return False
@@ -344,30 +344,32 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     )
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
-    velocity_along_flow, velocity_down, velocity_sideways = (
+    spurious_velocity_along_flow, spurious_velocity_down, spurious_velocity_sideways = (
         flow_residual_sum_since_alarm[0],
         V * np.cos(beta) * flow_residual_sum_since_alarm[1],
         V * flow_residual_sum_since_alarm[2],
     )
-    spurious_velocity, largest_component_magnitude, velocity_ahead = (
+    spurious_velocity, largest_component_magnitude, spurious_velocity_ahead = (
         memory.spurious_velocity,
         0.0,
-        np.cos(beta) * velocity_along_flow - np.sin(beta) * velocity_sideways,
+        np.cos(beta) * spurious_velocity_along_flow - np.sin(beta) * spurious_velocity_sideways,
     )
-    spurious_velocity[0] = np.cos(alpha) * velocity_ahead - np.sin(alpha) * velocity_down
-    spurious_velocity[1] = np.sin(beta) * velocity_along_flow + np.cos(beta) * velocity_sideways
-    spurious_velocity[2] = np.sin(alpha) * velocity_ahead + np.cos(alpha) * velocity_down
-    velocity_bound_if_healthy = flow_bound_sum_since_alarm[0] + V * (
+    spurious_velocity[0] = np.cos(alpha) * spurious_velocity_ahead - np.sin(alpha) * spurious_velocity_down
+    spurious_velocity[1] = (
+        np.sin(beta) * spurious_velocity_along_flow + np.cos(beta) * spurious_velocity_sideways
+    )
+    spurious_velocity[2] = np.sin(alpha) * spurious_velocity_ahead + np.cos(alpha) * spurious_velocity_down
+    spurious_velocity_bound_if_healthy = flow_bound_sum_since_alarm[0] + V * (
         flow_bound_sum_since_alarm[1] + flow_bound_sum_since_alarm[2]
     )  # m/s, of sound sensors
-    frozen_sensor = NO_SENSOR
+    frozen_accelerometer = NO_SENSOR
     for i in range(3):
         largest_component_magnitude = max(largest_component_magnitude, abs(spurious_velocity[i]))
-        frozen_sensor = AX + i if is_frozen(monitor, AX + i) else frozen_sensor
+        frozen_accelerometer = AX + i if is_frozen(monitor, AX + i) else frozen_accelerometer
     for i in range(AX, N_IN_EQUATIONS):
-        may_be_cause = frozen_sensor == i or (
-            frozen_sensor < 0
-            and abs(spurious_velocity[i - AX]) + velocity_bound_if_healthy
+        may_be_cause = frozen_accelerometer == i or (
+            frozen_accelerometer < 0
+            and abs(spurious_velocity[i - AX]) + spurious_velocity_bound_if_healthy
             >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest_component_magnitude
         )
         is_suspect[i] = may_be_cause and not gyro_explains_residual and not memory.is_cleared[i]
@@ -412,11 +414,11 @@ FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 
 @kernel
-def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, bound_record, dt, t):
+def monitor_sensors(monitor, prediction, measured, surface_conclusion, filter_bank, bound_record, dt, t):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
     filter_bank: detection filters, with the innovation of the elapsed frame, of dt s; bound_record: with the
-    bound on that innovation. conclusion: about the surfaces, so far.
+    bound on that innovation. surface_conclusion: about the surfaces, so far.
     """
     redundancy, initial_errors, readings = monitor.redundancy, monitor.initial_errors, measured.signal
     memory = monitor.memory
@@ -449,8 +451,8 @@ def monitor_sensors(monitor, prediction, measured, conclusion, filter_bank, boun
     if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
         advance_start_stage_and_widen_W_bound(monitor)
     if monitor.config.attitude_is_noisy:
-        exclude_gyros_if_attitude_disagrees(monitor)
-    isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_record, dt, t)
+        rule_out_gyros_if_W_and_attitude_differ(monitor)
+    isolate_broken_sensor(monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t)
     replace_isolated_readings(monitor, prediction, measured)
     mark_accelerometers_unusable(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
@@ -501,16 +503,16 @@ def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
     previous_W_bound[:] = W_bound
     previous_W[:] = W
     for i in range(3):
-        damping_acceleration, bound_growth_rate = 0.0, 0.0
+        damping_acceleration, W_bound_growth_by_damping = 0.0, 0.0
         for j in range(3):
             damping_acceleration += D[i, j] * previous_W[j]
-            bound_growth_rate += (-D[i, j] if i == j else abs(D[i, j])) * previous_W_bound[j]
+            W_bound_growth_by_damping += (-D[i, j] if i == j else abs(D[i, j])) * previous_W_bound[j]
         W[i] += dt * (innovation[i] - damping_acceleration)
-        W_bound[i] = max(previous_W_bound[i] + dt * (eta_bar[i] + bound_growth_rate), 0.0)
+        W_bound[i] = max(previous_W_bound[i] + dt * (eta_bar[i] + W_bound_growth_by_damping), 0.0)
 
 
 @kernel
-def exclude_gyros_if_attitude_disagrees(monitor):
+def rule_out_gyros_if_W_and_attitude_differ(monitor):
     """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
     Where the attitude is noisy, a surface is isolated only after that.
@@ -538,7 +540,7 @@ def exclude_gyros_if_attitude_disagrees(monitor):
 
 
 @kernel
-def isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_record, dt, t):
+def isolate_broken_sensor(monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
     output, memory = monitor.output, monitor.memory
     find_worst_test(monitor)
@@ -546,12 +548,12 @@ def isolate_broken_sensor(monitor, measured, conclusion, filter_bank, bound_reco
         return
     for i in range(N_SENSORS):
         if measured.missing[i] and output.isolated_sensor == NO_SENSOR:
-            raise_alarm(monitor, conclusion, t)
+            raise_alarm(monitor, surface_conclusion, t)
             isolate_sensor(monitor, i, t)
     if output.isolated_sensor != NO_SENSOR:
         return
     if output.worst_residual_bound_ratio > 1.0 and not output.alarmed:
-        raise_alarm(monitor, conclusion, t)
+        raise_alarm(monitor, surface_conclusion, t)
         output.alarm_test_index = output.worst_test_index
         store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
@@ -583,19 +585,20 @@ def find_worst_test(monitor):
 
 
 @kernel
-def raise_alarm(monitor, conclusion, t):
+def raise_alarm(monitor, surface_conclusion, t):
     """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
     and stays detected. Otherwise the conclusion about surfaces is void."""
     output = monitor.output
     if output.alarmed:
         return
     output.alarmed, output.alarmed_at_s = 1, t
-    if conclusion.detected and conclusion.detected_at_s < t - MIN_SURFACE_ALARM_LEAD_S:
+    if surface_conclusion.detected and surface_conclusion.detected_at_s < t - MIN_SURFACE_ALARM_LEAD_S:
         output.keeps_isolated_surface = 1
         return
-    if conclusion.detected:
-        output.alarmed_at_s = conclusion.detected_at_s  # the same fault, which the rates have shown first
-    output.surface_was_isolated_at_alarm = conclusion.isolated_estimator >= 0
+    if surface_conclusion.detected:
+        # the same fault, which the rates have shown first
+        output.alarmed_at_s = surface_conclusion.detected_at_s
+    output.surface_was_isolated_at_alarm = surface_conclusion.isolated_estimator >= 0
 
 
 @kernel
@@ -631,7 +634,7 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
             abs(apparent_gyro_error), abs(previous_apparent_gyro_error)
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
-        attitude_noise_bound = (  # of apparent_gyro_error, rad/s, by the attitude's noise
+        apparent_error_noise_bound = (  # of apparent_gyro_error, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
@@ -652,17 +655,21 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         )
         is_transient = (
             remaining_peak < MAX_REMAINING_TRANSIENT_SHARE * transient_peak
-            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * attitude_noise_bound
+            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * apparent_error_noise_bound
         )
-        innovation_fits = (
+        innovation_fits_gyro_jump = (
             abs(innovation[i] - jump_acceleration)
-            <= innovation_bound + jump_acceleration_tolerance + attitude_noise_bound / dt
+            <= innovation_bound + jump_acceleration_tolerance + apparent_error_noise_bound / dt
         )
-        W_follows_error = (
+        W_may_follow_error = (
             MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_gyro_error)
-            <= memory.gyro_error_estimate_bound[i] + abs(memory.gyro_error_estimate[i]) + attitude_noise_bound
+            <= memory.gyro_error_estimate_bound[i]
+            + abs(memory.gyro_error_estimate[i])
+            + apparent_error_noise_bound
         )
-        if not innovation_fits or (not dynamics_show_error and (is_transient or not W_follows_error)):
+        if not innovation_fits_gyro_jump or (
+            not dynamics_show_error and (is_transient or not W_may_follow_error)
+        ):
             memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
         elif dynamics_show_error:
             memory.gyro_error_verdict[i] = GYRO_ERROR_CONFIRMED
@@ -762,25 +769,25 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
     redundancy, memory = monitor.redundancy, monitor.memory
-    reading_index, reading_test_index = (
+    duplicated_reading_index, duplicated_reading_test_index = (
         DUPLICATED_READING_INDEX[duplicate_index],
         DUPLICATED_READING_TEST_INDEX[duplicate_index],
     )
     reading_test_record, duplicate_test_record = (
-        redundancy.test[reading_test_index],
+        redundancy.test[duplicated_reading_test_index],
         redundancy.test[N_COMPUTED_TESTS + duplicate_index],
     )
     # of the reading, if it is the broken one
     min_reading_error = abs(duplicate_test_record.residual) - duplicate_test_record.filtered_bound[0]
     error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_TEST_BOUND * max(
-        reading_test_record.filtered_bound[0], redundancy.memory.reading_error_bound[reading_index]
+        reading_test_record.filtered_bound[0], redundancy.memory.reading_error_bound[duplicated_reading_index]
     )
-    reading_is_frozen = is_frozen(monitor, reading_index)
+    reading_is_frozen = is_frozen(monitor, duplicated_reading_index)
     monitor.output.is_suspect[
         DUPLICATE_SENSOR_INDEX[duplicate_index]
-    ] = not memory.tests_exceeded_since_alarm[reading_test_index]
-    monitor.output.is_suspect[reading_index] = (
-        memory.tests_exceeded_since_alarm[reading_test_index] == 1
+    ] = not memory.tests_exceeded_since_alarm[duplicated_reading_test_index]
+    monitor.output.is_suspect[duplicated_reading_index] = (
+        memory.tests_exceeded_since_alarm[duplicated_reading_test_index] == 1
         or error_may_be_hidden
         or reading_is_frozen
         or not memory.has_duplicate_agreed[duplicate_index]
@@ -790,8 +797,8 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
 @kernel
 def is_only_exceeded_test(monitor, test_index):
     """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
-    for other_index in range(RPM_TEST):
-        if other_index != test_index and monitor.memory.tests_exceeded_since_alarm[other_index]:
+    for other_test_index in range(RPM_TEST):
+        if other_test_index != test_index and monitor.memory.tests_exceeded_since_alarm[other_test_index]:
             return False
     return True
 
@@ -875,7 +882,7 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
 def airspeed_error_would_exceed_own_test(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
     density_test, speed_test = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
-    max_reading_over_truth = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
+    max_airspeed_reading_over_truth = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
     for m in range(density_test.filtered_residual.size):
         unexplained_residual = abs(density_test.filtered_residual[m]) - max_error_effect_at_alarm(
             monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m
@@ -884,7 +891,7 @@ def airspeed_error_would_exceed_own_test(monitor):
         airspeed_error_mps = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained_residual
         if (
             airspeed_error_mps
-            > MAX_HIDDEN_ERROR_PER_TEST_BOUND * max_reading_over_truth * speed_test.filtered_bound[m]
+            > MAX_HIDDEN_ERROR_PER_TEST_BOUND * max_airspeed_reading_over_truth * speed_test.filtered_bound[m]
         ):
             return True
     return False
@@ -899,16 +906,16 @@ def suspect_gyros_and_attitude(monitor):
         memory.tests_exceeded_since_alarm,
         memory.gyro_error_verdict,
     )
-    n_exceeded_turn_tests, angle_is_frozen = 0, False
+    n_exceeded_turn_tests, any_angle_is_frozen = 0, False
     for i in range(3):
         n_exceeded_turn_tests += tests_exceeded_since_alarm[FIRST_TURN_TEST + i]
-        angle_is_frozen = angle_is_frozen or is_frozen(monitor, PHI + i)
+        any_angle_is_frozen = any_angle_is_frozen or is_frozen(monitor, PHI + i)
     for i in range(3):
         no_other_axis_exceeded = n_exceeded_turn_tests == 0 or (
             tests_exceeded_since_alarm[FIRST_TURN_TEST + i] == 1 and n_exceeded_turn_tests == 1
         )
         is_suspect[i] = (
-            no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not angle_is_frozen
+            no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not any_angle_is_frozen
         )
         angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
         may_be_only_this_angle = no_other_angle_test_exceeded(monitor, i) and (

@@ -115,7 +115,7 @@ def of_stages(fdi, kernel):
     return {
         "config": types["config"] if whole else fdi["config"], "types": types, "surfaces": types["surface"],
         **dict.fromkeys(("pair", "pair_record"), types["pair"]),
-        "conclusion": fdi["verdict"], "layout": fdi["layout"],
+        **dict.fromkeys(("conclusion", "surface_conclusion"), fdi["verdict"]), "layout": fdi["layout"],
         "isolation": fdi["isolation"], "estimators": fdi["isolation"]["estimator"],
         **dict.fromkeys(("bound", "bound_record"), fdi["bound"]),
         **dict.fromkeys(

@@ -21,10 +21,11 @@ _TEXTS = Path(__file__).with_suffix(".yaml")
 
 _HEAD = """# Properties of the aircraft
 
-Which JSBSim properties does the Beaver have, and what does each mean? This page is for readers who fly the
-model in JSBSim alone, or who read a property in Python. A scenario file needs no property names: its sections
-`faults`, `uncertainty` and `actuators` set the properties ([scenarios](reference/scenarios.md)). In JSBSim
-alone, set a property by its name: `fdm["failures/elevator/effectiveness"] = 0.6`.
+Which JSBSim properties does the Beaver have, and what does each of them mean? This page is for readers who
+fly the model in JSBSim alone, or who read a property in Python. A scenario file contains no property names:
+its sections `faults`, `uncertainty` and `actuators` set the properties
+([scenarios](reference/scenarios.md)). In JSBSim alone, set a property by its name:
+`fdm["failures/elevator/effectiveness"] = 0.6`.
 
 *Example.* This program flies 1 s and prints the position of the elevator in rad
 ([simulation](reference/python.md)):
@@ -51,8 +52,8 @@ How to read the tables:
   `lbsft` is pound-force times foot. A name without a unit is dimensionless.
 - The body axes are X forward, Y to the right and Z down. CX, CY and CZ are the coefficients of force along
   these axes. Cl, Cm and Cn are the coefficients of the moments in roll, pitch and yaw. A force is its
-  coefficient times the dynamic pressure times S. A moment in roll or yaw has the further factor b, in
-  pitch c.
+  coefficient times the dynamic pressure times S. For a moment in roll or yaw, the
+  product is also multiplied by b. For a moment in pitch, it is multiplied by c.
 - *Incidence* is the angle of attack, alpha.
 - Symbols of the motion: p, q and r are the body rates in rad/s, V is the airspeed in m/s, and rho is the
   density in kg/m3. A name with `dot` is a derivative with respect to time.
@@ -61,7 +62,7 @@ How to read the tables:
 - Symbols of the engine: n is the engine speed in rpm, pz is the manifold pressure in inHg, and P is the shaft
   power in kW.
 - The *command* is the position that the law or the pilot requires. The *demand* is the command, limited to
-  the stops. It is the input of the actuator.
+  the stops. The demand is the input of the actuator.
 - A key in brackets, such as [TM88], is an entry of the [sources](../REFERENCES.md)."""
 _TILTED = "aero/coefficient/CY_betadot-tilted"
 _PARTS = tuple(f"aero/coefficient/{force}_turn" for force in ("CX", "CY", "CZ"))
@@ -88,11 +89,12 @@ def as_markdown() -> str:
     return "\n\n".join([
         _HEAD,
         "## Properties that can be set",
-        "The defaults are the values after the model is loaded. With them, a surface follows its command.",
+        "The defaults are the values after the model is loaded. With these defaults, a surface follows its "
+        "command.",
         "*Table 1. Properties that can be set, with the value after the model is loaded.*",
         _table(("property", "default", "meaning"), _input_rows(inputs)),
         "## Properties that JSBSim computes",
-        "These properties can be read. JSBSim computes them in each step.",
+        "JSBSim computes these properties in each step. A program can read them.",
         "*Table 2. Properties that can be read.*",
         _table(("property", "meaning"), _output_rows(others)),
         "## Aerodynamic terms",

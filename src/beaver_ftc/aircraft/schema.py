@@ -503,9 +503,9 @@ class ErrorMapSection(Section):
 
 
 class StartSection(Section):
-    """Flight condition at the start, if the scenario has no other. Without an airspeed here, flights start at
-    45 m/s if `envelope` contains this airspeed, otherwise in the middle of the envelope. Without an altitude
-    here, they start at 1828.8 m."""
+    """Flight condition at the start, if the scenario does not state one. Without an airspeed here, flights
+    start at 45 m/s. If `envelope` does not contain this airspeed, they start in the middle of the envelope.
+    Without an altitude here, flights start at 1828.8 m."""
 
     airspeed_mps: Number | None = number(None, unit="m/s", says="true airspeed", gt=0, le=1000, examples=[45])
     altitude_m: Number | None = number(

@@ -75,8 +75,8 @@ class OfHandling(Section):
 
 
 class OfMargins(Section):
-    """Required stability margins of the loop of each surface. They must hold for the healthy aircraft, and
-    also after each loss for which the default law is designed. The margins are computed for each flight in
+    """Required stability margins of the loop of each surface. The margins must hold for the healthy aircraft,
+    and also after each loss for which the default law is designed. They are computed for each flight in
     `over`, and the scenario of each flight must meet them."""
 
     type: Literal["margins"]

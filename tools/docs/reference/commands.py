@@ -31,8 +31,8 @@ a text (`str`), a whole number (`int`), a number (`float`) or one of the listed 
 HOST:PORT or HZ. `list` means that you can give the option or value several times. The
 second column has the effect and the unit. In brackets it has:
 
-- `[default: X]`: the value if the option is left out. Without it, the text states the default, or the option
-  is off.
+- `[default: X]`: the value if the option is left out. If there is no such entry, the text states the default,
+  or the option is off.
 - `[1<=x<=60]`: the allowed range of the value, here from 1 to 60.
 - `[required]`: the command does not run without this value.
 

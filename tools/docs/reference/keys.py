@@ -460,7 +460,7 @@ KINDS = {
         "Which keys can a vehicle file have? The file states which column of a flight log contains which "
         "quantity ([prepare a log](how-to/flight-logs.md)). The command `identify --check` proposes a first "
         "version, and `beaver-ftc new NAME --log` writes an example. This page is for readers who "
-        "complete this version.",
+        "complete such a file.",
         "The log of a small flying wing is a table with the columns `time_ms`, `gyro_x`, `gyro_y`, `gyro_z`, "
         "`roll_cmd`, `pitch_cmd`, `roll_deg`, `pitch_deg`, `airspeed_kmh` and `altitude_m`. The wing has two "
         "elevons, `right` and `left`. Its file can be:",

@@ -8,7 +8,6 @@ import yaml
 
 from beaver_ftc_live.challenge import folders, grading
 from beaver_ftc_logs import sample_logs
-from samples import AT_NIGHT
 
 from .documents import files_of_pages, python_blocks, yaml_blocks
 from .installation import ROOT, Installation
@@ -20,11 +19,11 @@ reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
 """
 
 
-def lay_out(line: str, folder: Path, installation: Installation) -> None:
-    """Put into the folder what the command names."""
+def lay_out(line: str, folder: Path, installation: Installation, in_short: bool = False) -> None:
+    """Put into the folder what the command names; in_short: a sweep of 200 flights with 50 of them."""
     for name, text in files_of_pages().items():
         if any(word in line for word in (name, f"{name.removesuffix('.py')}:")):
-            (folder / name).write_text(text if AT_NIGHT else text.replace("runs: 200\n", "runs: 50\n"))
+            (folder / name).write_text(text.replace("runs: 200\n", "runs: 50\n") if in_short else text)
             for other in files_of_pages():  # the base of a sweep, the detector of a scenario
                 if other in text:
                     (folder / other).write_text(files_of_pages()[other])

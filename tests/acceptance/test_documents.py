@@ -5,6 +5,8 @@ import re
 
 import pytest
 
+from samples import AT_NIGHT
+
 from .documents import commands_of, shown
 from .exceptions import TABLE, tried
 from .installation import ROOT
@@ -45,7 +47,7 @@ def _succeeded(done):
 
 @pytest.mark.parametrize("line", TRIED)
 def test_command_of_the_pages(line, shell, installation, tmp_path):
-    lay_out(line, tmp_path, installation)
+    lay_out(line, tmp_path, installation, in_short=not AT_NIGHT)
     if "my-cusum" in line and "--plugin" not in line:
         assert shell(PLUGIN).returncode == 0
     done = shell(line)

@@ -57,6 +57,10 @@ def test_jumps_are_single_rows_that_come_back():
     assert signals.find_spike_rows(values).tolist() == [100, 700]
     assert not len(signals.find_spike_rows(noise()))
     assert signals.find_spike_rows(np.repeat(values[:800], 3))[:0].tolist() == []  # a jump is of one row
+    stairs = noise()
+    stairs[300] += 25.0
+    stairs[301:] += 50.0
+    assert not len(signals.find_spike_rows(stairs))  # up twice, and not back
     held = np.repeat(noise(), 3)
     held[[400, 2200]] -= 50.0
     assert signals.find_spike_rows(held).tolist() == [400, 2200]  # a log of more rows than readings

@@ -518,3 +518,9 @@ def test_the_power_of_a_group_s_effect_is_in_variances_of_correlated_noise(model
         weighted = np.einsum("ki,ij,kj->k", effect, np.linalg.inv(correlated.residual_covariance), effect)
         assert power[g] == pytest.approx(weighted.mean(), rel=1e-9)
         assert 0.0 < unexplained[g] <= power[g]
+
+
+def test_a_value_that_is_missing_is_not_outside():
+    values = np.array([1.9, 2.0, 3.0, 5.0, 5.1, np.nan])
+    within = trust._is_within_or_unknown(values, 2.0, 5.0)
+    assert within.tolist() == [False, True, True, True, False, True]

@@ -47,6 +47,8 @@ def test_three_draws_in_ten_are_at_an_end_of_the_range(plant, trim):
     inside = [number for number in numbers if 2.0 < number < 5.0]
     assert np.quantile(inside, [0.25, 0.5, 0.75]) == pytest.approx([2.75, 3.5, 4.25], abs=0.1)
     assert {one.around(1.0, 0.0), one.share(3.0, (2.0, 9.0), 0.0)} == {1.0, 3.0}
+    about = [one.around(2.0, 0.5) for _ in range(100)]
+    assert (min(about), max(about)) == (1.5, 2.5)
     shared = [one.share(3.0, (2.0, 9.0), 0.5) for _ in range(100)]
     assert (min(shared), max(shared)) == (2.5, 6.0)
 
@@ -103,6 +105,7 @@ def test_samples_are_the_same_to_the_bit_whichever_process_looks_at_the_states(n
         samples = sampling.sample(plant, where, level, 60, 3, properties, starts=6)
         regions = [sampling.Region(where, at) for at in (level, replace(level, airspeed_mps=48.0))]
         flown = sampling.fly_about_all(plant, regions, 3, properties)
+        assert flown.y[[0, 36], 2] == pytest.approx([level.airspeed_mps, 48.0], rel=1e-6)  # in their order
         plant.run()
         after = plant.read("accelerations/qdot-rad_sec2")
         found.append((*vars(samples).values(), *vars(flown).values(), after))

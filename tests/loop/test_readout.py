@@ -6,6 +6,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.readout import RECORDED_BLOCK_FIELDS
 from beaver_ftc.loop import Stepping, recorded_always, recorded_until_alarm
+from beaver_ftc.loop.readout import FrameReadout, Instruments
 from beaver_ftc.plant.instruments import SENSORS
 
 FLIGHT = {
@@ -112,3 +113,18 @@ def test_what_is_recorded_is_part_of_the_record(flown):
     for name, view in (always | early).items():
         assert np.shares_memory(view, record), name
         assert view.base is not None
+
+
+def test_the_duration_of_a_frame_is_not_rounded():
+    assert FrameReadout(np.array([(0.0125,)], [("dt", float)])[0]).dt_s == 0.0125
+
+
+def test_instruments_change_with_the_flight_that_they_read():
+    measured = np.dtype([("signal", float, 2), ("inertial", bool)])
+    frame = np.zeros(1, [("measured", measured)])[0]
+    instruments = Instruments(frame)
+    before = instruments.readings(), instruments.has_accelerometers
+    frame["measured"]["signal"], frame["measured"]["inertial"] = (0.1, -2.0), True
+    assert before == ([0.0, 0.0], False)
+    assert instruments.readings() == [0.1, -2.0]
+    assert instruments.has_accelerometers

@@ -249,6 +249,18 @@ def test_the_best_fit_is_the_constrained_least_squares_solution():
     assert misfit == pytest.approx(np.sum((eps - theta * Omega[:, :, 1]) ** 2) / 120)
 
 
+@pytest.mark.parametrize(("share", "theta"), [(-1.7, -1.0), (0.6, 0.0)])
+def test_a_surface_loses_no_more_than_all_its_effect_and_gains_none(share, theta):
+    """One surface acts, on roll: of eps = share Omega what the bound of theta leaves over is the misfit."""
+    Omega = np.zeros((3, 3))
+    Omega[0, 2] = 2.0
+    fit = SurfaceFit(1.0)
+    for _ in range(5):
+        fit.step(share * Omega[:, 2], Omega)
+    _, found, misfit = fit.fit_best_surface()
+    assert (found, misfit) == pytest.approx((theta, (2.0 * (share - theta)) ** 2 / 3.0))
+
+
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():
     """y[k] = 1.6 y[k-1] - 0.7 y[k-2] + b u[k-1]: predicted once learnt, an alarm when b halves."""
     rng = np.random.default_rng(5)

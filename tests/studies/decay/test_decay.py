@@ -184,6 +184,11 @@ def test_what_the_rows_say():
     assert re.split("  +", line)[3:8] == [
         "4", "25 (1 to 81)", "100 (40 to 100)", "50 (7 to 93)", "50 (7 to 93)",
     ]  # fmt: skip
+    for row in document["rows"]:
+        if row["error"] == TOGETHER:
+            counts = (1, 2) if row["factor"] == 1.0 else (3, 4)
+            row["false_alarm"]["count"], row["misnamed"]["count"] = counts
+    assert "1 of 4 flights have a false alarm and 2 of 4 a wrong name" in next(sentences(document))
 
 
 def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):

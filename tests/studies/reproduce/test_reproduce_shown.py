@@ -137,6 +137,13 @@ def test_what_never_happens_is_infinite(name):
     assert measures.MEASURES[name].of({"elevator": without_alarm()}, "elevator") == np.inf
 
 
+@pytest.mark.parametrize(("at_s", "apart_s"), [(9.25, 0.75), (11.5, 1.5)])
+def test_how_far_from_10_s_the_adaptive_law_takes_over_has_no_sign(at_s, apart_s):
+    supervisor = [SimpleNamespace(mode="degraded", time_s=3.0), SimpleNamespace(mode="adaptive", time_s=at_s)]
+    flight = SimpleNamespace(metrics=SimpleNamespace(supervisor=supervisor))
+    assert measures.activated_near_10({"elevator": flight}, "elevator") == apart_s
+
+
 def test_what_is_counted_without_an_alarm():
     never = {"elevator": without_alarm()}
     counted = ("detected", "isolated", "handled", "decisions", "order", "residuals", "generalised")

@@ -4,6 +4,7 @@ import pytest
 
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.builtin import is_sweep
+from beaver_ftc.scenario.schema import is_of_a_sweep
 from beaver_ftc.scenario.sweeps import SweepFile, Variation, load_sweep, load_sweep_text
 
 HEAD = "base: elevator-partial-loss\nruns: 3\n"
@@ -127,3 +128,10 @@ def test_a_sweep_that_is_not_there_or_too_large(tmp_path):
     (tmp_path / "large.yaml").write_text("#" * 4_000_001)
     with pytest.raises(ScenarioError, match="is too large"):
         load_sweep(tmp_path / "large.yaml")
+
+
+@pytest.mark.parametrize("key", ["runs", "vary", "set", "expect"])
+def test_a_base_and_what_becomes_of_it_make_a_sweep(key):
+    assert is_of_a_sweep({"base": "elevator-stuck", key: {}})
+    assert not is_of_a_sweep({key: {}})
+    assert not is_of_a_sweep({"base": "elevator-stuck", "name": key})

@@ -101,23 +101,23 @@ def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail
 def _excess_overdispersion(excesses_and_hours_by_flight: Sequence[PeaksAndHours]) -> float:
     """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
-    excess_sums, hours = (
+    excess_sum_by_flight, hours = (
         np.array([excesses.sum() for excesses, _ in excesses_and_hours_by_flight]),
         np.array([hours for _, hours in excesses_and_hours_by_flight]),
     )
-    n_peaks_over_level, hours_share = (
+    n_peaks_over_level, hours_share_by_flight = (
         sum(len(excesses) for excesses, _ in excesses_and_hours_by_flight),
         hours / hours.sum(),
     )
-    if len(excesses_and_hours_by_flight) < 2 or excess_sums.sum() <= 0.0:
+    if len(excesses_and_hours_by_flight) < 2 or excess_sum_by_flight.sum() <= 0.0:
         return 1.0
-    expected_excess_sums, mean_excess_of_peaks = (
-        hours_share * excess_sums.sum(),
-        excess_sums.sum() / n_peaks_over_level,
+    expected_excess_sum_by_flight, mean_excess_of_peaks = (
+        hours_share_by_flight * excess_sum_by_flight.sum(),
+        excess_sum_by_flight.sum() / n_peaks_over_level,
     )
-    squared_standardized_deviations = (excess_sums - expected_excess_sums) ** 2 / np.maximum(
-        2.0 * expected_excess_sums * mean_excess_of_peaks, MIN_DIVISOR
-    )
+    squared_standardized_deviations = (
+        excess_sum_by_flight - expected_excess_sum_by_flight
+    ) ** 2 / np.maximum(2.0 * expected_excess_sum_by_flight * mean_excess_of_peaks, MIN_DIVISOR)
     return max(float(squared_standardized_deviations.sum()) / (len(excesses_and_hours_by_flight) - 1), 1.0)
 
 
@@ -199,13 +199,13 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     """Shape, scale and posterior weight of each point of the grid."""
     from scipy.stats import genpareto
 
-    excess = np.array(tail.excess_over_level)
-    scale_grid = max(float(excess.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
+    excesses = np.array(tail.excess_over_level)
+    scale_grid = max(float(excesses.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
     pareto_shapes, pareto_scales = (
         grid.ravel() for grid in np.meshgrid(_PARETO_SHAPE_GRID, scale_grid, indexing="ij")
     )
     log_posterior = (
-        genpareto.logpdf(excess[:, None], pareto_shapes, scale=pareto_scales).sum(axis=0)
+        genpareto.logpdf(excesses[:, None], pareto_shapes, scale=pareto_scales).sum(axis=0)
         / tail.overdispersion
     )
     log_posterior -= 0.5 * (pareto_shapes / _PARETO_SHAPE_PRIOR_SD) ** 2

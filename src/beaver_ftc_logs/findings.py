@@ -258,16 +258,17 @@ def _conditional_fisher_information(whitened_responses: Floats, group_index: int
     n_samples, n_groups, n_axes = whitened_responses.shape
     trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
     other_responses = [
-        whitened_responses[:, other_group].reshape(-1, 1)
-        for other_group in range(n_groups)
-        if other_group != group_index
+        whitened_responses[:, other_group_index].reshape(-1, 1)
+        for other_group_index in range(n_groups)
+        if other_group_index != group_index
     ]
     nuisance_regressors = np.column_stack([trim_regressors, *other_responses])
-    target = whitened_responses[:, group_index].reshape(-1)
-    unexplained_target = (
-        target - nuisance_regressors @ np.linalg.lstsq(nuisance_regressors, target, rcond=None)[0]
+    group_response = whitened_responses[:, group_index].reshape(-1)
+    unexplained_group_response = (
+        group_response
+        - nuisance_regressors @ np.linalg.lstsq(nuisance_regressors, group_response, rcond=None)[0]
     )
-    return float(unexplained_target @ unexplained_target) / n_samples
+    return float(unexplained_group_response @ unexplained_group_response) / n_samples
 
 
 def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: int, dt_s: float) -> float:
@@ -275,12 +276,12 @@ def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: 
     settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group_index)]
     if not len(transition_shares):
         return float("inf")
-    change_probability = (
+    change_probability_per_sample = (
         settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(transition_shares))
     )
     return float(
         np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
-        - np.log(change_probability)
+        - np.log(change_probability_per_sample)
     )
 
 
@@ -301,14 +302,14 @@ def _smallest_detectable_losses(
 def _group_pair_cosine_entries(whitened_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pair_entries = []
-    for first_group, second_group in combinations(range(len(model.groups)), 2):
+    for first_group_index, second_group_index in combinations(range(len(model.groups)), 2):
         first_response, second_response = (
-            whitened_responses[:, first_group].ravel(),
-            whitened_responses[:, second_group].ravel(),
+            whitened_responses[:, first_group_index].ravel(),
+            whitened_responses[:, second_group_index].ravel(),
         )
         norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
         cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)
-        surfaces = [model.groups[first_group], model.groups[second_group]]
+        surfaces = [model.groups[first_group_index], model.groups[second_group_index]]
         pair_entries.append(
             {
                 "surfaces": surfaces,

@@ -21,16 +21,16 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
     Where the log has more rows than samples, each row is compared with the label of the last sample up to its
     time. Surfaces without a label are left out.
     """
-    is_labelled = np.isfinite(samples.labels).any(axis=0)
-    if not is_labelled.any():
+    is_surface_labelled = np.isfinite(samples.labels).any(axis=0)
+    if not is_surface_labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
     sample_of_row = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
     labelled_fields = {
-        name: getattr(rows, name).compress(is_labelled, axis=1)
+        name: getattr(rows, name).compress(is_surface_labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(rows, **labelled_fields), samples.labels[sample_of_row].compress(is_labelled, axis=1)
+        replace(rows, **labelled_fields), samples.labels[sample_of_row].compress(is_surface_labelled, axis=1)
     )
 
 
@@ -41,16 +41,19 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     estimate is nearest to the same setting as the label. side: share of rows in which the same surfaces are
     below 1. Without such a row all figures are None.
     """
-    is_known = np.isfinite(labels).all(axis=1)
-    if not is_known.any():
-        names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
-        return {"rows": 0, "settings": [], **dict.fromkeys(names)}
-    true_effectiveness, estimated_effectiveness = labels[is_known], rows.effectiveness[is_known]
+    is_every_label_known = np.isfinite(labels).all(axis=1)
+    if not is_every_label_known.any():
+        score_names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
+        return {"rows": 0, "settings": [], **dict.fromkeys(score_names)}
+    true_effectiveness, estimated_effectiveness = (
+        labels[is_every_label_known],
+        rows.effectiveness[is_every_label_known],
+    )
     label_settings, n_rows_of_setting = np.unique(true_effectiveness, axis=0, return_counts=True)
     frequent_settings = label_settings[n_rows_of_setting >= 0.005 * len(true_effectiveness)]
     is_truly_faulty = (true_effectiveness < 1.0).any(axis=1)
     return {
-        "rows": int(is_known.sum()),
+        "rows": int(is_every_label_known.sum()),
         "settings": frequent_settings.tolist(),
         "classes": float(
             np.mean(
@@ -58,13 +61,13 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
                 == nearest_label_setting_index(true_effectiveness, frequent_settings)
             )
         ),
-        "healthy_or_faulty": float(np.mean((rows.faulty[is_known] == 1) == is_truly_faulty)),
+        "healthy_or_faulty": float(np.mean((rows.faulty[is_every_label_known] == 1) == is_truly_faulty)),
         "side": float(np.mean(((estimated_effectiveness < 1.0) == (true_effectiveness < 1.0)).all(axis=1))),
         "mean_error": float(np.abs(estimated_effectiveness - true_effectiveness).mean()),
         "held_by_bounds": float(
             np.mean(
-                (rows.effectiveness_low[is_known] <= true_effectiveness)
-                & (true_effectiveness <= rows.effectiveness_high[is_known])
+                (rows.effectiveness_low[is_every_label_known] <= true_effectiveness)
+                & (true_effectiveness <= rows.effectiveness_high[is_every_label_known])
             )
         ),
     }
@@ -91,29 +94,29 @@ def score_against_failures(
         }
     )
     is_before_failure = onset.is_false(rows.t_s)
-    alarm_rows_after = np.flatnonzero(~is_before_failure & (rows.faulty == 1))
-    detected = bool(alarm_rows_after.size)
-    name_shares = _name_shares_after_failure(rows, alarm_rows_after)
+    alarm_rows_after_failure = np.flatnonzero(~is_before_failure & (rows.faulty == 1))
+    detected = bool(alarm_rows_after_failure.size)
+    name_shares = _name_shares_after_failure(rows, alarm_rows_after_failure)
     return {
         "failure": "+".join(failed_surfaces) or None,
         "failure_s": onset.at_s,
         "healthy_s": float(rows.t_s[is_before_failure][-1] - rows.t_s[0]) if is_before_failure.any() else 0.0,
         "false_alarms": int(np.sum(np.diff(rows.faulty[is_before_failure], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": onset.delay_s(float(rows.t_s[alarm_rows_after[0]])) if detected else None,
+        "delay_s": onset.delay_s(float(rows.t_s[alarm_rows_after_failure[0]])) if detected else None,
         "named": name_shares,
         "right_group": _is_right_group(name_shares, failed_surfaces, groups),
     }
 
 
-def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after: np.ndarray) -> dict[str, float]:
+def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after_failure: np.ndarray) -> dict[str, float]:
     """Return the names after the failure, as shares of the rows with an alarm."""
     names, n_rows_of_name = np.unique(
-        rows.isolated_surfaces[alarm_rows_after].astype(str), return_counts=True
+        rows.isolated_surfaces[alarm_rows_after_failure].astype(str), return_counts=True
     )
     return {
         str(name): float(share)
-        for name, share in zip(names, n_rows_of_name / max(len(alarm_rows_after), 1), strict=True)
+        for name, share in zip(names, n_rows_of_name / max(len(alarm_rows_after_failure), 1), strict=True)
     }
 
 
@@ -129,10 +132,12 @@ def _is_right_group(
         for name in group
         if name in failed_surfaces or name.endswith(name_endings)
     }
-    share_of_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
-    if not failed_group_indices or not share_of_name:
+    share_of_known_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
+    if not failed_group_indices or not share_of_known_name:
         return None
-    most_frequent_surfaces = set(max(share_of_name, key=lambda name: share_of_name[name]).split("+"))
+    most_frequent_surfaces = set(
+        max(share_of_known_name, key=lambda name: share_of_known_name[name]).split("+")
+    )
     named_group_indices = {
         group_index for group_index, group in enumerate(groups) if most_frequent_surfaces & set(group)
     }

@@ -22,7 +22,7 @@ LOSS_FAULT_TYPE = "loss_of_effectiveness"
 EFFECTIVENESS_BOUND_WINDOW_S = 1.0
 _LOSS_ROUNDING, _BOUND_ROUNDING_RAD_S2 = 1e-9, 1e-12
 _EFFECTIVE_SAMPLE_SHARE = 0.4
-_DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
+_ERROR_DECLARING_SCENARIO_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class ReplayedVerdicts:
 def declared_errors(scenario: Any) -> dict[str, Any]:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     scenario_values = scenario.model_dump(mode="json", exclude_unset=True)
-    return {key: scenario_values[key] for key in _DECLARING_SCENARIO_KEYS if key in scenario_values}
+    return {key: scenario_values[key] for key in _ERROR_DECLARING_SCENARIO_KEYS if key in scenario_values}
 
 
 def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
@@ -68,10 +68,10 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
         innovation[:, :, None], innovation_bound[:, :, None], expected_effect
     )
     theta_bounds[0][0], theta_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
-    memory_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
+    window_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
     effectiveness_low, effectiveness_high = (
-        1.0 + _sliding_maximum(theta_bounds[0], memory_samples),
-        1.0 - _sliding_maximum(-theta_bounds[1], memory_samples),
+        1.0 + _sliding_maximum(theta_bounds[0], window_samples),
+        1.0 - _sliding_maximum(-theta_bounds[1], window_samples),
     )
     is_unexplained = effectiveness_low > effectiveness_high
     command_gain_upper_bounds = _command_gain_upper_bounds(innovation, expected_effect)

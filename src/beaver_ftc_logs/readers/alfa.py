@@ -45,10 +45,10 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 def _load_column_and_failure_topics() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
-    topic_document: dict[str, dict[str, Any]] = json.loads(
+    columns_and_failures: dict[str, dict[str, Any]] = json.loads(
         Path(__file__).with_name("alfa.json").read_text("utf-8")
     )
-    return topic_document
+    return columns_and_failures
 
 
 def read(path: Path) -> RecordedFlight:

@@ -36,7 +36,7 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
 
 def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, ValuesByField]:
     """The numeric fields of all messages with a stamp, by message and instance: those of its first."""
-    values_of_message: dict[str, ValuesByField] = {}
+    values_by_message_and_field: dict[str, ValuesByField] = {}
     with (
         refuse_log_unreadable_by_package(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"),
         _silence_stderr(),
@@ -53,21 +53,21 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
                 if isinstance(value, int | float)
             }
             if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numeric_fields:
-                name = _message_name(message.get_type(), fields)
-                for field, values in values_of_message.setdefault(
-                    name, _empty_arrays_of_wanted_fields(name, numeric_fields, wanted_columns)
+                message_name = _message_name(message.get_type(), fields)
+                for field, values in values_by_message_and_field.setdefault(
+                    message_name, _empty_arrays_of_wanted_fields(message_name, numeric_fields, wanted_columns)
                 ).items():
                     values.append(numeric_fields.get(field, nan))
-    return values_of_message
+    return values_by_message_and_field
 
 
 def _empty_arrays_of_wanted_fields(
-    name: str, numeric_fields: ValuesByField, wanted_columns: Collection[str] | None
+    message_name: str, numeric_fields: ValuesByField, wanted_columns: Collection[str] | None
 ) -> ValuesByField:
     kept_fields = [
         field
         for field in numeric_fields
-        if wanted_columns is None or field == _TIME_FIELD or f"{name}.{field}" in wanted_columns
+        if wanted_columns is None or field == _TIME_FIELD or f"{message_name}.{field}" in wanted_columns
     ]
     return {field: array("d") for field in kept_fields}
 

@@ -1,6 +1,7 @@
 """Who is let in, and what each may ask."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from starlette.datastructures import Headers
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.gate import BURST, MESSAGES_PER_S, TOKENS_OPEN, Gate, Seat, as_name
+from beaver_ftc_live.page.server import Pages
 
 
 def token_of(address):
@@ -200,3 +202,16 @@ def test_browsers_leave_the_port_of_http_out():
 def test_only_its_own_page_by_its_own_name(host, origin, own):
     headers = {"host": host} | ({"origin": origin} if origin else {})
     assert Gate(8000).is_own_page(Headers(headers)) is own
+
+
+def test_the_pilot_is_told_of_the_class_and_a_guest_of_its_own_rights():
+    def seat(number):
+        return SimpleNamespace(number=number, pages=0, shown=lambda: {"rights": number})
+
+    pages = Pages()
+    told = [pages.add(None, seat(number)) for number in (0, 3, 5)]
+    pages.tell_class(SimpleNamespace(guests=[], roster=lambda: {"class": "none"}))
+    pages.tell_class(SimpleNamespace(guests=[3, 5], roster=lambda: {"class": 2}))
+    assert [[json.loads(one) for one in page._waiting] for page in told] == [
+        [{"class": 2}], [{"rights": 3}], [{"rights": 5}],
+    ]  # fmt: skip

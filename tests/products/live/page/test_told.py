@@ -328,3 +328,13 @@ def test_another_aircraft_has_none_of_the_errors_that_the_scenario_gives_its_own
     other = live_command._with("beaver-split", healthy)
     assert (other.airframe.name, other.duration_s) == ("beaver-split", bf.load(healthy).duration_s)
     assert other.uncertainty == bf.load({"name": "x"}).uncertainty
+
+
+def test_a_terminal_is_told_whose_link_is_whose(capsys):
+    live_command._point_to("http://a", [], "")
+    assert capsys.readouterr().out == "live: http://a\nOpen it in a browser; Ctrl-C ends the flight.\n"
+    live_command._point_to("http://a", ["http://b", "http://c"], "anyone\n")
+    assert capsys.readouterr().out.splitlines() == [
+        "live: http://a", "guest 1: http://b", "guest 2: http://c", "anyone",
+        "Open the first in a browser, give a guest one of the others; Ctrl-C ends the flight.",
+    ]  # fmt: skip

@@ -1,6 +1,7 @@
 """The closed loop: one suite over every built-in scenario, and what must not depend on how it is run."""
 
 import dataclasses
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import assembly, frame, loop, outcome
-from beaver_ftc.loop.loop import fly
+from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.verdict import verdict_lines
@@ -293,3 +294,18 @@ def test_from_the_first_fault_of_an_instrument_on_all_of_them_are_read(
     flight.declare(["fault"])
     assert declared == [("effectors", ["fault"]), ("sensors", ["fault"])]
     assert calls == done
+
+
+@pytest.mark.parametrize("turbulent", [True, False])
+def test_the_air_is_turned_before_each_of_jsbsims_frames(turbulent):
+    done = []
+    cockpit = SimpleNamespace(native=False, **{
+        name: partial(done.append, name) for name in ("write", "turn_air", "read")
+    })  # fmt: skip
+    loop = SimpleNamespace(
+        _inside=0, _turbulent=turbulent, cockpit=cockpit, frames=7, _look=done.append,
+        plant=SimpleNamespace(run=partial(done.append, "run")),
+    )  # fmt: skip
+    Loop.fly_inside(loop, 2)
+    assert done == ["write", *[*(["turn_air"] if turbulent else []), "run", "read", 7] * 2]
+    assert loop._inside == 2

@@ -244,5 +244,9 @@ def test_the_model_is_what_the_surfaces_are_expected_to_give():
     means = diagnosis.innovation()[2]
     assert (f.shape, G.shape) == ((3,), (3, 4))
     assert G * flown.samples[49][2] == pytest.approx(means, rel=0.05, abs=1e-3)
+    kept = f.tolist(), G.tolist()
+    diagnosis.step(*flown.samples[50])
+    assert (f.tolist(), G.tolist()) == kept  # what was given stays as it was
+    assert all((now != then).any() for now, then in zip(diagnosis.model(), (f, G), strict=True))
     model = bf.linearise(flown.scenario)
     assert G[1, 1] == pytest.approx(model.B[model.states.index("q"), 1], rel=0.05)

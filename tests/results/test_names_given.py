@@ -57,6 +57,10 @@ def test_nothing_named_and_no_fault_are_not_premature():
     assert isolation(Fault(), isolated=None, isolation_time_s=None)["premature"] is None
     said = isolation(isolation_time_s=3.0)
     assert (said["premature"], said["correct"]) == (False, False)
+    of_type = [
+        isolation(isolation_time_s=3.0, isolation_type=kind)["type_correct"] for kind in ("stuck", None)
+    ]
+    assert of_type == [False, None]
 
 
 def test_a_name_is_held_against_the_fault_that_it_names():

@@ -12,7 +12,7 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import differences
-from beaver_ftc.studies import margins
+from beaver_ftc.studies import handling, linearise, margins
 from beaver_ftc.studies.margins import (
     LawGains,
     Margin,
@@ -211,3 +211,15 @@ def test_the_margins_as_they_are_shown(changed):
 )
 def test_a_margin_keeps_what_is_asked_up_to_the_bound(up_db, down_db, phase_deg, keeps):
     assert Margin(40.0, "none", "flap", up_db, down_db, phase_deg).keeps(6.0, 45.0) is keeps
+
+
+def test_linearise_asks_for_the_margins_that_the_scenario_declares(monkeypatch):
+    """A loop that keeps 6 dB and 45 deg, but not the 45 dB and 6 deg of a mistaken order."""
+    found = Margin(50.0, "healthy", "elevator", up_db=7.0, down_db=8.0, phase_deg=46.0)
+    monkeypatch.setattr(margins, "study", lambda scenario: [found])
+    monkeypatch.setattr(handling, "over_airspeeds", lambda scenario: [])
+    declared = scenario(control={"gain_margin_db": 6.0, "phase_margin_deg": 45.0})
+    monkeypatch.setattr(linearise, "load", lambda name: declared)
+    document = linearise.Linearise("any").run(None)
+    assert (document["gain_margin_db"], document["phase_margin_deg"]) == (6.0, 45.0)
+    assert [row["keeps"] for row in document["margins"]] == [True]

@@ -128,3 +128,28 @@ def test_instruments_change_with_the_flight_that_they_read():
     assert before == ([0.0, 0.0], False)
     assert instruments.readings() == [0.1, -2.0]
     assert instruments.has_accelerometers
+
+
+def test_each_number_of_a_frame_is_read_from_its_own_field():
+    """A record in which no two numbers are alike: each readout is counted off by hand."""
+    means = np.dtype([("G", float, (3, 2)), ("acceleration", float, 3)])
+    actuators = np.dtype([(name, float, 2) for name in ("step", "approach", "high", "low")])
+    prediction = np.dtype(
+        [("u", float, 2), ("G", float, (3, 2)), ("frame_means", means), ("actuators", actuators)]
+    )
+    frame = np.zeros(1, [("since", int), ("prediction", prediction), ("y", float)])[0]
+    frame["since"] = 3
+    now = frame["prediction"]
+    now["u"], now["G"] = (1.0, 2.0), np.arange(3.0, 9.0).reshape(3, 2)
+    now["frame_means"]["G"] = np.arange(9.0, 15.0).reshape(3, 2)
+    now["frame_means"]["acceleration"] = (15.0, 16.0, 17.0)
+    for first, name in enumerate(("low", "high", "approach", "step")):
+        now["actuators"][name] = (18.0 + 2 * first, 19.0 + 2 * first)
+    readout = FrameReadout(frame)
+    assert (readout.since, readout.expected_u_rad.tolist()) == (3, [1.0, 2.0])
+    assert readout.G.tolist() == [[3.0, 4.0], [5.0, 6.0], [7.0, 8.0]]
+    assert readout.mean_G.tolist() == [[9.0, 10.0], [11.0, 12.0], [13.0, 14.0]]
+    assert readout.model_rad_s2.tolist() == [15.0, 16.0, 17.0]
+    found = readout.actuators
+    assert [found.low_rad.tolist(), found.high_rad.tolist()] == [[18.0, 19.0], [20.0, 21.0]]
+    assert [found.approach.tolist(), found.step_rad.tolist()] == [[22.0, 23.0], [24.0, 25.0]]

@@ -233,3 +233,20 @@ def test_what_turns_while_nothing_is_logged_says_nothing_of_a_rate():
     zero = Column(t_s, np.zeros(len(t_s)))
     found = physics.fit_roll_angle_to_rates([Column(t_s, p), zero, zero], Column(t_s, roll), None)
     assert (found.slope, found.correlation) == (pytest.approx(1.0, abs=0.01), pytest.approx(1.0, abs=1e-3))
+
+
+def test_a_signal_is_clipped_from_the_tenth_row_at_its_largest_value():
+    """In threes: 3 * 3 rows at 5 are not enough, and a row alone is none; a larger value begins again."""
+    fives = [5.0, 5.0, 5.0, 1.0]
+    values = np.array([*fives, *fives, *fives, *fives, 5.0, 1.0, 6.0, 6.0, 6.0])
+    assert np.flatnonzero(signals.is_clipped(values)).tolist() == [14]
+    assert np.flatnonzero(signals.is_clipped(-values)).tolist() == [14]
+
+
+def test_a_spike_is_larger_than_forty_usual_steps():
+    values = np.resize([0.0, 1.0], 300)
+    for height, rows in ((41.5, [100]), (39.5, [])):
+        values[100] = height
+        assert signals.find_spike_rows(values).tolist() == rows
+    values[[100, 150, 200, 250]] = 50.0
+    assert not len(signals.find_spike_rows(values))  # four of 300 rows are more than 1 %

@@ -82,6 +82,20 @@ def test_states_are_within_their_box(plant, trim, changed):
     assert not changed({name: in_short([state[name] for state in seen]) for name in seen[0]})
 
 
+def test_a_region_begins_at_the_ends_of_its_altitudes_and_is_nearly_as_wide_in_every_box(plant, trim):
+    """Of a region rates and sideslip reach the root of the box's share, airspeed all of its range."""
+    of_region = replace(ENVELOPE, of_region=True, altitude_m=(400.0, 2600.0))
+    one = Draw(5, plant.aircraft, of_region, trim)
+    assert [one.start(0.25, turn).altitude_m for turn in (0, 1)] == [400.0, 2600.0]
+    assert 400.0 <= one.start(0.25, 2).altitude_m <= 2600.0
+    ends, alone = one.ends(0.25, 1.0), draw(plant, trim).ends(0.25, 1.0)
+    assert ends["airspeed_mps"] == (38.0, 60.0)
+    assert ends["beta_rad"] == pytest.approx((trim.beta_rad - 0.06, trim.beta_rad + 0.06))
+    assert [ends[f"{axis}_rad_s"][1] for axis in "pqr"] == pytest.approx([0.3, 0.175, 0.175])
+    assert [alone[f"{axis}_rad_s"][1] for axis in "pqr"] == pytest.approx([0.15, 0.0875, 0.0875])
+    assert alone["alpha_rad"] == ends["alpha_rad"]
+
+
 def test_samples_of_every_box_share_and_age(plant, trim, changed):
     found = sampling.sample(plant, ENVELOPE, trim, 60, 3, PROPERTIES, starts=12)
     assert Counter(found.box.tolist()) == dict.fromkeys(range(4), 15)

@@ -144,6 +144,17 @@ def test_how_far_from_10_s_the_adaptive_law_takes_over_has_no_sign(at_s, apart_s
     assert measures.activated_near_10({"elevator": flight}, "elevator") == apart_s
 
 
+def test_the_laws_changes_are_counted_from_the_alarm_and_from_the_name():
+    changes = (("adaptive", 12.625), ("reallocated", 14.0), ("adaptive", 20.0))
+    metrics = SimpleNamespace(
+        supervisor=[SimpleNamespace(mode=mode, time_s=at_s) for mode, at_s in changes],
+        detection=SimpleNamespace(time_s=12.25), isolation=SimpleNamespace(time_s=13.25),
+    )  # fmt: skip
+    flight = {"elevator": SimpleNamespace(metrics=metrics)}
+    assert measures.in_charge(flight, "elevator") == 0.375
+    assert measures.reallocation(flight, "elevator") == 0.75
+
+
 def test_what_is_counted_without_an_alarm():
     never = {"elevator": without_alarm()}
     counted = ("detected", "isolated", "handled", "decisions", "order", "residuals", "generalised")

@@ -215,3 +215,19 @@ def test_the_pilot_is_told_of_the_class_and_a_guest_of_its_own_rights():
     assert [[json.loads(one) for one in page._waiting] for page in told] == [
         [{"class": 2}], [{"rights": 3}], [{"rights": 5}],
     ]  # fmt: skip
+
+
+def test_one_page_is_told_by_its_number_and_all_by_0_and_who_is_called_what():
+    pages, asked = Pages(), []
+    seats = [SimpleNamespace(number=number, pages=0, label=f"seat {number}") for number in (0, 4)]
+    told = [pages.add(None, seats[k]) for k in (0, 1, 1)]
+    assert [seat.pages for seat in seats] == [1, 2]
+    pages.tell(told[1].number, b"a")
+    pages.tell(0, b"b")
+    assert [list(page._waiting) for page in told] == [[b"b"], [b"a", b"b"], [b"b"]]
+    for seat in seats:
+        pages.call(seat, lambda *said: asked.append(said))
+    assert asked == [(0, f"called {page.number} seat 4") for page in told[1:]]
+    for _ in range(2):  # gone once, however often it is said
+        pages.remove(told[2])
+    assert ([seat.pages for seat in seats], len(pages)) == ([1, 1], 2)

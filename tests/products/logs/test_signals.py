@@ -245,7 +245,7 @@ def test_a_signal_is_clipped_from_the_tenth_row_at_its_largest_value():
 
 def test_a_spike_is_larger_than_forty_usual_steps():
     values = np.resize([0.0, 1.0], 300)
-    for height, rows in ((41.5, [100]), (39.5, [])):
+    for height, rows in ((41.5, [100]), (40.5, [])):
         values[100] = height
         assert signals.find_spike_rows(values).tolist() == rows
     values[[100, 150, 200, 250]] = 50.0

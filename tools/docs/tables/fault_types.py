@@ -79,15 +79,17 @@ def _summary(document: Document) -> str:
     delays = [row["delay_s"] for row in document["flights"] if row["delay_s"] is not None]
     lost = len(document["lost_though_the_oracle_was_not"])
     return (
-        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
-        f"{document['false_alarms']} false alarms, {lost} aircraft lost although the law oracle kept it. "
-        f"Half of {len(delays)} alarms came within {median(delays):.2f} s."
+        f"{len(document['flights'])} faults were flown. The diagnosis named {document['wrong']} of them "
+        f"wrongly and raised {document['false_alarms']} false alarms. The number of aircraft that were lost "
+        f"although the law oracle kept them is {lost}. Half of the {len(delays)} alarms came within "
+        f"{median(delays):.2f} s of the fault."
     )
 
 
 def _told(told: Document) -> str:
     each = ", ".join(f"{name} {one['named']} of {one['seen']}" for name, one in told["by_surface"].items())
     return (
-        f"The informed test, which knows the fault, detects {told['seen']} of them. Of these the diagnosis "
-        f"detects {told['detected']}, and names the right surface in {told['named']}: {each}."
+        f"The informed test receives the fault and detects {told['seen']} of the {told['flights']} faults. "
+        f"Of these {told['seen']} faults, the diagnosis detects {told['detected']}. It names the right "
+        f"surface for {told['named']}: {each}."
     )

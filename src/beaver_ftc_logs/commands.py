@@ -35,10 +35,10 @@ def identify(
 ) -> None:
     """Identify a vehicle from recorded flights.
 
-    The command writes a model file for `diagnose`. The fit uses the healthy parts of the flights. It also
-    uses faulty parts if labels in the log state the effectiveness. The model is validated on data that the
-    fit did not use. The result of the validation is in the model file, and on a page beside it (MODEL with
-    .html).
+    The command writes a model file for `diagnose`. The fit uses the healthy parts of the flights. The fit
+    also uses faulty parts if labels in the log state the effectiveness. The model is validated on data that
+    the fit did not use. The model file contains the result of the validation. A page beside this file (MODEL
+    with .html) shows it.
 
     Examples:
       beaver-ftc identify my-logs/healthy.csv --vehicle my-logs/vehicle.yaml --out wing.json

@@ -48,7 +48,7 @@ FaultKind = Literal["loss", "stuck"]
 
 
 class QuantityColumn(Section):
-    """A column of the log. Its value in `unit` is `scale` times the number in the log, plus `offset`. If the
+    """A column of the log. The value in `unit` is `scale` times the number in the log, plus `offset`. If the
     numbers in the log are in the SI unit, write only the name of the column instead of this section."""
 
     column: ColumnName = Field(description="name of the column in the log", examples=["gyro_x"])
@@ -99,7 +99,7 @@ QuantityColumnOrName = Annotated[QuantityColumn, BeforeValidator(_expand_column_
 
 
 class TimeColumn(Section):
-    """The column of a table that contains the time."""
+    """The column that contains the time, if the log is a table."""
 
     column: ColumnName = Field(description="name of the column", examples=["TimeUS"])
     unit: Literal[tuple(SECONDS_PER_TIME_UNIT)] = Field(  # type: ignore[valid-type]
@@ -116,8 +116,8 @@ class RateColumns(Section):
 
 
 class AttitudeColumns(Section):
-    """Columns of the attitude angles. They show wrong units and signs of the body rates. If turbulence is
-    declared, `diagnose --aircraft` requires these columns."""
+    """Columns of the attitude angles. With these angles, wrong units and signs of the body rates are found.
+    If turbulence is declared, `diagnose --aircraft` requires these columns."""
 
     roll: QuantityColumnOrName = Field(description="column of the roll angle, rad", examples=["roll_rad"])
     pitch: QuantityColumnOrName | None = Field(
@@ -129,7 +129,7 @@ class AttitudeColumns(Section):
 
 
 class EnergyColumns(Section):
-    """Columns that show an engine failure. In an engine failure, altitude and airspeed fall together."""
+    """Columns that show an engine failure. After an engine failure, altitude and airspeed fall together."""
 
     altitude: QuantityColumnOrName = Field(description="column of the altitude, m", examples=["altitude_m"])
     airspeed: QuantityColumnOrName = Field(

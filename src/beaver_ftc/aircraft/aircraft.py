@@ -106,8 +106,8 @@ class Aircraft:
     - `file`: the content of aircraft.yaml.
     - `folder`: path of the folder.
 
-    `surfaces` is a tuple with the names of the surfaces, in the order of every array and log column. `travel`
-    is a mapping from surface to its limits, `min_rad` and `max_rad`.
+    `surfaces` is a tuple with the names of the surfaces, in the order that all arrays and log columns have.
+    `travel` is a mapping from surface to its limits, `min_rad` and `max_rad`.
 
     Two aircraft are equal only if they are the same object. `load` returns the same object while the file is
     unchanged.
@@ -128,7 +128,7 @@ class Aircraft:
 
     @cached_property
     def surfaces(self) -> tuple[str, ...]:
-        """Names of the surfaces, in the order of every array and log column."""
+        """Names of the surfaces, in the order that all arrays and log columns have."""
         return tuple(self.file.surfaces)
 
     @property
@@ -283,7 +283,7 @@ class Aircraft:
         return tuple(term for term in self.forces if all(signal != SIDESLIP_RATE for signal, _ in term.of))
 
     def separated_by_force(self, force: str) -> tuple[int, ...]:
-        """Indices of the surfaces of one group that only a measured force distinguishes, not the body rates.
+        """Indices of surfaces that a measured force can distinguish, but the body rates cannot.
 
         - `force`: `CZ` selects the surfaces of pitch, which differ in lift. `CY` selects the other surfaces.
 
@@ -309,10 +309,10 @@ class Aircraft:
         """The value of one aerodynamic coefficient: the sum of its terms in the aircraft file.
 
         - `name`: e.g. `Cm`.
-        - `of`: value of every signal and of every surface, by name.
-        - `scale`: factors on single terms, by name of the term.
+        - `of`: a mapping from the name of each signal and each surface to its value.
+        - `scale`: a mapping from the name of a term to a factor that multiplies this term.
 
-        The function is a plain Python sum, for occasional use.
+        The sum is plain Python, for occasional use.
         """
         scale = scale or {}
         terms = self._terms_of[name]

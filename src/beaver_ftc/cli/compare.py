@@ -47,8 +47,8 @@ def command(options: Options) -> None:
 
     The command compares finished runs (RUN), schemes and laws (--sweep or --benchmark), or detectors on
     recorded flights (--flights FOLDER). For each recorded flight, the model is identified from the other
-    flights. --tune chooses parameters of schemes and laws. The search is the same for built-in methods and
-    plug-ins.
+    flights. --tune searches for good parameters of schemes and laws. The search is the same for built-in
+    methods and plug-ins.
 
     The command writes comparison.json, .png and .html. For finished runs it writes runs.json, .png and .html.
     For recorded flights it writes flights.json, .md and .png. With --tune it writes tuned.json.

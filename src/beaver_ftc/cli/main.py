@@ -119,8 +119,8 @@ def options(
 ) -> None:
     """Fault diagnosis and fault-tolerant control of the DHC-2 Beaver, flown by JSBSim.
 
-    Exit status: 0 done and every expectation met, 1 an expectation or a check failed, 2 bad input or usage,
-    3 the simulation could not be completed.
+    Exit status: 0 = done and every expectation met, 1 = an expectation or a check failed, 2 = bad input or
+    usage, 3 = the simulation could not be completed.
     """
 
 

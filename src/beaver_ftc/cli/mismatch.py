@@ -40,14 +40,14 @@ def command(
     """Decompose the model error by source.
 
     The command flies each scenario and computes the mismatch: the angular acceleration of the truth minus
-    that of the design model. It reports the part of each source, such as sensors, fault or coefficients, and
-    its share of the declared bound.
+    that of the design model. For each source, such as sensors, fault or coefficients, it reports the part of
+    the mismatch that comes from this source. It also reports this part as a share of the declared bound.
 
     With --format json the command prints one JSON object. For one flight it contains rms, max, share and
     bound_share for each axis and source (axes.{p,q,r}.{source}). For several flights it is {"runs": [...],
     "recommended": ..., "guarantee": ...}.
 
-    If the map is interrupted, the same command resumes it.
+    If the command is interrupted while it computes the map (--map), the same command resumes it.
 
     Examples:
       beaver-ftc mismatch fault-free

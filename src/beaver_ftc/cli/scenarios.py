@@ -96,7 +96,7 @@ def new(
     log: bool = False,
     out: Path = Path(),
 ) -> None:
-    """Write NAME.yaml, a scenario to begin with, or sample logs.
+    """Write a first scenario NAME.yaml, or sample logs.
 
     `run` can fly the new file without changes. The command does not replace an existing file.
 

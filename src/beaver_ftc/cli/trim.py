@@ -39,9 +39,10 @@ class Condition:
 def command(condition: Condition) -> None:
     """Print a trimmed flight condition.
 
-    The flight is steady and straight, with wings level. An omitted option has the value of the scenario.
-    Without SCENARIO the values are 45 m/s, 1828.8 m, 1800 rpm, 20 inHg and flap 0 deg. The options for engine
-    and flap apply only to an aircraft with these parts. If no trim exists, the exit status is 2.
+    The flight is steady and straight, with wings level. If you leave out an option, the value of the scenario
+    is used. Without SCENARIO the default values are 45 m/s, 1828.8 m, 1800 rpm, 20 inHg and flap 0 deg. The
+    options for engine and flap apply only to an aircraft with these parts. If no trim exists, the exit status
+    is 2.
 
     Examples:
       beaver-ftc trim --airspeed-mps 40 --altitude-m 1000

@@ -63,8 +63,8 @@ class Reference(NamedTuple):
     """The reference of one frame, for p, q and r.
 
     - `commanded` (3,) rad/s: body rates that the scenario commands.
-    - `rate` (3,) rad/s, `acceleration` (3,) rad/s²: response of the reference model. Tracking errors are
-      measured against `rate`.
+    - `rate` (3,) rad/s, `acceleration` (3,) rad/s²: response of the reference model. A tracking error is the
+      difference from `rate`.
     """
 
     commanded: np.ndarray
@@ -74,9 +74,9 @@ class Reference(NamedTuple):
 
 @runtime_checkable
 class Law(Protocol):
-    """A control law. Write a class with these two methods.
+    """A control law. Write a class with the methods `reset` and `step`.
 
-    The class takes no arguments. The first line of its docstring is its text in `beaver-ftc list`.
+    The class takes no arguments. `beaver-ftc list` prints the first line of its docstring as a description.
 
     With the class attribute `fault_tolerant = True` the law declares that it uses the verdict. After an alarm
     the supervisor then reports the mode `adaptive` or `unanticipated`. Without the attribute the mode stays
@@ -84,11 +84,11 @@ class Law(Protocol):
     """
 
     def reset(self, context: "Context") -> None:
-        """Prepare the law for a flight. The loop calls it once before the flight."""
+        """Prepare the law for a flight. The loop calls this method once before the flight."""
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Return the command (surfaces,) rad. The loop calls it once for each frame, and limits the command
-        to the travel.
+        """Return the command (surfaces,) rad. The loop calls this method once for each frame. It limits the
+        command to the travel of the surfaces.
         """
 
 

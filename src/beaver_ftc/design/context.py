@@ -18,21 +18,22 @@ _ZEROS = {shape: partial(np.zeros, shape) for shape in (0, 3, 4, 7, (3, 3))}
 
 @dataclass(frozen=True)
 class DeclaredErrors:
-    """The errors that `fdi.bounds` declares beside the published bounds, and the actuators.
+    """The errors that `fdi.bounds` declares in addition to the published bounds, and the data of the
+    actuators.
 
-    A plug-in receives them as `Context.declared`. An error that is not declared is zero.
+    A plug-in receives this record as `Context.declared`. An error that is not declared is zero.
 
     - `noise`, `bias`, `resolution`, `slope` (7,): errors of the instruments for p, q, r (rad/s), angle of
       attack, sideslip (rad), airspeed (m/s) and dynamic pressure (Pa). `noise` is the standard deviation of a
-      sample. `slope` is the relative error of the slope, without unit.
+      sample. `slope` is the relative error of the scale factor, without unit.
     - `gust_rad_s`, `gust_time_s` (3,): standard deviation, rad/s, and correlation time, s, of the rotation of
       the air about each axis.
     - `gust_effect` (3, 3) 1/s: angular acceleration for each rad/s of this rotation.
     - `coefficients`: absolute tolerance of each moment coefficient, in the order of `Aircraft.moments`.
-    - `inertia`: tolerance of the moments of inertia, share of 1.
+    - `inertia`: relative tolerance of the moments of inertia: 0.05 is 5 %.
     - `deflection_rad`: largest difference between a surface and the model of its actuator, rad.
-    - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s². It includes all errors above
-      except those of the gyros and of the air.
+    - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s². The model error includes all
+      errors above, except those of the gyros and of the air.
     - `bandwidth_rad_s`, `rate_limit_rad_s` (surfaces,): bandwidth, rad/s, and rate limit, rad/s, of the
       actuators; 0 if the actuator is ideal.
     """
@@ -104,16 +105,16 @@ class Context:
     - `model`: the design model. `model.f(x, y)` (3,) rad/s² is the angular acceleration at neutral surfaces,
       for rates x (3,) rad/s and signals y as in `Measured.y`. `model.G(y)` (3, surfaces) rad/s² for each rad
       is the effect of each surface.
-    - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and surfaces in
-      the trim at the start. `trim_y` has the order and units of `Measured.y`.
+    - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and deflections
+      of the surfaces in trim, at the start of the flight. `trim_y` has the order and units of `Measured.y`.
     - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.
-    - `constant_rad_s2` (3,) rad/s², `inertia_coupling` (3,): declared bounds on the constant error of the
-      angular acceleration, and on the relative error of the inertia coupling.
+    - `constant_rad_s2` (3,) rad/s²: declared bound on the constant error of the angular acceleration.
+      `inertia_coupling` (3,): declared bound on the relative error of the inertia coupling.
     - `seed`: seed of the scenario.
     - `options`: the mapping `fdi.options` for a detector, `control.options` for a law.
     - `surfaces`: names of the surfaces.
     - `leading`: indices of the main surfaces of roll, pitch and yaw. `leaders` contains their names.
-    - `declared`: the other errors that `fdi.bounds` declares, and the actuators.
+    - `declared`: the other errors that `fdi.bounds` declares, and the data of the actuators.
     """
 
     dt_s: float

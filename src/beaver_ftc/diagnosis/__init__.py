@@ -45,8 +45,8 @@ class Measured(NamedTuple):
 
     The other fields are means over the frame that ends at `t_s`. In the first frame they are zero.
 
-    - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. The innovation is
-      therefore (x - x_before) / dt - acceleration.
+    - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. With x_before, the `x` of
+      the previous frame, the innovation is (x - x_before) / dt - acceleration.
     - `contribution` (3, surfaces) rad/s²: the part G u of each commanded surface.
     - `eta_bar` (3,) rad/s²: declared bound on the error of `acceleration`.
     """
@@ -60,17 +60,18 @@ class Measured(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The result of a detector so far. The loop keeps the first alarm.
+    """The result of a detector up to the present frame. The loop keeps the first alarm.
 
     - `detected`: True if the detector raises the alarm.
     - `axis`: axis of the alarm: `p`, `q` or `r`.
     - `isolated`: name of the faulty surface, or `unanticipated`; None if no fault is isolated.
     - `type`: fault type of the isolated fault.
-    - `estimate`: size of the fault; for a loss of effectiveness theta from -1 to 0, otherwise an angle, rad.
+    - `estimate`: estimated size of the fault. A loss of effectiveness has the size theta, from -1 to 0. Other
+      faults have an angle, rad.
     - `effectiveness` (surfaces,): estimated effectiveness of every surface, 1 if it is healthy. The adaptive
       laws use it. None if the detector does not estimate it.
-    - `statistic`: number that exceeds 1 when the alarm is raised. Compute it in every frame, also after the
-      alarm, because `compare` tries other alarm levels with it.
+    - `statistic`: number that exceeds 1 when the alarm is raised. Compute this number in every frame, also
+      after the alarm. `compare` needs it to try other alarm levels.
     - `candidates`: names that are not excluded.
     """
 
@@ -86,16 +87,16 @@ class Verdict(NamedTuple):
 
 @runtime_checkable
 class Detector(Protocol):
-    """A diagnosis scheme. Write a class with these two methods.
+    """A diagnosis scheme. Write a class with the methods `reset` and `step`.
 
-    The class takes no arguments. The first line of its docstring is its text in `beaver-ftc list`.
+    The class takes no arguments. `beaver-ftc list` prints the first line of its docstring as a description.
     """
 
     def reset(self, context: "Context") -> None:
-        """Prepare the detector for a flight. The loop calls it once before the flight."""
+        """Prepare the detector for a flight. The loop calls this method once before the flight."""
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
-        """Return the verdict so far. The loop calls it once for each frame.
+        """Return the verdict up to this frame. The loop calls this method once for each frame.
 
         - `measured`: the measurements of the frame.
         - `command` (surfaces,) rad: the command that the surfaces follow at this instant.

@@ -76,7 +76,7 @@ class Stepping:
 
         - `seed`: seed of the new flight; None keeps the seed.
 
-        The flight after a reset has exactly the numbers of a new `Simulation`.
+        After a reset, the flight has exactly the same numbers as that of a new `Simulation`.
         """
         if seed is not None:
             self._given = self._given.with_({"seed": seed})
@@ -84,7 +84,9 @@ class Stepping:
         self._make_ready()
 
     def release(self) -> None:
-        """Release aircraft and memory for another flight. Afterwards this simulation cannot be used."""
+        """Release the aircraft and the memory, so that another flight can use them. Afterwards you cannot use
+        this simulation.
+        """
         with ONE_FLIES:
             self._loop.release()
 
@@ -200,13 +202,13 @@ class Stepping:
     ) -> None:
         """Fly one frame, or several.
 
-        - `command` (surfaces,) rad: replaces the command of the law in these frames. It is limited to the
-          travel.
+        - `command` (surfaces,) rad: replaces the command of the law in these frames. The command is limited
+          to the travel of the surfaces.
         - `frames`: number of frames.
-        - `stick` (3,) rad/s: is added to the reference of the scenario in these frames.
+        - `stick` (3,) rad/s: body rates that are added to the reference of the scenario in these frames.
 
-        Raises BadInput for a wrong shape and after the end of the flight. Raises SimulationFailed if a value
-        becomes infinite or NaN.
+        Raises BadInput if an array has a wrong shape, and if the flight has ended. Raises SimulationFailed if
+        a value becomes infinite or NaN.
         """
         if self.done:
             raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
@@ -230,8 +232,8 @@ class Stepping:
 
         - `fault`: the keys of a fault in a scenario file, without `at_s`.
 
-        If the same fault is already present, the call has no effect. Raises BadInput with the key that is
-        wrong.
+        If the same fault is already present, the call has no effect. Raises BadInput if a key or value is
+        wrong. The message names the key.
         """
         with checked_against(self._loop.aircraft):
             new = fault_of(fault, self._now_s)
@@ -245,11 +247,10 @@ class Stepping:
     def repair(self, actuator: str | None = None) -> None:
         """End faults that have begun.
 
-        - `actuator`: name of a surface or sensor; `unanticipated` for a fault of the aerodynamics; `damage`
-          for a structural damage of an aircraft that declares one; None for all faults.
+        - `actuator`: name of the surface or sensor whose fault ends. `unanticipated` ends a fault of the
+          aerodynamics. `damage` ends a structural damage, if the aircraft declares one. None ends all faults.
 
-        A fault that has not begun yet stays in the scenario. Raises BadInput for a name that no fault can
-        have.
+        A fault that has not begun yet stays in the scenario. Raises BadInput for any other name.
         """
         with checked_against(self._loop.aircraft):
             names = (
@@ -274,7 +275,7 @@ class Stepping:
 
         - `gust`: the keys of an entry of `environment.gust`, without `at_s`.
 
-        Raises BadInput with the key that is wrong, and while another gust is active.
+        Raises BadInput if a key or value is wrong, and if another gust is still active.
         """
         self._begin()
         self._scenario = interventions.with_gust(self._scenario, gust, self._now_s)
@@ -283,12 +284,12 @@ class Stepping:
         self._loop.gust, self._turn_at = GustSchedule(gusts, self._loop.plant, self.rate_hz), self._next
 
     def change(self, change: Mapping[str, Any]) -> None:
-        """Change law, diagnosis or sensors from the next frame on.
+        """Change the law, the diagnosis or the sensors. The change acts from the next frame on.
 
         - `change`: the keys of an entry of `changes`, without `at_s`.
 
-        A changed diagnosis restarts. The log keeps its columns. Raises BadInput with the key that is wrong;
-        the flight then continues unchanged.
+        A changed diagnosis restarts. The log keeps its columns. Raises BadInput if a key or value is wrong.
+        The flight then continues unchanged.
         """
         self._begin()
         scenario = interventions.with_change(self._scenario, change, self._now_s)
@@ -297,11 +298,11 @@ class Stepping:
         self._scenario, self._turn_at = scenario, self._next
 
     def aim(self, targets: Mapping[str, float]) -> None:
-        """Set new targets of the autopilot from now on.
+        """Give the autopilot new targets.
 
-        - `targets`: target to value, e.g. `{"altitude_m": 1900}`.
+        - `targets`: a mapping from target to value, e.g. `{"altitude_m": 1900}`.
 
-        Raises BadInput with the key that is wrong.
+        Raises BadInput if a key or value is wrong. The message names the key.
         """
         self._begin()
         self._scenario = interventions.with_targets(self._scenario, targets, self._now_s)
@@ -347,8 +348,8 @@ class Stepping:
     def scenario_flown(self) -> Scenario:
         """A scenario that repeats this flight with exactly the same numbers.
 
-        Its faults begin and end at the frames of `inject` and `repair`. Its reference contains the stick
-        inputs as tables (`csv`). Its duration is the time flown.
+        The faults of the scenario begin and end at the frames in which you called `inject` and `repair`. Its
+        reference contains the stick inputs as tables (`csv`). Its duration is the time that was flown.
 
         Raises BadInput for a flight with your own surface commands, because a scenario cannot contain them.
         """

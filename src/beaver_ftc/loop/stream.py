@@ -33,16 +33,19 @@ class Diagnosis:
         diagnosis = Diagnosis(aircraft("beaver"), rate_hz=100, fdi={"bounds": {"inertia": 0.05}})
         verdict = diagnosis.step(rates_rad_s, signals, command_rad)
 
-    - `aircraft`: the aircraft, which states its surfaces and their travel.
+    - `aircraft`: the aircraft. Its file states the surfaces and their travel.
     - `rate_hz`: number of samples in a second. The samples are evenly spaced.
-    - `fdi`, `actuators`, `design_model`: the sections of the same name in a scenario file.
-    - `start`: rates (3,) rad/s, signals and surfaces (surfaces,) rad in trim. The linearised design model and
-      the statistical detector need them. By default they are taken from the first sample.
+    - `fdi`, `actuators`, `design_model`: contents of the sections with these names in a scenario file.
+    - `start`: three arrays in trim: rates (3,) rad/s, signals (4 + signals,), and deflections of the surfaces
+      (surfaces,) rad. The linearised design model and the statistical detector need these values. By default
+      the values of the first sample are used.
 
-    Attributes: `declared` lists the errors that `fdi.bounds` declares, and the parts that use them. `t_s` is
-    the time of the last sample since the first, s. `config` is the section `fdi` with all defaults.
+    Attributes: `declared` lists the errors that `fdi.bounds` declares, and the parts of the diagnosis that
+    use these errors. `t_s` is the time from the first sample to the last, s. `config` is the section `fdi`
+    with all defaults.
 
-    The memory of the diagnosis is one record of fixed size. Raises BadInput with the key that is wrong.
+    The memory of the diagnosis is one record of fixed size. Raises BadInput if a key or value is wrong. The
+    message names the key.
     """
 
     def __init__(
@@ -76,7 +79,7 @@ class Diagnosis:
         self.reset()
 
     def reset(self) -> None:
-        """Delete the memory. The next sample is then the first sample of a flight."""
+        """Delete the memory of the diagnosis. The next sample then counts as the first sample of a flight."""
         stops = [self._aircraft.travel[name] for name in self._aircraft.surfaces]
         travel = np.array([[stop.min_rad for stop in stops], [stop.max_rad for stop in stops]])
         self._frames = configure_design(self._scenario, travel)
@@ -109,18 +112,18 @@ class Diagnosis:
         attitude_rad: ArrayLike | None = None,
         altitude_m: float | None = None,
     ) -> Verdict:
-        """Diagnose one further sample, and return the verdict so far.
+        """Diagnose one further sample, and return the verdict of all samples up to this one.
 
         - `rates_rad_s` (3,) rad/s: measured p, q and r.
         - `signals` (4 + signals,): angle of attack rad, sideslip rad, airspeed m/s, dynamic pressure Pa, and
           the signals that the aircraft declares. The Beaver declares one, `dpt`.
-        - `command_rad` (surfaces,) rad: command since the previous sample; at the first sample the surfaces
-          in trim.
-        - `attitude_rad` (3,) rad: roll, pitch and yaw angle. It is required if `fdi.bounds` declares
+        - `command_rad` (surfaces,) rad: command that was active since the previous sample. For the first
+          sample, give the deflections in trim.
+        - `attitude_rad` (3,) rad: roll, pitch and yaw angle. The angles are required if `fdi.bounds` declares
           turbulence.
-        - `altitude_m`: measured altitude above sea level, m. It is used if turbulence is declared, because
-          turbulence depends on the height. By default the previous altitude is used. Before the first value
-          it is 1828.8 m.
+        - `altitude_m`: measured altitude above sea level, m. The altitude is used only if turbulence is
+          declared, because turbulence depends on the height. If you leave it out, the previous altitude is
+          used. Before the first altitude, 1828.8 m is used.
 
         Raises BadInput for a wrong shape, and for a value that is infinite or NaN. Such a sample is ignored.
         """
@@ -158,11 +161,11 @@ class Diagnosis:
         return self.innovation()
 
     def innovation(self) -> tuple[Vector, Vector, Vector]:
-        """Three arrays of the last frame, rad/s²: innovation (3,), its bound (3,), effect of each surface (3,
-        surfaces).
+        """Three arrays of the last frame in rad/s²: the innovation (3,), its bound (3,), and the effect of
+        each surface (3, surfaces).
 
         The last frame ends with the last sample. The bound follows from the declared errors. The effects are
-        those that the design model predicts.
+        predictions of the design model.
         """
         innovation, bound = (
             self._fdi["bank"]["output"]["innovation"],
@@ -178,7 +181,7 @@ class Diagnosis:
         return prediction["f"].copy(), prediction["G"].copy()
 
     def inside(self) -> tuple[np.ndarray, Scenario]:
-        """The memory of the diagnosis as a structured array (1,), and the scenario that it represents.
+        """The memory of the diagnosis as a structured array (1,), and the scenario of this diagnosis.
 
         Use it to inspect or record the state of the diagnosis after a sample.
         """

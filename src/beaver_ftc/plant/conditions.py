@@ -100,24 +100,26 @@ def _files_of(model: Path) -> tuple[str, ...]:
 
 
 def trim(scenario: ScenarioLike | None = None, **initial: float) -> TrimPoint:
-    """Trim the truth of a scenario, with its errors, in steady straight flight with wings level.
+    """Trim the simulated aircraft of a scenario in steady, straight flight with wings level. The aircraft has
+    the errors that the scenario gives to the truth.
 
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`. By default a scenario with
       all defaults is used.
-    - `initial`: keys of the section `initial` that replace those of the scenario, e.g. `airspeed_mps=40,
-      altitude_m=300, flap_deg=10`.
+    - `initial`: keys of the section `initial`. Their values replace those of the scenario, e.g.
+      `airspeed_mps=40, altitude_m=300, flap_deg=10`.
 
-    Raises BadInput with the key that is wrong, and if no trim exists.
+    Raises BadInput if a key or value is wrong, and if no trim exists.
     """
     return trimmed(_condition(scenario, initial))[1]
 
 
 def linearise(scenario: ScenarioLike | None = None, **initial: float) -> "LinearModel":
-    """Linear model xdot = A x + B u of the truth of a scenario at its trim.
+    """Linear model xdot = A x + B u of the simulated aircraft of a scenario, about its trim.
 
     The ten states are airspeed (m/s), alpha, beta (rad), p, q, r (rad/s), phi, theta, psi (rad) and altitude
-    (m). `states` and `inputs` of the result name the states and the surfaces. Arguments and errors are
-    those of `trim`. The method `state_space` returns the model for python-control.
+    (m). The fields `states` and `inputs` of the result contain the names of the states and of the surfaces.
+    The arguments and exceptions are the same as for `trim`. The method `state_space` of the result returns
+    the model for python-control.
     """
     from beaver_ftc.plant.linear import differences
 

@@ -56,10 +56,11 @@ Look = Callable[[Vector], Vector]
 
 @dataclass(frozen=True, init=False)
 class TrimPoint(FlightState):
-    """A flight condition in trim: states, `<surface>_rad` and engine settings as attributes.
+    """A flight condition in trim. Its attributes are the states, `<surface>_rad` and the engine settings.
 
     - `gamma_rad`: flight path angle, rad, positive in a climb.
-    - `residual`: six remaining accelerations: (udot, vdot, wdot) m/s² and (pdot, qdot, rdot) rad/s².
+    - `residual`: the six accelerations that remain in trim: (udot, vdot, wdot) m/s² and (pdot, qdot, rdot)
+      rad/s².
     - `envelope_valid`: True inside the validated envelope.
     """
 

@@ -32,8 +32,8 @@ class Proof(NamedTuple):
     """The proof of a flight's alarm and exclusions, as `Flight.proof` returns it.
 
     - `certificate`: the content of certificate.json.
-    - `log`: a mapping from the name of a column to its values (frames,). It has the columns of log.parquet,
-      and those from which the certificate is computed again.
+    - `log`: a mapping from the name of a column to its values (frames,). The mapping has the columns of
+      log.parquet. It also has the columns from which the certificate can be computed again.
     - `scenario`: the text of scenario.yaml, with all defaults filled in.
     """
 
@@ -52,8 +52,9 @@ class Flight:
     - `log`: a DataFrame with one row for each frame and the columns of log.parquet. Its `attrs` contain
       scenario, seed, verdict and units. Raises BadInput for a flight without a log.
     - `fault`, `detection`, `isolation`, `tracking`, `supervisor`, `departure`, `expectations`: the sections
-      of `metrics` as records. `supervisor` is a tuple of `ModeChange`, and `expectations` a tuple of
-      `Expectation`. `fault` is None without a fault. `departure` is None if the aircraft was not lost.
+      of `metrics` as records. `supervisor` is a tuple of `ModeChange` records. `expectations` is a tuple of
+      `Expectation` records. `fault` is None if the scenario has no fault. `departure` is None if the aircraft
+      was not lost.
     - `false_alarm`: True if an alarm was raised before any fault.
     - `passed`: True if every expectation was met.
     """
@@ -141,9 +142,9 @@ class Flight:
         """Draw one view of the flight and return it as a matplotlib Figure.
 
         - `view`: a name from `views()`.
-        - `closeup`: True shows only the time around the fault.
-        - `style`: "screen" or "paper". A "paper" figure is 8.4 cm wide. Its letters have at most 8 points. A
-          bitmap of it has 300 dots per inch.
+        - `closeup`: if True, the figure shows only the time around the fault.
+        - `style`: "screen" or "paper". A "paper" figure is 8.4 cm wide, and its text has at most 8 points. As
+          a bitmap, the figure has 300 dots per inch.
 
         Raises BadInput for an unknown view or style.
         """
@@ -165,16 +166,16 @@ class Flight:
         """The content of certificate.json: the alarm and the exclusions, each with the inequality that proves
         it.
 
-        The certificate needs further columns of the log. For this reason the call flies the scenario again.
-        Raises BadInput for a flight without a log, and for a scheme that has no certificate.
+        The certificate needs columns that the log does not have. To record these columns, the call flies the
+        scenario again. Raises BadInput for a flight without a log, and for a scheme that has no certificate.
         """
         return self.proof().certificate
 
     def proof(self) -> Proof:
-        """The certificate, and the data that a check of it needs.
+        """The certificate, and the data from which you can check the certificate.
 
-        The `Proof` contains `certificate`, the `log` with further columns, and `scenario`, the text of
-        scenario.yaml.
+        The `Proof` has the fields `certificate`, `log` and `scenario`. The log has more columns than
+        log.parquet. The scenario is the text of scenario.yaml.
         """
         found: Proof = required("proof", "certificate")(self.scenario, self._log_or_raise())
         return found
@@ -183,7 +184,7 @@ class Flight:
         """Write the result folder `out/<name>/` as `beaver-ftc run` does, and return its path.
 
         - `out`: the folder that contains the result folders.
-        - `report`: True also writes report.html and the figures.
+        - `report`: if True, the call also writes report.html and the figures.
 
         If writing fails, no partial folder remains. Raises BadInput for a flight without a log, and
         SimulationFailed if the folder cannot be written.
@@ -245,12 +246,12 @@ def fly(
     """Fly a scenario to its end and return the finished flight.
 
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
-    - `log`: True keeps the log in memory: one row of 0.8 kB for each frame.
+    - `log`: if True, the log is kept in memory. Each frame adds one row of 0.8 kB.
     - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
     - `progress`: a function that is called during the flight. Its argument is the share of the flight that
       has been flown, from 0 to 1.
 
-    Raises BadInput if the flight cannot be trimmed or if a name does not exist. Raises SimulationFailed if a
+    Raises BadInput for an unknown name, and if the aircraft cannot be trimmed. Raises SimulationFailed if a
     value becomes infinite or NaN.
     """
     from beaver_ftc.loop.loop import fly as fly_loop

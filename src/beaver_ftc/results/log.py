@@ -116,7 +116,7 @@ class MemoryLog:
         self._chunks.append(rows.copy())
 
     def close(self) -> None:
-        """End the log. A log in memory needs no action."""
+        """End the log. For a log in memory the call has no effect."""
 
     @property
     def rows(self) -> np.ndarray:
@@ -126,13 +126,15 @@ class MemoryLog:
         return self._chunks[0]
 
     def frozen_copy(self) -> "MemoryLog":
-        """A second log with the rows so far. Later rows of the first log do not change it."""
+        """A second log with a copy of the rows. It does not get the rows that are later written to the first
+        log.
+        """
         now = MemoryLog()
         now.columns, now._chunks = self.columns, list(self._chunks)
         return now
 
     def copy_to(self, path: Path) -> None:
-        """Write the rows as a log.parquet, as `run` writes it."""
+        """Write the rows into a file with the format of the log.parquet of `run`."""
         with ParquetLog(path) as log:
             log.open(self.columns)
             log.write(self.rows)

@@ -137,8 +137,8 @@ class DeclaredFault(Fault):
 class Statistical(Part):
     """The alarm of the statistical detector.
 
-    - `time_s`: time of its alarm, s; None without an alarm.
-    - `alarm_level`: level that its score must exceed, in standard deviations.
+    - `time_s`: time of the alarm, s; None without an alarm.
+    - `alarm_level`: an alarm is raised when the detector's score exceeds this level, in standard deviations.
     - `closest_approach`: largest score before a fault, divided by the alarm level.
     """
 
@@ -151,9 +151,9 @@ class Statistical(Part):
 class Inconclusive(Part):
     """The frames in which the built-in diagnosis can conclude nothing.
 
-    - `share`: these frames as a share of all frames, 0 to 1.
+    - `share`: number of these frames divided by the number of all frames, 0 to 1.
     - `from_s`: time of the first of these frames, s.
-    - `reasons`: the reasons, one mapping each.
+    - `reasons`: one mapping for each reason.
     """
 
     share: float
@@ -189,14 +189,16 @@ class Named(Part):
 
     - `fault`: name of the surface or sensor, or `unanticipated`; None while several candidates remain.
     - `type`: fault type.
-    - `time_s`, `delay_s`: time of the name, and time from the fault to the name, s.
-    - `correct`: True if the name is the true one and was not given before the fault began.
+    - `time_s`: time at which the fault was named, s. `delay_s`: time from the fault to this instant, s.
+    - `correct`: True if this fault is the true fault, and if it was not named before it began.
     - `candidates`: names or fault types that are not excluded.
-    - `type_correct`: True if the fault type is the true one.
-    - `type_delay_s`: time from the fault to the fault type, s.
-    - `estimate`: size of the fault: theta from -1 to 0 for a loss of effectiveness, otherwise an angle, rad.
+    - `type_correct`: True if `type` is the type of the true fault.
+    - `type_delay_s`: time from the fault to the instant at which its type was named, s.
+    - `estimate`: estimated size of the fault. A loss of effectiveness has the size theta, from -1 to 0. Other
+      faults have an angle, rad.
     - `estimate_deg`: the same size as an angle, deg.
-    - `estimate_interval`: lower and upper end of the set that contains the size, in the unit of `estimate`.
+    - `estimate_interval`: lower and upper end of the interval that contains the size of the fault, in the
+      unit of `estimate`.
     - `frequency_rad_s`: frequency of an oscillating fault, rad/s.
     - `so_far`: True if the name was given because all other candidates are excluded. Later data can exclude
       this name, too.
@@ -221,9 +223,9 @@ class Named(Part):
 
 @dataclass(frozen=True)
 class Withdrawn(Part):
-    """A name that was withdrawn during the flight.
+    """A fault that the diagnosis named, and later withdrew during the flight.
 
-    - `fault`: the name.
+    - `fault`: the name of the fault.
     - `from_s`, `to_s`: times at which the name was given and withdrawn, s.
     """
 
@@ -237,9 +239,9 @@ class Isolation(Part):
     """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
 
     - `isolated`: True if a fault was named.
-    - `withdrawn`: names that were withdrawn, in the order of time.
-    - `names`: all names that were given, withdrawn names included and premature names excluded. They are in
-      the order of the scenario's faults.
+    - `withdrawn`: names of faults that the diagnosis gave and later withdrew, in the order of time.
+    - `names`: all names of faults that the diagnosis gave, in the order of the scenario's faults. Withdrawn
+      names are included, but premature names are not.
     - `probing_s`: times at which probing began and ended, s; None without probing.
     - `faults`: one `Named` for each fault if several faults were named at once; otherwise empty.
     """
@@ -279,9 +281,10 @@ class Tracking(Part):
     """The tracking errors and the movement of the surfaces.
 
     - `pre_fault_rms_deg_s`, `post_fault_rms_deg_s`: RMS tracking error of each axis before and after the
-      first fault, deg/s; None if the flight has no such time.
-    - `surface_travel_deg`: surface to the length of its path, deg. Upward and downward movements are added.
-    - `surface_energy_deg2_s`: surface to the integral of its squared angular speed, deg²/s.
+      first fault, deg/s. A value is None if the flight has no time before or after the fault.
+    - `surface_travel_deg`: a mapping from surface to the length of its path, deg. Upward and downward
+      movements are added.
+    - `surface_energy_deg2_s`: a mapping from surface to the integral of its squared angular speed, deg²/s.
     """
 
     pre_fault_rms_deg_s: Rates | None
@@ -434,7 +437,7 @@ class Expectation(Part):
     - `name`: key of the expectation in the section `expect`.
     - `passed`: True if it was met.
     - `expected`, `actual`: expected and actual value.
-    - `reason`: why it was not met; None if it was met or if no reason is known.
+    - `reason`: reason why the expectation was not met; None if it was met or if no reason is known.
     """
 
     name: str

@@ -33,22 +33,25 @@ class Simulation(Stepping):
 
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
     - `detector`, `law`: plug-in objects that replace the detector and the law of the scenario.
-    - `log`: True keeps one row of the log for each frame in memory. A `MemoryLog` receives the rows instead.
-    - `prepare`: a function that is called once before the flight. Its argument is the trimmed plant, the
-      simulated aircraft.
+    - `log`: if True, the log is kept in memory, with one row for each frame. You can also give a `MemoryLog`,
+      in which the rows are then stored.
+    - `prepare`: a function that is called once before the flight. Its argument is the plant (the simulated
+      aircraft) in trim.
 
     Attributes:
 
     - `t_s`: time of the last frame, s. `frames`: number of frames flown. `rate_hz`: frames in a second.
     - `done`: True after the last frame or after the loss of the aircraft. `departed`: True after the loss.
-    - `mode`: mode of the supervisor. `inconclusive`: reason why the diagnosis can conclude nothing, or "".
+    - `mode`: mode of the supervisor. `inconclusive`: reason why the diagnosis can conclude nothing; otherwise
+      an empty text.
     - `measured`, `verdict`: the last `Measured` and `Verdict`.
     - `columns`: names of the columns of the log. `values` (columns,): row of the last frame. `rows` (frames,
-      columns): rows of the last call of `step`. `log`: the log so far, as a DataFrame.
-    - `trim_rad` (surfaces,) and `travel_rad` (2, surfaces), rad: surfaces in trim; lower and upper stops.
+      columns): rows of the last call of `step`. `log`: a DataFrame with all rows up to the last frame.
+    - `trim_rad` (surfaces,) rad: deflections of the surfaces in trim. `travel_rad` (2, surfaces) rad: their
+      lower and upper stops.
     - `readout`: further values of the last frame, with names and units, for example `readout.G`.
 
-    The first call of `step` also flies frame 0, which measures the aircraft in trim.
+    The first call of `step` also flies frame 0. In this frame the aircraft in trim is measured.
     """
 
     def __init__(
@@ -73,7 +76,8 @@ class Simulation(Stepping):
     def snapshot(self) -> "Snapshot":
         """The present state of the flight. Its method `resume` returns a new `Simulation` in this state.
 
-        You can resume a snapshot any number of times. All these flights have exactly the same numbers.
+        You can resume a snapshot any number of times. All flights that you resume from it have exactly the
+        same numbers.
         """
         plugged = tuple(
             name for name, of in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if of is not None
@@ -82,17 +86,21 @@ class Simulation(Stepping):
         return Snapshot(self.frames, self.t_s, tuple(self._asked), made, plugged)
 
     def clone(self) -> Self:
-        """A second flight in the same state, independent of the first: `snapshot().resume()`."""
+        """A second flight in the same state, independent of the first flight. The call is the same as
+        `snapshot().resume()`.
+        """
         return cast("Self", self.snapshot().resume())
 
     def land(self) -> Flight:
-        """The flight so far as a `Flight`. The simulation can continue afterwards."""
+        """The flight up to the last frame, as a `Flight`. The simulation can continue afterwards."""
         outcome = self._outcome()
         self._flush()
         return Flight.landed(outcome, self._kept and self._kept.frozen_copy())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
-        """Write the flight so far as a result folder, and return its path. See `Flight.save`."""
+        """Write a result folder of the flight up to the last frame, and return the path of the folder. See
+        `Flight.save`.
+        """
         return self.land().save(out, report=report)
 
 
@@ -104,10 +112,10 @@ class Snapshot:
     - `t_s`: time of this instant, s.
     - `plugged`: which plug-in objects the flight has: `detector`, `law`, both or none.
 
-    The snapshot stores the commands and injected faults up to this instant, not the state of JSBSim. JSBSim
-    keeps filters, delays, integrators and engines where no property can read them. `resume` therefore flies
-    the flight again. The repeated flight is exact for every aircraft and sensor. It takes about 1 ms for each
-    second of flight at 100 Hz.
+    The snapshot stores the commands and injected faults up to this instant. It does not store the state of
+    JSBSim, because no property gives the states of its filters, delays, integrators and engines. `resume`
+    therefore flies the flight again up to this instant. The repeated flight is exact for every aircraft and
+    sensor. The repetition takes about 1 ms for each second of flight at 100 Hz.
     """
 
     frames: int
@@ -119,9 +127,10 @@ class Snapshot:
     def resume(self, **plug_ins: "Detector | Law") -> Simulation:
         """Return a new `Simulation` in the state of the snapshot.
 
-        - `plug_ins`: `detector=` and `law=` with new objects, if the flight has such plug-in objects.
+        - `plug_ins`: new plug-in objects as `detector=` and `law=`, if the flight has such objects.
 
-        Raises BadInput if such an object is missing, or if the flight has no plug-in of this kind.
+        Raises BadInput if you leave out an object that the flight needs, or give an object that it does not
+        use.
         """
         if set(plug_ins) != set(self.plugged):
             asked = " and ".join(self.plugged) or "no plug-in"

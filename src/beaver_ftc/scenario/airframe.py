@@ -150,8 +150,9 @@ Ratios = Annotated[dict[TermName, Ratio], BeforeValidator(_no_more_than_there_ar
 
 class Initial(Section):
     """The flight condition at the start: trimmed straight flight with wings level. The settings of the engine
-    and the deflections of surfaces are those of the Beaver. Another aircraft has the names in
-    `engine.settings` of its aircraft file, and the surfaces that its trim does not move."""
+    and the deflections of surfaces are those of the Beaver. For another
+    aircraft, the names of the settings are in `engine.settings` of its aircraft file. Its surfaces here are
+    those that its trim does not move."""
 
     airspeed_mps: Number = number(
         45.0, "m/s", "true airspeed. The model is valid from 30 to 55 m/s", ge=20, le=70

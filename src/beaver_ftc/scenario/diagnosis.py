@@ -121,7 +121,7 @@ BoundedSensors = Annotated[Sensors, AfterValidator(_can_be_bounded)]
 
 
 class Bounds(Section, strict=True):
-    """Declared uncertainty. The thresholds follow from it [Zhang2005, sec. VII].
+    """Declared uncertainty. The thresholds follow from this uncertainty [Zhang2005, sec. VII].
 
     inertia_coupling: largest relative error of the inertia coupling on each axis. The default is the bound in
     the published study [Zhang2005]
@@ -179,7 +179,7 @@ class Probing(Section):
 
     If both surfaces follow their commands, their effects cancel, and the aircraft does not react. A reaction
     shows which surface is faulty. Probing begins some time after an alarm in pitch, if neither surface is
-    named. This time is long enough to see a slow oscillation. Probing ends when a surface is named.
+    named. This wait is long enough to detect a slow oscillation. Probing ends when a surface is named.
     """
 
     amplitude_deg: float = entry(3.0, "largest flap deflection, downwards, deg", gt=0, le=10)

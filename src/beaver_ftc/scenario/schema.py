@@ -301,8 +301,8 @@ class RmsLimits(Section):
 
 
 class Arrival(Section):
-    """Largest allowed deviations from the commanded flight path at the end of the flight. Each deviation
-    first passes a first-order lag of 10 s."""
+    """Largest allowed deviations from the commanded flight path at the end of the flight. Before the
+    check, a first-order lag with a time constant of 10 s smooths each deviation."""
 
     altitude_m: Number | None = number(None, "m", "altitude", gt=0, le=10_000, examples=[10])
     airspeed_mps: Number | None = number(None, "m/s", "airspeed", gt=0, le=100, examples=[2])
@@ -457,7 +457,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
     def with_(self, changes: Mapping[str, Any]) -> Self:
         """A copy of the scenario with new values.
 
-        - `changes`: dotted key to new value, e.g. `{"faults[0].magnitude": 0.2}`.
+        - `changes`: a mapping from dotted key to new value, e.g. `{"faults[0].magnitude": 0.2}`.
 
         Raises BadInput with the key, the mistake and the allowed values.
         """
@@ -488,7 +488,9 @@ class Scenario(Section, title="beaver-ftc scenario"):
         }
 
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about values that are allowed but unusual: one text `key.path: warning` for each."""
+        """Warnings about values that are allowed but unusual. Each warning is one text,
+        `key.path: warning`.
+        """
         from beaver_ftc.scenario.declared import warnings_of
 
         return warnings_of(self)
@@ -508,8 +510,8 @@ def load(scenario: ScenarioLike) -> Scenario:
     """Load a scenario from a built-in name, a file's path or a mapping.
 
     - `scenario`: a name from `scenarios()`, the path of a YAML file, a mapping with the keys of a scenario
-      file, or a `Scenario`, which is returned unchanged. A mapping needs no `name`. CSV files that a mapping
-      names are in the working directory.
+      file, or a `Scenario`, which is returned unchanged. A mapping needs no `name`. If a mapping names CSV
+      files, they are read from the working directory.
 
     Raises BadInput with one line for each mistake.
     """

@@ -171,8 +171,8 @@ class Step(_Window):
 
 
 class Square(_Wave):
-    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. Its sign is
-    always that of a `sine` with the same amplitude, frequency and phase."""
+    """A square wave: +amplitude in the first half of each period, -amplitude in the second half. The
+    wave always has the same sign as a `sine` with the same amplitude, frequency and phase."""
 
     def rate_deg_s(self, t_s: "Samples") -> "Samples":
         import numpy as np
@@ -224,8 +224,8 @@ class Csv(Section):
     """A table in a CSV file. Between two rows the rate is interpolated linearly. Before the first row and
     after the last row it is constant.
 
-    The table is read when the scenario is loaded. It then becomes a part of the scenario, as `time_s` and
-    `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
+    The table is read when the scenario is loaded. The loaded scenario then contains the values of the table
+    as `time_s` and `values_deg_s`. For this reason the scenario in a result folder needs no CSV file.
 
     file: CSV file in the scenario's own folder or below it
     column: name of the column with the rates in deg/s. The times in s are in the column `t_s`
@@ -333,7 +333,7 @@ def check_table(time_s: Sequence[float], values_deg_s: Sequence[float]) -> None:
 
 
 class Signal(Section):
-    """One signal. The section has exactly one of these keys, the kind of the signal."""
+    """One signal. The section has exactly one of these keys. The key is the kind of the signal."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
@@ -428,7 +428,7 @@ class _Leg(Section):
 
 
 class AltitudeLeg(_Leg):
-    """A commanded altitude. The command moves to it at a constant rate of climb or descent."""
+    """A commanded altitude. The command changes to the new value at a constant rate of climb or descent."""
 
     value: Number | None = number(
         None,
@@ -442,7 +442,7 @@ class AltitudeLeg(_Leg):
 
 
 class AirspeedLeg(_Leg):
-    """A commanded airspeed. The command moves to it at a constant acceleration."""
+    """A commanded airspeed. The command changes to the new value at a constant acceleration."""
 
     value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
     change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
@@ -491,8 +491,9 @@ def _legs(says: str) -> Any:
 
 
 class Autopilot(Section):
-    """The flight path. Each quantity has a list of legs. At its time, a leg sets a new `value`, or keeps the
-    present one with `hold: true`. A quantity that is left out is not controlled."""
+    """The flight path. Each quantity has a list of legs. A leg begins at its time `at_s`. It sets a new
+    `value`, or keeps the present value if it has `hold: true`. A quantity that is left out is not
+    controlled."""
 
     altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
         "legs of the altitude"

@@ -568,13 +568,14 @@ class Detectability(StudyCommand):
     The command varies the airspeed, the altitude and the amplitude of the references. It prints one sentence
     for each surface, and then the tables.
 
-    A fault is certain to be isolated if it is detected within 0.5 s and isolated within 1 s with every error
-    within the declared bounds. The references of the scenario are scaled by factors from 0.25 to 2. A column
-    with `median` is for half of the possible start times of the fault. With --surface the command prints one
-    sentence for each airspeed and altitude.
+    A loss is certain to be isolated if it meets two conditions for all errors within the declared bounds: it
+    is detected within 0.5 s, and isolated within 1 s. The references of the scenario are scaled by factors
+    from 0.25 to 2. A column with `median` has the loss for which the conditions hold at half of the possible
+    start times of the fault. With --surface the command prints one sentence for each airspeed and altitude.
 
-    The map of isolability has a row for each pair of surfaces. A row contains the smallest loss that is
-    distinguished, its delay, and the smallest doublet that distinguishes the two surfaces.
+    The map of isolability has a row for each pair of surfaces. A row contains the smallest loss for which the
+    two surfaces are distinguished, the delay of this decision, and the smallest doublet that distinguishes
+    the surfaces.
 
     If the command is interrupted, the same command resumes it.
 

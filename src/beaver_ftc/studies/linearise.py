@@ -15,14 +15,14 @@ from beaver_ftc.studies import handling, margins
 class Linearise(StudyCommand):
     """Linearise the closed loop and print its margins.
 
-    The loop contains the aircraft, the actuators, lag and delay of the sensors, the frame rate and the
-    default law. The command opens the loop at each surface in turn, at several airspeeds of the envelope. It
-    prints the margins of the healthy aircraft, and with losses of each surface. In the cases with a loss, the
-    law uses the true effectiveness.
+    The loop contains the aircraft, the actuators, the lag and delay of the sensors, and the default law at
+    its frame rate. The command opens the loop at each surface in turn, at several airspeeds of the envelope.
+    It prints the margins of the healthy aircraft, and the margins after losses of effectiveness of each
+    surface. After a loss, the law uses the true effectiveness.
 
     The command also prints the handling qualities of the aircraft alone: short period, phugoid, Dutch roll,
-    roll and spiral mode, and their levels of MIL-F-8785C. If the scenario has a fault, the command also
-    prints the handling qualities at the end of the flight.
+    roll and spiral mode. For each mode it prints the level of MIL-F-8785C. If the scenario has a fault, the
+    command also prints the handling qualities at the end of the flight.
 
     Examples:
       beaver-ftc linearise elevator-loss-in-turbulence

@@ -432,9 +432,9 @@ class Verify(StudyCommand):
 
     The guarantees hold as long as all errors are within the declared bounds. The command counts violations of
     the guarantees, with exact confidence limits. A violation is a false alarm, an excluded true fault, a
-    wrong isolation, or a detection more than one frame later than guaranteed. The same flights are
-    diagnosed by the published scheme, and by the sharpened one, which has the steps of `fdi.sharpen`. The
-    exit status is 1 if a guarantee is violated.
+    wrong isolation, or a detection more than one frame later than guaranteed. Two schemes diagnose the same
+    flights: the published scheme and the sharpened scheme. The sharpened scheme has the steps of
+    `fdi.sharpen`. The exit status is 1 if a guarantee is violated.
 
     If the command is interrupted, the same command resumes it.
 

@@ -19,7 +19,7 @@ def command(
     """Propose the smallest doublet that separates candidates.
 
     The command flies the scenario to its end. For each pair of remaining candidates it prints the smallest
-    doublet that is certain to distinguish them, and the time until it does. The doublet stays within the
+    doublet that is certain to distinguish the two, and the time that this takes. The doublet stays within the
     limits of travel, actuators, body rates and angle of attack. If no such doublet exists, the command prints
     the reason. If the scenario contains `fdi.probing`, the command also flies the doublets and reports the
     remaining candidates. The folder flown/N/ then contains log and certificate of the flight with doublet N.

@@ -41,7 +41,7 @@ instead of text. [Columns](reference/columns.md) lists the columns of the tables
 [glossary](reference/glossary.md) explains the terms of the diagnosis."""
 _NEXT = """## Next
 
-[Exit statuses](reference/exit-statuses.md) explains the status with which a command ends.
+[Exit statuses](reference/exit-statuses.md) explains what each exit status means.
 [Columns](reference/columns.md) has the columns of the tables that commands write."""
 _CONTENTS = '*Table 1. The commands, by purpose. "more": the page that shows or explains the command.*'
 
@@ -84,7 +84,7 @@ _PRINTED = {
     " supervisor, notes, tracking errors, and each expectation with its result.",
     "list": "The example prints the names of each list.",
     "show": "The example prints the YAML text of the scenario.",
-    "new": "Each example prints the name of the written file or folder, and the next command.",
+    "new": "Each example prints the name of the written file or folder, and a command to run next.",
     "validate": "The example prints one line for each file: `valid`, or its mistakes.",
     "schema": "The example prints one JSON document.",
     "trim": "The example prints one line for each state, setting and surface, with its value and unit.",
@@ -94,21 +94,21 @@ _PRINTED = {
     "sweep": "The first example prints rates of detection, isolation and false alarms with their 95 % "
     "intervals, the delays (s), the tracking errors (deg/s), and each expectation with its result. The "
     "second example also prints the worst flight that the search found.",
-    "compare": "The first two examples fly two scenarios and compare the runs: one row for each quantity, "
-    "one column for each run. A `*` marks the rows that differ. The third example prints one row for each "
-    "scheme and each law. The fourth example chooses the parameters of one scheme.",
+    "compare": "The first two examples fly two scenarios and compare the runs. The table has one row for "
+    "each quantity and one column for each run. A `*` marks the rows that differ. The third example prints "
+    "one row for each scheme and each law. The fourth example chooses the parameters of one scheme.",
     "matrix": "The first example prints a table with a row for each fault and a column for each surface. A "
     "cell has the verdict, the delay of the alarm (s), and the tracking error divided by that of the "
     "informed law.",
-    "detectability": "The example prints one sentence for each amplitude of the reference, such as: at 45 "
-    "m/s and 1000 m, 1.5 deg/s of pitch: a loss of elevator of 18 % and more is certain to be detected "
-    "within 0.5 s.",
-    "smallest": "The example prints the two sizes of the loss, and a table with the condition that limits "
-    "them.",
+    "detectability": "The example prints one sentence for each amplitude of the reference, such as "
+    '"at 45 m/s and 1000 m, 1.5 deg/s of pitch: a loss of elevator of 18 % and more is certain to be '
+    'detected within 0.5 s".',
+    "smallest": "The example prints the two losses, and a table with one row for each change of "
+    "the conditions.",
     "power": "The example prints one line for each size of the loss.",
     "decay": "The example prints a table with a row for each error and size.",
     "mismatch": "The first example prints RMS, largest value and share of the bound for each source and "
-    "axis, in 1e-3 rad/s². It ends with the constant bound that would just contain the error.",
+    "axis, in 1e-3 rad/s². The output ends with the smallest constant bound that would contain the error.",
     "bench": "The example prints the time of a frame, and its ratio to the time of the bare aircraft.",
     "verify": "The example prints the number of flights, violations and upper confidence limits for each "
     "scheme.",
@@ -117,11 +117,12 @@ _PRINTED = {
     "mechanisms": "The example prints one row for each mechanism.",
     "separate": "The example prints one line for each pair of candidates.",
     "identify": "The example needs the folder `my-logs` of `beaver-ftc new my-logs --log`. It prints the "
-    "number of samples, and the share of each rate that the model explains on data left out of the fit.",
+    "number of samples. For each rate it also prints the share that the model explains in data that the fit "
+    "did not use.",
     "diagnose": "The example prints each event with its time span, and the effectiveness of each surface "
     "with its interval.",
-    "derive": "The example prints the number of terms of each moment coefficient, the largest error on each"
-    " axis (rad/s²) in states of the fit and in other states, and the declared bound.",
+    "derive": "The example prints the number of terms of each moment coefficient. For each axis it prints "
+    "the largest error (rad/s²) in states of the fit and in other states, and the declared bound.",
     "challenge submit": "The example prints the points of the practice flight, and the path of the "
     "submission.",
     "challenge grade": "The example prints the ranking: one row for each submission.",
@@ -240,7 +241,7 @@ def statuses_page() -> str:
         "the command was successful."
     )
     _, _, listed = PARSER.help.partition("Exit status: ")
-    found = re.findall(r"(\d+) ([^,.]+)", " ".join(listed.split()))
+    found = re.findall(r"(\d+) = ([^,.]+)", " ".join(listed.split()))
     raised = {
         error.exit_code: f"`{error.__name__}`: {' '.join(str(error.__doc__).split())}"
         for error in vars(errors).values()

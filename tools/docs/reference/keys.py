@@ -70,21 +70,22 @@ _READ = """## How to read a table
 
 The file is YAML. Each section of the file has a table below, with a row for each key:
 
-- *what it is*: meaning of the key. The text after "Left out:" says what happens without the key.
+- *what it is*: meaning of the key. The text after "Left out:" says what happens if the key is left out.
 - *type*: kind of value. A link goes to the table of a section below this key. A mapping of names to
   numbers is written `{aileron: 0.1, rudder: 0.2}`.
 - *unit*: unit of a number. `1` is a pure number. `share of 1` is a fraction: 0.4 is 40 %.
 - *range*: allowed values. The value of a key of the type "choice" is one of the listed values.
-- *default*: value that is used without the key. "required": the key must be in the file. "left out": there
-  is no value. "none": the value is empty. "see section": the keys of the section have their own defaults.
+- *default*: value that is used if the key is left out. "required": the key must be in the file. "left
+  out": there is no value. "none": the value is empty. "see section": the keys of the section have their own
+  defaults.
 - *example*: the key with an allowed value. Some examples need a second key. The column *what it is*
   then names this key.
 
 In a heading, `[]` stands for each item of a list. `NAME` stands for a name that you choose or that the
-aircraft has. A key in brackets, such as [Zhang2005], refers to an entry of the
+aircraft has. A label in brackets, such as [Zhang2005], refers to an entry of the
 [sources](../REFERENCES.md). The [glossary](reference/glossary.md) explains the terms, and the
 [nomenclature](reference/nomenclature.md) explains symbols, axes and signs."""
-_CONTENTS = "*Table 1. The sections of the file, by their key at the top of the file.*"
+_CONTENTS = "*Table 1. The keys at the top level of the file, and the sections that belong to each key.*"
 
 
 def _contents(sections: Iterable[Section], headings: Iterable[str]) -> str:
@@ -109,7 +110,7 @@ def _captioned(parts: Iterable[str], number: int) -> Iterator[str]:
         if part.startswith("|"):
             first, second, *_ = part.split("\n")[0].strip("| ").split(" | ")
             shown = {"option": f"Options of each {first}", "part": "Values of each preset"}
-            yield f"*Table {number}. {shown.get(second, f'Names of each {first}, and what it does')}.*"
+            yield f"*Table {number}. {shown.get(second, f'The {first}s, and what each of them does')}.*"
             number += 1
         yield part
 
@@ -117,14 +118,14 @@ def _captioned(parts: Iterable[str], number: int) -> Iterator[str]:
 def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
     parts = [f'<a id="{_anchor(section.title)}"></a>\n\n## {_heading(section)}']
     if _is_also_a_list(section):
-        parts.append("The value is one such mapping, or a list of them.")
+        parts.append("The value is one mapping with these keys, or a list of such mappings.")
     elif elsewhere := _elsewhere(section):
         parts.append(f"Sections with the same keys: {elsewhere}.")
     if section.says:
         parts += [" ".join(part.split()) for part in section.says.split("\n\n")]
     if page := links.get(_SENSOR_FAULTS if _is_of_a_sensor(section) else dotted(section.places[0].path)):
         parts.append(f"More: {page}.")
-    parts.append(f"*Table {number}. Keys of {_called_file(section)}.*")
+    parts.append(f"*Table {number}. Keys {_called_file(section)}.*")
     parts.append(markdown_table(HEAD, [_row(key, section.places) for key in section.keys]))
     return "\n\n".join(parts)
 
@@ -132,8 +133,16 @@ def _section(section: Section, number: int, links: Mapping[str, str]) -> str:
 def _called_file(section: Section) -> str:
     heading = _heading(section)
     if section.title in _HEADINGS:
-        return heading[0].lower() + heading[1:]
-    return "the top of the file" if heading == "The file" else heading
+        return f"of {heading[0].lower()}{heading[1:]}"
+    if heading == "The file":
+        return "at the top level of the file"
+    beside = _beside(section)
+    above = beside[0][:-1]
+    if len(beside) > 1 and above:
+        return "of " + _together(above, [path[-1] for path in beside])
+    if _is_of_a_sensor(section):
+        heading = heading.removesuffix(" of a sensor").replace(", type", " for a sensor fault of type")
+    return f"of {heading}"
 
 
 _TYPES_OF = {"OfHandling": "handling_qualities"}  # title of a section -> its type, if not its words
@@ -150,10 +159,16 @@ def _heading(section: Section) -> str:
         return "The file"
     if section.title in _HEADINGS:
         return _HEADINGS[section.title]
-    beside = [place.path for place in section.places if place.path[:-1] == first[:-1]]
+    beside = _beside(section)
     kind = next((key.choices[0] for key in section.keys if key.name == "type"), "")
     of = " of a sensor" if _is_of_a_sensor(section) else ""
     return _named(beside) + (f", type `{kind}`{of}" if kind else "")
+
+
+def _beside(section: Section) -> list[Path]:
+    """Its paths with the same key above them as the first path."""
+    above = section.places[0].path[:-1]
+    return [place.path for place in section.places if place.path[:-1] == above]
 
 
 def _is_of_a_sensor(section: Section) -> bool:
@@ -321,7 +336,7 @@ def _of_scenarios() -> Iterator[str]:
         yield f"## {what.capitalize()}, and their `{where}.options`"
         yield (
             f"`{where}.{what[:-1]}` has one of these names, and `{where}.options` sets the options below. "
-            f"{what.capitalize()} that are not in the table of options have no options."
+            f"A {what[:-1]} that is not in the table of options has no options."
         )
         entries = [entry for entry in registered(group).values() if entry.package == "beaver-ftc"]
         yield markdown_table(
@@ -335,7 +350,7 @@ def _of_scenarios() -> Iterator[str]:
         yield markdown_table((what[:-1], "option", "range", "default", "what it is"), rows)
     for what, presets in (("sensors", sensors.PRESETS), ("actuators", airframe.PRESETS)):
         yield f"## Presets of `{what}`"
-        yield f"A preset is a name for these values: `{what}: NAME` replaces the section with the values."
+        yield f"A preset is a name for a set of values. With `{what}: NAME` the section has these values."
         rows = [(f"`{name}`", *each) for name, of in presets.items() for each in _preset(of)]
         yield markdown_table(("preset", "part", "values"), rows)
 
@@ -412,7 +427,7 @@ KINDS = {
         "of the simulated aircraft is 5 % too large, and the diagnosis allows for errors of 5 %. Only `name` "
         "is required; every other key has a default.",
         "[Sweep keys](reference/sweep-keys.md) has the keys of a file with many flights, and "
-        "[columns](reference/columns.md) the results of a flight.",
+        "[columns](reference/columns.md) lists the results of a flight.",
         _of_scenarios,
         _LINKS,
     ),
@@ -422,8 +437,8 @@ KINDS = {
         "Which keys can a sweep file have? This page lists every key, for readers who write a sweep. "
         "A sweep flies one scenario many times with varied values "
         f"([how to fly one](how-to/sweeps.md)). {_AS_SCHEMA.format(' --sweep')}",
-        "This sweep flies 50 losses of the elevator. Their size and the airspeed are random. At least 90 % "
-        "of the losses must be detected, and half of the losses within 0.2 s.",
+        "This sweep flies 50 losses of the elevator. The size of the loss and the airspeed are random. At "
+        "least 90 % of the losses must be detected, and half of the losses must be detected within 0.2 s.",
         "[Results of a sweep](reference/sweep-results.md) has the files and statistics that a sweep writes.",
     ),
     "plan-keys": Kind(

@@ -172,8 +172,8 @@ def _wrong(case: str) -> str | None:
 
 
 class Damage(Switched):
-    """A case of damage that the file of the aircraft declares. It changes aerodynamics and mass, and removes
-    surfaces.
+    """A case of structural damage that the file of the aircraft declares. The damage changes the aerodynamics
+    and the mass, and removes surfaces.
 
     case: name of the case in the file of the aircraft
     """

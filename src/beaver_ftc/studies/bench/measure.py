@@ -322,8 +322,8 @@ class Bench(StudyCommand):
     """Time the closed loop against the bare aircraft.
 
     The command times the loop and the bare aircraft in turn. It also times each part of the loop: it leaves
-    the part out and measures the difference. The first run compiles the frame again for each part. This
-    compilation takes about two minutes.
+    the part out and measures the difference. In the first run, the code of a frame is compiled again for each
+    part. This compilation takes about two minutes.
 
     Examples:
       beaver-ftc bench --no-parts

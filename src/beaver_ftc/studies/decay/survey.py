@@ -192,10 +192,10 @@ class Decay(StudyCommand):
     """Measure how verdicts degrade beyond declared bounds.
 
     `fdi.bounds` can declare several errors. The command flies each declared error at 1, 1.5, 2 and 4 times
-    its declared size, first alone and then together with all other errors. An error that is not
-    declared has no declared size. The command flies it alone, in multiples of a unit. The sign of an error is
-    random, its size is not. The command reports false alarms, detections, right names, wrong names and
-    tracking errors, each with its 95 % interval.
+    its declared size, first alone and then together with all other errors. An error that is not declared has
+    no declared size. The command flies such an error alone, at multiples of a fixed size. The sign of an
+    error is random, but its size is not. The command reports false alarms, detections, right names, wrong
+    names and tracking errors, each with its 95 % interval.
 
     If the command is interrupted, the same command resumes it.
 

@@ -21,12 +21,13 @@ from beaver_ftc.studies.matrix import pitch_lost as lost
 class Matrix(StudyCommand):
     """Fly every fault type on every surface.
 
-    The command reports which faults are detected and which are named. It also divides the tracking error by
-    that of the informed law, a law that receives the true fault. With --declared the command also reports how
-    many faults the informed test detects, and how many of these faults the diagnosis names.
+    The command reports which faults are detected and which are named. It also reports the tracking error,
+    divided by the tracking error of the informed law. The informed law receives the true fault. With
+    --declared the command also reports how many faults the informed test detects, and how many of those the
+    diagnosis names. The informed test receives the true fault, too.
 
     The exit status is 1 if a fault is named wrongly or an alarm is false. With --pitch-lost, the exit status
-    is 1 if an aircraft is lost only with control by engine power.
+    is 1 if an aircraft is lost with control by engine power, but not without this control.
 
     If the command is interrupted, the same command resumes it.
 

@@ -38,11 +38,16 @@ class Mechanisms(StudyCommand):
     The command flies two systems on the same random flights: the published system and the default system.
     Each system flies with all of its mechanisms, and then without one mechanism at a time. The mechanisms are
     adaptive thresholds, adaptation, networks, hand-over to the flap, bank of poles, memory, sharpened tests
-    and statistics. The random flights differ in fault, bandwidth of the law, undeclared error and
-    instruments. For each mechanism the command prints how many flights become worse without it, minus those
-    that become better, as a share of all flights. False alarms, late alarms, names and tracking have a share
-    of their own, each with its 95 % interval. For each false alarm of a worst-case detector it prints the
-    reason, and for the default scheme also the certificate.
+    and statistics. The random flights differ in the fault, the bandwidth of the law, the undeclared error,
+    and the instruments.
+
+    For each mechanism the command counts the flights that become worse without the mechanism, and subtracts
+    the number of flights that become better. It prints this difference as a share of all flights. There is
+    one share for false alarms, one for late alarms, one for names and one for tracking, each with its 95 %
+    interval.
+
+    For each false alarm of a worst-case detector the command prints the reason. For the default scheme it
+    also prints the certificate.
 
     The exit status is 1 if a false alarm of a worst-case detector has no reason.
 

@@ -306,7 +306,8 @@ class Reproduce(StudyCommand):
 
     The study is [Zhang2005]. The command reports every figure and every statement of the study. For each
     statement it reports the value that it found and a verdict. It also reports the value without the
-    mechanism to which the statement refers. It also flies the same cases with the default scheme and law.
+    mechanism to which the statement refers. The command also flies the same cases with the default scheme and
+    law.
 
     The exit status is 1 if a statement does not hold and the reason is not known.
 

@@ -259,14 +259,15 @@ def _counted(count: int, of: int) -> Document:
 class Smallest(StudyCommand):
     """Find the smallest loss that is detected within a time.
 
-    The command reports two sizes of a loss. The first size is certain to be detected. The second size is
-    detected in 90 % of the flights; it has a 95 % interval. The flights are those of the scenario without its
-    faults. Seed and time of the loss are random. The command adds flights until the interval is narrow, up to
-    480 flights.
+    The command reports two losses of effectiveness of the surface: the smallest loss that is certain to be
+    detected, and the smallest loss that is detected in 90 % of the flights. The second loss has a 95 %
+    interval. Each flight is the scenario without its own faults, but with a loss. The seed and the time of
+    the loss are random. The command adds flights until the interval is narrow, up to 480 flights.
 
-    Finally it reports which condition limits the size. For this purpose it repeats the flights with one
-    change at a time: without turbulence, without sensor errors, without servos, without model uncertainty,
-    with references of twice the amplitude, and with references of twice the frequency.
+    Finally the command reports which condition makes the smallest losses so large. To find this condition, it
+    repeats the flights with one change at a time: without turbulence, without sensor errors, without servos,
+    without model uncertainty, with references of twice the amplitude, and with references of twice the
+    frequency.
 
     If the command is interrupted, the same command resumes it.
 

@@ -36,14 +36,17 @@ def sweep(
     """Fly a scenario many times, and return a DataFrame with one row for each flight.
 
     - `scenario`: a built-in name, the path of a file, a mapping or a `Scenario`.
-    - `vary`: dotted key to its variation, e.g. `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`.
-    - `runs`: number of flights. By default each point of the grid is flown once.
-    - `workers`: number of processes. The rows do not depend on it.
-    - `seed`, `sampling`, `expect`: as in a sweep file.
-    - `out`: folder in which results.parquet, summary.json and report.html are kept, in a folder of their own.
+    - `vary`: a mapping from dotted key to its variation, e.g.
+      `{"faults[0].magnitude": {"uniform": [0.2, 1.0]}}`.
+    - `runs`: number of flights. By default, each point of the grid of varied values is flown once.
+    - `workers`: number of processes. The results are the same for any number of processes.
+    - `seed`, `sampling`, `expect`: the keys with these names in a sweep file.
+    - `out`: folder for the results. The sweep makes a new folder in it, and writes results.parquet,
+      summary.json and report.html there.
 
-    The columns are those of results.parquet. `attrs` of the DataFrame contains scenario, seed, varied keys
-    and units. If a flight fails, its row has the reason. Raises BadInput with the key that is wrong.
+    The DataFrame has the columns of results.parquet. Its `attrs` contain scenario, seed, varied keys and
+    units. If a flight fails, its row contains the reason. Raises BadInput if a key or value is wrong. The
+    message names the key.
     """
     asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
     made = _made(scenario, {key: value for key, value in asked.items() if value is not None})

@@ -19,7 +19,7 @@ DERIVED_IN = {
 }  # section of the page: where it is derived
 OF_TYPES = ("slowest_oscillation_rad_s", "slowest_rate_deg_s")  # keys of section 4 that another page derives
 CONSTANTS = (  # (section, meaning, module, name there, unit)
-    (2, "rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
+    (2, "rotation rate of the Earth", aircraft, "EARTH_RATE_RAD_S", "rad/s"),
     (2, "allowance for rounding", bounds, "ROUNDING_RAD_S2", "rad/s²"),
     (2, "limit of instrument noise: number of standard deviations", instruments, "NOISE_LIMIT_SIGMA", ""),
     (2, "limit of gusts: number of standard deviations", bounds, "GUST_LIMIT_SIGMA", ""),
@@ -49,13 +49,13 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "growth rate in the signature of a growing loss", statistical, "LOSS_GROWTH_RATE_PER_S", "1/s"),
     (
         7,
-        "a loss is excluded only if its log-likelihood ratio is below this share of the best one",
+        "a loss is excluded only if its log-likelihood ratio is below this share of the largest ratio",
         statistical,
         "MIN_LLR_SHARE_OF_CONSTANT_LOSS",
         "",
     ),
     (7, "number of frequencies of the oscillation tests", parity, "N_TONE_FREQUENCIES", ""),
-    (7, "range of these frequencies", parity, "TONE_FREQUENCIES_RAD_S", "rad/s"),
+    (7, "range of the frequencies of the oscillation tests", parity, "TONE_FREQUENCIES_RAD_S", "rad/s"),
     (7, "time constant of the oscillation tests", parity, "TONE_MEMORY_S", "s"),
     (9, "poles of the filters of the sensor monitor", redundancy, "FILTER_POLES_PER_S", "1/s"),
     (
@@ -86,7 +86,7 @@ SETTINGS = (  # (section, meaning, key of a scenario, of which section of it, un
     (3, "poles of further filters", "pole_bank_per_s", FdiConfig(), "1/s"),
     (4, "pole of the isolation estimators", "isolation_pole_per_s", FdiConfig(), "1/s"),
     (4, "time constant of the estimates", "forgetting_time_s", FdiConfig(), "s"),
-    (4, "slowest oscillation of a surface", "slowest_oscillation_rad_s", FdiConfig(), "rad/s"),
+    (4, "lowest frequency of an oscillating surface", "slowest_oscillation_rad_s", FdiConfig(), "rad/s"),
     (4, "slowest rate limit; a slower surface counts as jammed", "slowest_rate_deg_s", FdiConfig(), "deg/s"),
     (7, "declared rate of false alarms", "false_alarms_per_h", Statistical(), "1/h"),
     (7, "probability that noise excludes the true fault in a second", "misnaming", Statistical(), ""),

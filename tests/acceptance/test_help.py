@@ -42,7 +42,7 @@ def test_no_line_of_the_list_of_commands_is_cut_short_and_no_argument_is_bracket
 
 def test_the_program_says_its_exit_statuses(helps):
     said = " ".join(helps[""].split())
-    for status in ("0 done", "1 an expectation or", "2 bad input or usage", "3 the simulation could not"):
+    for status in ("0 = done", "1 = an expectation or", "2 = bad input or usage", "3 = the simulation"):
         assert status in said
 
 

@@ -148,7 +148,7 @@ def diagnose_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, diagnosis, input_arrays, gap_free_stretches, replayed_by_stretch = (
+    samples, diagnosis, input_arrays, gap_free_stretches, replayed_verdicts_by_stretch = (
         aircraft_inputs.samples,
         aircraft_inputs.diagnosis,
         aircraft_inputs.input_arrays,
@@ -157,33 +157,36 @@ def diagnose_inputs(
     )
     for begin, end in gap_free_stretches:
         diagnosis.reset()
-        replayed_by_stretch.append(
+        replayed_verdicts_by_stretch.append(
             replay_samples(diagnosis, [array[begin:end] for array in input_arrays], aircraft_inputs.rate_hz)
         )
     if not diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
-        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, replayed_by_stretch)
-    replayed_flight = _join_stretch_diagnoses(
-        len(samples.t_s), len(diagnosed_aircraft.aircraft.surfaces), gap_free_stretches, replayed_by_stretch
+        _check_command_signs(samples.name, diagnosed_aircraft.aircraft, replayed_verdicts_by_stretch)
+    replayed_flight_verdicts = _join_stretch_verdicts(
+        len(samples.t_s),
+        len(diagnosed_aircraft.aircraft.surfaces),
+        gap_free_stretches,
+        replayed_verdicts_by_stretch,
     )
     rows = diagnosis_rows_from_replay(
-        samples.t_s, replayed_flight, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
+        samples.t_s, replayed_flight_verdicts, diagnosed_aircraft.aircraft.surfaces, diagnosis.config
     )
     rows_by_reason = _undiagnosable_rows_by_reason(
         input_arrays[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
-    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed_flight)
+    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
     rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, rows_by_reason))
     return rows, _verdict_document(
-        samples, rows, replayed_flight, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
+        samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
     )
 
 
 def _check_command_signs(
-    flight_name: str, aircraft: Aircraft, replayed_by_stretch: list[ReplayedVerdicts]
+    flight_name: str, aircraft: Aircraft, replayed_verdicts_by_stretch: list[ReplayedVerdicts]
 ) -> None:
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
     for surface, gain_upper_bound in zip(
         aircraft.surfaces,
-        np.min([one.command_gain_upper_bounds for one in replayed_by_stretch], axis=0),
+        np.min([one.command_gain_upper_bounds for one in replayed_verdicts_by_stretch], axis=0),
         strict=True,
     ):
         if gain_upper_bound < trust.MAX_REVERSED_GAIN:
@@ -326,11 +329,11 @@ def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: floa
     return [(begin, end + 1) for begin, end in begin_end_pairs if end + 1 - begin >= _MIN_STRETCH_SAMPLES]
 
 
-def _join_stretch_diagnoses(
+def _join_stretch_verdicts(
     n_samples: int,
     n_surfaces: int,
     gap_free_stretches: list[tuple[int, int]],
-    replayed_by_stretch: list[ReplayedVerdicts],
+    replayed_verdicts_by_stretch: list[ReplayedVerdicts],
 ) -> ReplayedVerdicts:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
@@ -340,9 +343,9 @@ def _join_stretch_diagnoses(
         np.ones((n_samples, n_surfaces)),
     )
     command_gain_upper_bounds = np.min(
-        [replayed.command_gain_upper_bounds for replayed in replayed_by_stretch], axis=0
+        [replayed.command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
     )
-    for (begin, end), replayed in zip(gap_free_stretches, replayed_by_stretch, strict=True):
+    for (begin, end), replayed in zip(gap_free_stretches, replayed_verdicts_by_stretch, strict=True):
         verdicts[begin:end], effectiveness_low[begin:end], effectiveness_high[begin:end] = (
             replayed.verdicts,
             replayed.single_fault_effectiveness_low,
@@ -376,7 +379,7 @@ def _undiagnosable_rows_by_reason(
 
 
 def _unexplained_start_rows_by_reason(
-    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight: ReplayedVerdicts
+    t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight_verdicts: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the
     residuals within the first second."""
@@ -387,10 +390,10 @@ def _unexplained_start_rows_by_reason(
         )
         if any(
             verdict.isolated == "unanticipated"
-            for verdict in replayed_flight.verdicts[begin:first_second_end_row]
+            for verdict in replayed_flight_verdicts.verdicts[begin:first_second_end_row]
         ):
             first_alarm_row = next(
-                k for k in range(begin, first_second_end_row) if replayed_flight.verdicts[k].detected
+                k for k in range(begin, first_second_end_row) if replayed_flight_verdicts.verdicts[k].detected
             )
             is_after_unexplained_alarm[first_alarm_row:end] = True
     reason = (
@@ -423,18 +426,20 @@ def _add_rows_after_doubtful_alarm(
 def _verdict_document(
     samples: Samples,
     rows: DiagnosisRows,
-    replayed_flight: ReplayedVerdicts,
+    replayed_flight_verdicts: ReplayedVerdicts,
     diagnosed_aircraft: DiagnosedAircraft,
     mean_age_s_by_held_column: dict[str, float],
 ) -> Document:
     """The document of verdict.json."""
     surfaces = list(diagnosed_aircraft.aircraft.surfaces)
     alarm_rows = np.flatnonzero(rows.faulty)
-    verdict_of_last_alarm_row = replayed_flight.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    verdict_of_last_alarm_row = (
+        replayed_flight_verdicts.verdicts[alarm_rows[-1]] if alarm_rows.size else Verdict()
+    )
     alarm_rows_with_last_isolation = [
         k
         for k in alarm_rows.tolist()
-        if replayed_flight.verdicts[k].isolated == verdict_of_last_alarm_row.isolated
+        if replayed_flight_verdicts.verdicts[k].isolated == verdict_of_last_alarm_row.isolated
     ]
     held_column_notes = [
         f"{name} is held, {mean_age_s:.2g} s old on average: errors declared have to cover it"
@@ -471,12 +476,12 @@ def _excluded_loss_sentences(rows: DiagnosisRows, surfaces: list[str]) -> list[s
     is_credible_without_alarm = (rows.faulty == 0) & (rows.credible == 1)
     if not is_credible_without_alarm.any():
         return []
-    median_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
+    median_least_excluded_losses = 1.0 - np.median(rows.effectiveness_low[is_credible_without_alarm], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
         if loss < 1.0
         else f"{name}: in half of the flight not even a complete loss would show within a second."
-        for name, loss in zip(surfaces, median_excluded_losses.tolist(), strict=True)
+        for name, loss in zip(surfaces, median_least_excluded_losses.tolist(), strict=True)
     ]
 
 

@@ -39,21 +39,27 @@ def logs_with_one_mistake_corrected(
     surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
     commands."""
     surfaces, rate_columns = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    for first_index, second_index in combinations(
+    for first_surface_index, second_surface_index in combinations(
         [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
     ):
         surface_order = list(range(len(surfaces)))
-        surface_order[first_index], surface_order[second_index] = second_index, first_index
+        surface_order[first_surface_index], surface_order[second_surface_index] = (
+            second_surface_index,
+            first_surface_index,
+        )
         exchanged_samples = replace(samples, commands=samples.commands[:, surface_order])
         yield CorrectedLog(
-            f"the commands of {surfaces[first_index]} and {surfaces[second_index]} exchanged",
+            f"the commands of {surfaces[first_surface_index]} and {surfaces[second_surface_index]} exchanged",
             exchanged_samples,
         )
-    for first_rate, second_rate in combinations(rate_columns, 2):
+    for first_rate_column, second_rate_column in combinations(rate_columns, 2):
         exchanged_samples = _with_exchanged_or_scaled_columns(
-            samples, vehicle, {first_rate: second_rate, second_rate: first_rate}, {}
+            samples,
+            vehicle,
+            {first_rate_column: second_rate_column, second_rate_column: first_rate_column},
+            {},
         )
-        yield CorrectedLog(f"{first_rate} and {second_rate} exchanged", exchanged_samples)
+        yield CorrectedLog(f"{first_rate_column} and {second_rate_column} exchanged", exchanged_samples)
     for name in [*rate_columns, *vehicle.signal_columns]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
@@ -64,7 +70,7 @@ def logs_with_one_mistake_corrected(
 def _with_exchanged_or_scaled_columns(
     samples: Samples,
     vehicle: Vehicle,
-    column_to_take_for: Mapping[str, str],
+    source_column_of_column: Mapping[str, str],
     factor_of_column: Mapping[str, float],
 ) -> Samples:
     """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
@@ -74,7 +80,7 @@ def _with_exchanged_or_scaled_columns(
     for name in column_names:
         stem, suffix = name.removesuffix(" by airspeed"), name[len(name.removesuffix(" by airspeed")) :]
         new_columns.append(
-            factor_of_column.get(stem, 1.0) * columns[column_to_take_for.get(stem, stem) + suffix]
+            factor_of_column.get(stem, 1.0) * columns[source_column_of_column.get(stem, stem) + suffix]
         )
     new_signals = np.column_stack(new_columns[3:]) if new_columns[3:] else samples.signals
     return replace(samples, rates=np.column_stack(new_columns[:3]), signals=new_signals)

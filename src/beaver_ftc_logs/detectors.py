@@ -103,8 +103,8 @@ def _fading_or_sliding_sums(values: Floats, dt_s: float, forgets_exponentially: 
 
         return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], values, axis=0))
     sums = np.cumsum(values, axis=0)
-    memory_samples = round(LEAST_SQUARES_MEMORY_S / dt_s)
-    sums[memory_samples:] = sums[memory_samples:] - sums[:-memory_samples].copy()
+    window_samples = round(LEAST_SQUARES_MEMORY_S / dt_s)
+    sums[window_samples:] = sums[window_samples:] - sums[:-window_samples].copy()
     return sums
 
 
@@ -154,16 +154,19 @@ def _diagnosis_rows_from_least_squares(
 
 
 def _rows_with_default_bounds(
-    samples: Samples, isolated_names: np.ndarray, effectiveness: Floats, **given_bounds: Floats
+    samples: Samples,
+    isolated_names: np.ndarray,
+    effectiveness: Floats,
+    **given_bounds_and_probability: Floats,
 ) -> DiagnosisRows:
     """Rows of a detector: faulty where it names a surface. Of low, high and probability those that are not
-    in given_bounds: the bounds are the estimate, the probability is 0 or 1."""
+    in given_bounds_and_probability: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in isolated_names], dtype=np.int64)
     bounds_and_probability = {
         "low": effectiveness,
         "high": effectiveness,
         "probability": faulty.astype(float),
-        **given_bounds,
+        **given_bounds_and_probability,
     }
     low, high, probability = (
         bounds_and_probability["low"],

@@ -258,20 +258,22 @@ def recent_noise_variance_scale(
     whitened_residual = residual @ np.linalg.inv(np.linalg.cholesky(noise_covariance)).T
     cumulated_residual = np.cumsum(np.vstack([np.zeros((1, 3)), whitened_residual]), axis=0)
     cumulated_usable_count = np.concatenate([[0], np.cumsum(is_usable)])
-    window_end = np.arange(1, len(whitened_residual) + 1)
+    window_end_rows = np.arange(1, len(whitened_residual) + 1)
     max_variance_ratio = np.zeros(len(whitened_residual))
     for span_s in _RESIDUAL_SUM_SPANS_S:
-        span_begin = np.maximum(window_end - max(round(span_s * rate_hz), 1), 0)
+        span_begin_rows = np.maximum(window_end_rows - max(round(span_s * rate_hz), 1), 0)
         squared_sum_per_sample_and_axis = (
-            (cumulated_residual[window_end] - cumulated_residual[span_begin]) ** 2
+            (cumulated_residual[window_end_rows] - cumulated_residual[span_begin_rows]) ** 2
         ).sum(axis=1) / (
-            3.0 * np.maximum(cumulated_usable_count[window_end] - cumulated_usable_count[span_begin], 1)
+            3.0
+            * np.maximum(cumulated_usable_count[window_end_rows] - cumulated_usable_count[span_begin_rows], 1)
         )
         cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_sum_per_sample_and_axis)])
-        window_begin = np.maximum(window_end - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
+        window_begin_rows = np.maximum(window_end_rows - max(round(_VARIANCE_WINDOW_S * rate_hz), 1), 0)
         max_variance_ratio = np.maximum(
             max_variance_ratio,
-            (cumulated_squares[window_end] - cumulated_squares[window_begin]) / (window_end - window_begin),
+            (cumulated_squares[window_end_rows] - cumulated_squares[window_begin_rows])
+            / (window_end_rows - window_begin_rows),
         )
     return max_variance_ratio
 

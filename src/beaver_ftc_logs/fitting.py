@@ -68,7 +68,7 @@ _FILTER_SETTINGS_FOR_OTHER_LAWS: dict[str, Any] = {
 not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6)."""
 _FILTER_SETTINGS_FOR_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-_GAIN_WINDOW_S, AUTOREGRESSIVE_ORDER = 10.0, 20
+_GAIN_ERROR_WINDOW_S, AUTOREGRESSIVE_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
@@ -506,7 +506,7 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     samples_and_usable = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    squared_error_sum = n_gains = float(len(model.groups))
+    normalized_squared_error_sum = n_gains = float(len(model.groups))
     for fold_model, held_out_flights in _cross_validation_fits(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
@@ -514,11 +514,14 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
         for held_out in held_out_flights:
             group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
             group_responses = group_responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
-            squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+            normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                 group_responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
             )
-            squared_error_sum, n_gains = squared_error_sum + squared_error, n_gains + n_determined_gains
-    return squared_error_sum / n_gains
+            normalized_squared_error_sum, n_gains = (
+                normalized_squared_error_sum + normalized_squared_error,
+                n_gains + n_determined_gains,
+            )
+    return normalized_squared_error_sum / n_gains
 
 
 def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
@@ -539,20 +542,25 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
         for held_out in held_out_flights:
             group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
             group_responses = group_responses[:, :, has_known_effect].reshape(*residual.shape, -1)
-            n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_WINDOW_S), 1)
+            n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses, window_residual = (
                     _without_mean(group_responses[window_rows]),
                     _without_mean(residual[window_rows]),
                 )
-                squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+                normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
                     prior_gain_covariance,
                 )
                 window_inflations_by_ma_coefficients.setdefault(
                     held_out.samples.noise_ma_coefficients, []
-                ).append(min(squared_error / max(n_determined_gains, 1), _MAX_WINDOW_COVARIANCE_INFLATION))
+                ).append(
+                    min(
+                        normalized_squared_error / max(n_determined_gains, 1),
+                        _MAX_WINDOW_COVARIANCE_INFLATION,
+                    )
+                )
     covariance_inflation_by_ma_coefficients = {
         ma_coefficients: max(float(np.mean(window_inflations)), 1.0)
         for ma_coefficients, window_inflations in window_inflations_by_ma_coefficients.items()
@@ -593,14 +601,16 @@ def _normalized_squared_gain_error_and_rank(
     identity_plus_prior_times_information = (
         np.eye(len(gain_errors)) + prior_gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
-    squared_error = max(
+    normalized_squared_error = max(
         float(
             score_vector
             @ np.linalg.lstsq(identity_plus_prior_times_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
         ),
         0.0,
     )
-    return squared_error, int(np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information)))
+    return normalized_squared_error, int(
+        np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information))
+    )
 
 
 def _standardized_responses_and_residual(
@@ -608,7 +618,7 @@ def _standardized_responses_and_residual(
 ) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
-    _, residual, rate_responses = whitened_residual_and_responses(model, held_out)
+    _, residual, rate_responses = time_whitened_residual_and_responses(model, held_out)
     whitening_matrix = np.linalg.inv(
         np.linalg.cholesky(
             np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
@@ -642,7 +652,7 @@ def _estimate_trim_random_walk_sd(
     for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         for held_out in held_out_flights:
-            rows, residual, _ = whitened_residual_and_responses(fold_model, held_out)
+            rows, residual, _ = time_whitened_residual_and_responses(fold_model, held_out)
             noise_covariance = np.array(
                 fold_model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance
             )
@@ -749,7 +759,7 @@ def add_fitted_ranges_and_alarm_threshold(
                 )
             held_out_peaks_and_hours.append(peaks_and_hours)
             if len(usable_flights) > 1 and model.vehicle.other_laws:
-                squared_gain_deviations.append(_squared_gain_deviation(fold_model, held_out))
+                squared_gain_deviations.append(_squared_gain_deviation_beyond_noise(fold_model, held_out))
     rate_regression = fit_least_squares_of_order(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
@@ -826,13 +836,16 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
             if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
         ]
         residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
-        share_by_chance = 3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
+        variance_share_explained_by_chance = (
+            3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
+        )
         log_determinant_ratio = (
             np.linalg.slogdet(np.array(noise_model.residual_covariance))[1]
             - np.linalg.slogdet(np.cov(residuals.T))[1]
         )
         unmodelled_variance_share = max(
-            unmodelled_variance_share, 1.0 - float(np.exp(log_determinant_ratio / 3.0)) - share_by_chance
+            unmodelled_variance_share,
+            1.0 - float(np.exp(log_determinant_ratio / 3.0)) - variance_share_explained_by_chance,
         )
     unexplained_effect_power = trust.effect_power_unexplained_by_others(
         [(usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights], model
@@ -843,7 +856,7 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
     )
 
 
-def _squared_gain_deviation(model: Model, held_out: FlightWithUsableRows) -> Floats:
+def _squared_gain_deviation_beyond_noise(model: Model, held_out: FlightWithUsableRows) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
     group_responses, residual = _standardized_responses_and_residual(model, held_out)
@@ -1044,7 +1057,7 @@ def gain_standard_error_by_column(
         np.sqrt(np.diag(rate_regression.residual_covariance)),
     )
     gain_standard_error_of_column = {}
-    for name, (past_rows, coefficients) in trust.cross_axis_coefficients(model).items():
+    for name, (past_rows, coefficients) in trust.coefficients_by_column_without_own_axis(model).items():
         coefficient_rows = [1 + row for row in past_rows]
         coefficients_over_standard_errors = coefficients / np.maximum(
             rate_regression.standard_errors[coefficient_rows], MIN_DIVISOR * noise_sd
@@ -1144,7 +1157,7 @@ def one_step_prediction_quality(model: Model, held_out: FlightWithUsableRows) ->
     }
 
 
-def whitened_residual_and_responses(
+def time_whitened_residual_and_responses(
     model: Model, usable_flight: FlightWithUsableRows
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers

@@ -366,7 +366,7 @@ def check_explained_variance(
         for axis, fold_values in explained_shares_by_axis.items()
         if entries_with_samples
     }
-    if unexplained_axes := {
+    if explained_share_by_unexplained_axis := {
         axis: explained_share
         for axis, explained_share in mean_explained_share_by_axis.items()
         if explained_share <= 0.0
@@ -377,8 +377,8 @@ def check_explained_variance(
         )
         raise BadInput(
             "identify: on parts it was not fitted on the model explains less of "
-            f"{', '.join(unexplained_axes)} than the "
-            f"mean does ({_values_by_axis_text(unexplained_axes)}), allowed: a model that "
+            f"{', '.join(explained_share_by_unexplained_axis)} than the "
+            f"mean does ({_values_by_axis_text(explained_share_by_unexplained_axis)}), allowed: a model that "
             "explains more; what would "
             f"help: more than these {usable_minutes:.1f} min, commands that move more "
             f"({stillest_surface_and_sd[0]} has a standard "
@@ -543,7 +543,7 @@ def _ma_coefficients_text(noise_model: NoiseModel) -> str:
     return ", ".join(f"{coefficient:.3g}" for coefficient in noise_model.ma_coefficients)
 
 
-def _another_day_sentences(expected: Document, n_flights: int) -> list[str]:
+def _another_day_sentences(expected_performance: Document, n_flights: int) -> list[str]:
     """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
     day_text = (
         "another day, each left out in turn"
@@ -551,25 +551,30 @@ def _another_day_sentences(expected: Document, n_flights: int) -> list[str]:
         else "another half of this day, not of another day"
     )
     lines = []
-    if "classes" in expected:
+    if "classes" in expected_performance:
         score_texts = [
-            f"{title} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
+            f"{title} {expected_performance[key]['mean']:.3f} ({expected_performance[key]['worst']:.3f})"
             for key, title in _SCORE_TITLES.items()
         ]
         lines.append(f"  expect of {day_text}, mean (worst): {', '.join(score_texts)}")
-    if "false_alarms_per_hour" in expected:
-        false_alarm_entry, missing_minutes = expected["false_alarms_per_hour"], expected["minutes_missing"]
+    if "false_alarms_per_hour" in expected_performance:
+        false_alarm_entry, missing_minutes = (
+            expected_performance["false_alarms_per_hour"],
+            expected_performance["minutes_missing"],
+        )
         lines.append(
             f"  false alarms: {false_alarm_entry['asked']:g} an hour asked for, "
             f"{false_alarm_entry['low']:.2g} to {false_alarm_entry['high']:.2g} at 90 %, "
-            f"by {expected['minutes_left_out']:.1f} min of health left out"
+            f"by {expected_performance['minutes_left_out']:.1f} min of health left out"
         )
         if missing_minutes:
             lines.append(
                 f"  to show this rate without a fitted tail {missing_minutes:.0f} min of health are missing"
             )
-        if expected.get("parts"):
-            alarmed_text = f"{expected['alarmed']} of {expected['parts']} parts left out alarm"
+        if expected_performance.get("parts"):
+            alarmed_text = (
+                f"{expected_performance['alarmed']} of {expected_performance['parts']} parts left out alarm"
+            )
             lines.append(f"  at the threshold of the others {alarmed_text}")
     return lines
 

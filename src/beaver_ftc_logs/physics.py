@@ -116,17 +116,17 @@ def _fit_angle_to_rate(
         ]
     )
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
-    window_begin, window_end = (
+    window_begin_rows, window_end_rows = (
         np.arange(0, len(t_s) - window_samples, window_samples),
         np.arange(window_samples, len(t_s), window_samples),
     )
-    is_window_usable = (t_s[window_end] - t_s[window_begin]) < 2.0 * _INTEGRATION_WINDOW_S
+    is_window_usable = (t_s[window_end_rows] - t_s[window_begin_rows]) < 2.0 * _INTEGRATION_WINDOW_S
     if pitch_rad is not None:
         cumulated_steep_count = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
-        is_window_usable &= cumulated_steep_count[window_end] == cumulated_steep_count[window_begin]
+        is_window_usable &= cumulated_steep_count[window_end_rows] == cumulated_steep_count[window_begin_rows]
     angle_changes, rate_integrals = (
-        (angle[window_end] - angle[window_begin])[is_window_usable],
-        (rate_term_integrals[window_end] - rate_term_integrals[window_begin])[is_window_usable],
+        (angle[window_end_rows] - angle[window_begin_rows])[is_window_usable],
+        (rate_term_integrals[window_end_rows] - rate_term_integrals[window_begin_rows])[is_window_usable],
     )
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
@@ -137,16 +137,16 @@ def _fit_angle_to_rate(
         angle_changes - rate_integrals[:, 1:] @ coefficients[1:],
         rate_integrals[:, 0],
     )
-    rate_integral_power, angle_change_power = (
+    rate_integral_square_sum, angle_change_square_sum = (
         float(rate_integrals @ rate_integrals),
         float(angle_changes @ angle_changes),
     )
-    if len(rate_integrals) < _MIN_WINDOWS or not rate_integral_power * angle_change_power > 0.0:
+    if len(rate_integrals) < _MIN_WINDOWS or not rate_integral_square_sum * angle_change_square_sum > 0.0:
         return None
-    cross_power = float(rate_integrals @ angle_changes)
+    cross_product_sum = float(rate_integrals @ angle_changes)
     return AngleRateFit(
-        slope=np.sign(cross_power) * np.sqrt(angle_change_power / rate_integral_power),
-        correlation=cross_power / np.sqrt(rate_integral_power * angle_change_power),
+        slope=np.sign(cross_product_sum) * np.sqrt(angle_change_square_sum / rate_integral_square_sum),
+        correlation=cross_product_sum / np.sqrt(rate_integral_square_sum * angle_change_square_sum),
         n_windows=len(rate_integrals),
         max_angle_magnitude=float(np.nanmax(np.abs(angle))),
         max_rate_magnitude=float(np.nanmax(np.abs(rate_terms[0]))),
@@ -179,11 +179,11 @@ _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 def find_attitude_mistake(
     rate_column_by_name: Mapping[str, Column],
     named_angles: Sequence[NamedColumn | None],
-    other_columns: Mapping[str, Column],
+    possible_rate_columns: Mapping[str, Column],
 ) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
-    is not known. The first that is wrong; None where nothing is. other_columns: what may have taken the place
-    of a rate."""
+    is not known. The first that is wrong; None where nothing is. possible_rate_columns: what may
+    have taken the place of a rate."""
     rate_columns = list(rate_column_by_name.values())
     for axis, (rate_name, named_angle) in enumerate(zip(rate_column_by_name, named_angles, strict=True)):
         if named_angle is None:
@@ -193,33 +193,33 @@ def find_attitude_mistake(
         fit = _fit_angle_of_axis(rate_columns, named_angles, axis)
         if fit is None:
             continue
-        for other_name, other_column in {**rate_column_by_name, **other_columns}.items():
-            other_fit = _fit_angle_of_axis(
-                [*rate_columns[:axis], other_column, *rate_columns[axis + 1 :]], named_angles, axis
+        for candidate_name, candidate_column in {**rate_column_by_name, **possible_rate_columns}.items():
+            candidate_fit = _fit_angle_of_axis(
+                [*rate_columns[:axis], candidate_column, *rate_columns[axis + 1 :]], named_angles, axis
             )
-            if other_fit is not None and abs(other_fit.correlation) > _min_correlation_of_other_column(
-                fit, other_name in rate_column_by_name
-            ):
+            if candidate_fit is not None and abs(
+                candidate_fit.correlation
+            ) > _min_correlation_to_replace_rate(fit, candidate_name in rate_column_by_name):
                 return _exchanged_column_text(
-                    named_angle[0], (rate_name, fit), (other_name, other_fit), _RATE_TITLES[axis]
+                    named_angle[0], (rate_name, fit), (candidate_name, candidate_fit), _RATE_TITLES[axis]
                 )
         if remark := angle_rate_remark(fit, rate_name, named_angle[0]):
             return remark
     return None
 
 
-def _min_correlation_of_other_column(fit: AngleRateFit, is_rate: bool) -> float:
+def _min_correlation_to_replace_rate(named_rate_fit: AngleRateFit, is_candidate_a_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
-    own_correlation = abs(fit.correlation)
-    if is_rate and own_correlation < (
-        _LOW_CORRELATION if fit.has_many_windows else _LOW_CORRELATION_OF_FEW_WINDOWS
+    named_rate_correlation = abs(named_rate_fit.correlation)
+    if is_candidate_a_rate and named_rate_correlation < (
+        _LOW_CORRELATION if named_rate_fit.has_many_windows else _LOW_CORRELATION_OF_FEW_WINDOWS
     ):
         return _MIN_AGREEING_CORRELATION
     return (
         _HIGH_CORRELATION
-        if own_correlation < _MIN_AGREEING_CORRELATION
+        if named_rate_correlation < _MIN_AGREEING_CORRELATION
         else _EXACT_CORRELATION
-        if own_correlation < _HIGH_CORRELATION
+        if named_rate_correlation < _HIGH_CORRELATION
         else np.inf
     )
 
@@ -297,31 +297,37 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
         (one for one in ("deg", "cdeg") if max_pitch * KIND_AND_SI_FACTOR_OF_UNIT[one][1] <= _MAX_PITCH_RAD),
         None,
     )
-    fit_text = (
+    fitting_unit_text = (
         f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         if unit
         else "no unit fits"
     )
     return (
-        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fit_text}; look at "
-        "the rates' too"
+        f"{column_name} reaches {max_pitch:.4g} rad, a pitch angle at most 1.571: {fitting_unit_text}; "
+        "look at the rates' too"
     )
 
 
-def gravity_remark(acceleration: Column, column_name: str) -> str | None:
+def gravity_remark(z_acceleration_column: Column, column_name: str) -> str | None:
     """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
     is."""
-    finite_accelerations = acceleration.values[np.isfinite(acceleration.values)]
-    median_mps2 = float(np.median(np.abs(finite_accelerations))) if finite_accelerations.size else 0.0
-    if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
+    finite_accelerations = z_acceleration_column.values[np.isfinite(z_acceleration_column.values)]
+    median_magnitude_mps2 = (
+        float(np.median(np.abs(finite_accelerations))) if finite_accelerations.size else 0.0
+    )
+    if _PLAUSIBLE_GRAVITY_RANGE_G[0] < median_magnitude_mps2 / _GRAVITY_MPS2 < _PLAUSIBLE_GRAVITY_RANGE_G[1]:
         return None
-    unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_mps2, 2.0) if median_mps2 > 0.0 else None
-    fit_text = (
+    unit = (
+        nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median_magnitude_mps2, 2.0)
+        if median_magnitude_mps2 > 0.0
+        else None
+    )
+    fitting_unit_text = (
         f"it is in {unit}, a factor of {KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         if unit
         else "no unit fits: is 1 g in it?"
     )
     return (
-        f"{column_name}: is {median_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
-        f"{_GRAVITY_MPS2:.4g}: {fit_text}"
+        f"{column_name}: is {median_magnitude_mps2:.4g} m/s2 on the middle of the flight, 1 g is "
+        f"{_GRAVITY_MPS2:.4g}: {fitting_unit_text}"
     )

@@ -96,19 +96,19 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     _check_rates_fit_attitude(recording, vehicle)
     log_stamps_s = recording.columns[rate_columns[0]].t_s
     t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
-    values_and_mean_age = {
+    values_and_mean_age_by_column = {
         name: values_and_mean_age_at(recording.columns[name], t_s, step_s) for name in used_columns
     }
     for name in rate_columns:
-        values, mean_age_s = values_and_mean_age[name]
-        values_and_mean_age[name] = (
+        values, mean_age_s = values_and_mean_age_by_column[name]
+        values_and_mean_age_by_column[name] = (
             np.where(_is_stale(recording.columns[name], t_s, step_s), np.nan, values),
             mean_age_s,
         )
 
     def stacked_columns(names: list[str]) -> Floats:
         return (
-            np.column_stack([values_and_mean_age[name][0] for name in names])
+            np.column_stack([values_and_mean_age_by_column[name][0] for name in names])
             if names
             else np.empty((len(t_s), 0))
         )
@@ -124,7 +124,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         dt_s=step_s,
         mean_age_s_by_held_column={
             name: mean_age_s
-            for name, (_, mean_age_s) in values_and_mean_age.items()
+            for name, (_, mean_age_s) in values_and_mean_age_by_column.items()
             if mean_age_s is not None
         },
         logged_failures=recording.logged_failures,
@@ -282,18 +282,18 @@ def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> No
             (one.column, columns[one.column]) if one and one.column in columns else None
             for one in angle_quantities
         ]
-        other_column_names = [
+        possible_rate_column_names = [
             *vehicle.signal_columns,
             *(one.column for one in vehicle.flow.values()),
             *vehicle.command_columns,
         ]
-        other_logged_columns = {
-            name: columns[name] for name in dict.fromkeys(other_column_names) if name in columns
+        possible_rate_columns = {
+            name: columns[name] for name in dict.fromkeys(possible_rate_column_names) if name in columns
         }
-        mistake = physics.find_attitude_mistake(rate_column_by_name, named_angles, other_logged_columns)
-    z_acceleration = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
-    if not mistake and vehicle.acceleration and z_acceleration:
-        mistake = physics.gravity_remark(z_acceleration, vehicle.acceleration.column)
+        mistake = physics.find_attitude_mistake(rate_column_by_name, named_angles, possible_rate_columns)
+    z_acceleration_column = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
+    if not mistake and vehicle.acceleration and z_acceleration_column:
+        mistake = physics.gravity_remark(z_acceleration_column, vehicle.acceleration.column)
     if mistake:
         raise BadInput(
             f"{recording.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended"
@@ -305,21 +305,21 @@ def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight
     quantity_of_column = {one.column: one for _, one in vehicle.model_quantities()}
     quantity_of_column |= {one.column: one for one in vehicle.flow.values()}
     quantity_of_column |= {one.column: one for _, _, one in vehicle.quantities_of_known_kind()}
-    converted = {
+    converted_columns = {
         name: replace(column, values=quantity_of_column[name].to_si(column.values))
         for name, column in recording.columns.items()
         if name in quantity_of_column
     }
-    return replace(recording, columns={**recording.columns, **converted})
+    return replace(recording, columns={**recording.columns, **converted_columns})
 
 
 def mixer_matrix(vehicle: Vehicle) -> Floats:
     """Return the share of each command in each surface, (surfaces, commands)."""
-    share_rows = [
+    mixer_rows = [
         [shares_by_command.get(name, 0.0) for name in vehicle.command_columns]
         for shares_by_command in vehicle.surfaces.values()
     ]
-    return np.array(share_rows, dtype=float)
+    return np.array(mixer_rows, dtype=float)
 
 
 def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_columns: list[str]) -> None:
@@ -462,13 +462,15 @@ def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
     column = _finite_rows(column)
     stamps, cumulated_values = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
-    rounding_s = 1e-6 * step_s  # of stamps that are meant to fall on the edge
-    end_row = np.searchsorted(stamps, t_s + rounding_s, side="right")
-    start_row = np.searchsorted(stamps, t_s - step_s + rounding_s, side="right")
-    n_rows = end_row - start_row
+    stamp_tolerance_s = 1e-6 * step_s  # of stamps that are meant to fall on the edge
+    interval_end_rows = np.searchsorted(stamps, t_s + stamp_tolerance_s, side="right")
+    interval_begin_rows = np.searchsorted(stamps, t_s - step_s + stamp_tolerance_s, side="right")
+    n_rows_in_interval = interval_end_rows - interval_begin_rows
     held_values, _ = _held_values(column, t_s)
-    interval_mean = (cumulated_values[end_row] - cumulated_values[start_row]) / np.maximum(n_rows, 1)
-    return np.where(n_rows > 0, interval_mean, held_values), 0.5 * step_s
+    interval_mean = (
+        cumulated_values[interval_end_rows] - cumulated_values[interval_begin_rows]
+    ) / np.maximum(n_rows_in_interval, 1)
+    return np.where(n_rows_in_interval > 0, interval_mean, held_values), 0.5 * step_s
 
 
 def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehicle, t_s: Floats) -> Floats:

@@ -35,7 +35,7 @@ _MAX_FALSE_MISTAKE_PROBABILITY, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _DISTRUST_AFTER_CLIPPING_S = 30.0
 _MIN_EFFECT_NOISE_POWER_RATIO = 1e-6
-_MAX_EXPLAINED_SHARE, _MAX_EFFECT_NOISE_POWER_RATIO = 0.98, 12.5
+_MAX_EXPLAINED_SHARE, _EFFECT_NOISE_POWER_RATIO_CAP = 0.98, 12.5
 """Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_AXIS_RATIO_OF_ONE_UNIT, _UNIT_TOLERANCE_FACTOR = 10.0, 1.6
 _MAX_ALIKE_MOTION_FACTOR, _MIN_OTHER_UNIT_FACTOR = 3.0, 12.0
@@ -136,7 +136,7 @@ def effect_share_explained_by_others(flights: Sequence[tuple[Samples, Mask]], mo
     effect_power, unexplained_power = _effect_powers(flights, model)
     has_moved = effect_power > _MIN_EFFECT_NOISE_POWER_RATIO
     explained_share = 1.0 - unexplained_power / np.minimum(
-        np.where(has_moved, effect_power, 1.0), _MAX_EFFECT_NOISE_POWER_RATIO
+        np.where(has_moved, effect_power, 1.0), _EFFECT_NOISE_POWER_RATIO_CAP
     )
     return np.where(has_moved, np.maximum(explained_share, 0.0), 1.0)
 
@@ -151,29 +151,29 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
     surface_groups = regression.surface_indices_by_group(model)
-    regressor_order = (
+    regressor_arguments = (
         model.n_rate_lags,
         model.n_command_lags,
         True,
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     regressors_by_flight = [
-        regression.build_regressors(one, surface_groups, *regressor_order) for one, _ in flights
+        regression.build_regressors(one, surface_groups, *regressor_arguments) for one, _ in flights
     ]
-    used_rows_by_flight = [
+    is_row_used_by_flight = [
         is_used & is_predictable
         for (_, is_used), (_, _, is_predictable) in zip(flights, regressors_by_flight, strict=True)
     ]
     past_regressors = np.vstack(
         [
-            regressors[0][used_rows]
-            for regressors, used_rows in zip(regressors_by_flight, used_rows_by_flight, strict=True)
+            regressors[0][is_row_used]
+            for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
         ]
     )
     lagged_commands = np.vstack(
         [
-            regressors[1][used_rows]
-            for regressors, used_rows in zip(regressors_by_flight, used_rows_by_flight, strict=True)
+            regressors[1][is_row_used]
+            for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
         ]
     )
     command_response, residual_covariance = (
@@ -184,9 +184,9 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
     effect_power, unexplained_power = np.zeros(len(surface_groups)), np.zeros(len(surface_groups))
     for group_index in range(len(surface_groups)):
         other_lagged_commands = [
-            lagged_commands[:, other_group]
-            for other_group in range(len(surface_groups))
-            if other_group != group_index
+            lagged_commands[:, other_group_index]
+            for other_group_index in range(len(surface_groups))
+            if other_group_index != group_index
         ]
         other_regressors = np.column_stack(
             [np.ones(len(past_regressors)), past_regressors, *other_lagged_commands]
@@ -266,9 +266,9 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
     rate_sd_ratios = np.nanstd(samples.rates, axis=0) / np.maximum(fitted_ranges.rate_sd_rad_s, MIN_DIVISOR)
     geometric_mean_sd_ratio = float(np.exp(np.mean(np.log(np.maximum(rate_sd_ratios, MIN_DIVISOR)))))
     for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        are_axes_alike = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
+        do_axes_share_one_ratio = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
         if (
-            are_axes_alike
+            do_axes_share_one_ratio
             and 1.0 / _UNIT_TOLERANCE_FACTOR**2
             < geometric_mean_sd_ratio / units_per_rad
             < _UNIT_TOLERANCE_FACTOR**2
@@ -279,7 +279,7 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
                 f"allowed: rates in rad/s; a factor of {1.0 / units_per_rad:.4g} (`unit: {unit}`) fits"
             )
         if (
-            are_axes_alike
+            do_axes_share_one_ratio
             and 1.0 / _UNIT_TOLERANCE_FACTOR**2
             < geometric_mean_sd_ratio * units_per_rad
             < _UNIT_TOLERANCE_FACTOR**2
@@ -303,19 +303,19 @@ def check_command_units(
     rate_width_ratios = _range_widths(central_ranges(rates)) / np.maximum(
         _range_widths(fitted_ranges.rate_ranges_rad_s), MIN_DIVISOR
     )
-    do_rates_move_alike = (
+    do_rates_move_as_fitted = (
         rate_width_ratios.min() > 1.0 / _MAX_ALIKE_MOTION_FACTOR
         and rate_width_ratios.max() < _MAX_ALIKE_MOTION_FACTOR
     )
     max_command_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
-        1.0 if do_rates_move_alike else max(rate_width_ratios.max(), 1.0)
+        1.0 if do_rates_move_as_fitted else max(rate_width_ratios.max(), 1.0)
     )
     command_width_ratios = _range_widths(central_ranges(commands)) / np.maximum(
         _range_widths(fitted_ranges.command_ranges), MIN_DIVISOR
     )
     for surface, width_ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
         if max_command_width_ratio < width_ratio < 1e4 or (
-            do_rates_move_alike and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
+            do_rates_move_as_fitted and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
         ):
             raise BadInput(
                 f"{flight_name}: the command of {surface} moves {width_ratio:.3g} times as much as "
@@ -352,15 +352,15 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
         (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
         for one in model.noise_models
     ]
-    flights_and_likelihoods = [
-        (one, likelihoods_and_sample_count)
+    flights_and_log_likelihoods = [
+        (one, log_likelihoods_and_sample_count)
         for one in whitened_flights_and_models or [(samples, model)]
-        if (likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(*one))
+        if (log_likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(*one))
     ]
-    if not flights_and_likelihoods:
+    if not flights_and_log_likelihoods:
         return
     likeliest_whitened_flight, likeliest_model = max(
-        flights_and_likelihoods, key=lambda one: one[1][0].mean()
+        flights_and_log_likelihoods, key=lambda one: one[1][0].mean()
     )[0]
     gain_bounds = _bound_gains_over_flight_parts(likeliest_whitened_flight, likeliest_model)
     if gain_bounds is None:
@@ -492,23 +492,25 @@ def _likelier_column_mistake_text(samples: Samples, model: Model) -> str | None:
 def log_likelihood_gain_of_corrections(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
     part of the flight where that is least; and as how many samples a part counts."""
-    corrections = list(
+    corrected_logs = list(
         logs_with_one_mistake_corrected(samples, model.vehicle, surfaces_of_unknown_effect(model))
     )
-    likelihoods_and_sample_count = _sample_log_likelihood_by_flight_part(samples, model)
-    if likelihoods_and_sample_count is None:
+    log_likelihoods_and_sample_count = _sample_log_likelihood_by_flight_part(samples, model)
+    if log_likelihoods_and_sample_count is None:
         return {}, 0.0
-    sample_log_likelihood_by_part, n_effective_part_samples = likelihoods_and_sample_count
+    sample_log_likelihood_by_part, n_effective_part_samples = log_likelihoods_and_sample_count
     sample_log_likelihood_gain_by_correction = {}
-    for correction in corrections:
-        corrected_likelihoods_and_count = _sample_log_likelihood_by_flight_part(correction.samples, model)
-        sample_log_likelihood_gain_by_correction[correction.correction_text] = (
+    for log_with_one_mistake_corrected in corrected_logs:
+        corrected_log_likelihoods_and_count = _sample_log_likelihood_by_flight_part(
+            log_with_one_mistake_corrected.samples, model
+        )
+        sample_log_likelihood_gain_by_correction[log_with_one_mistake_corrected.correction_text] = (
             -np.inf
-            if corrected_likelihoods_and_count is None
+            if corrected_log_likelihoods_and_count is None
             else float(
                 (
-                    corrected_likelihoods_and_count[0]
-                    + correction.log_jacobian
+                    corrected_log_likelihoods_and_count[0]
+                    + log_with_one_mistake_corrected.log_jacobian
                     - sample_log_likelihood_by_part
                 ).min()
             )
@@ -653,7 +655,7 @@ def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floa
     past_regressors, _, _ = regression.build_regressors(
         samples, [[0]], model.n_rate_lags, 1, False, n_signal_lags
     )
-    rows_and_coefficients_by_column = cross_axis_coefficients(model)
+    rows_and_coefficients_by_column = coefficients_by_column_without_own_axis(model)
     return np.stack(
         [
             past_regressors[:, rows] @ coefficients
@@ -663,7 +665,7 @@ def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floa
     ), list(rows_and_coefficients_by_column)
 
 
-def cross_axis_coefficients(model: Model) -> dict[str, tuple[list[int], Floats]]:
+def coefficients_by_column_without_own_axis(model: Model) -> dict[str, tuple[list[int], Floats]]:
     """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
     rate on its own axis."""
     rate_columns = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
@@ -750,10 +752,14 @@ def _is_within_or_unknown(values: Floats, low: float, high: float) -> Mask:
 def _mostly_true_recently(is_true: Mask, samples: Samples) -> Mask:
     """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
     window_samples = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
-    cumulated_true, window_end = np.concatenate([[0], np.cumsum(is_true)]), np.arange(1, len(is_true) + 1)
-    window_begin = np.maximum(window_end - window_samples, 0)
+    cumulated_true, window_end_rows = (
+        np.concatenate([[0], np.cumsum(is_true)]),
+        np.arange(1, len(is_true) + 1),
+    )
+    window_begin_rows = np.maximum(window_end_rows - window_samples, 0)
     return np.asarray(
-        cumulated_true[1:] - cumulated_true[window_begin] > _MIN_OUTSIDE_SHARE * (window_end - window_begin)
+        cumulated_true[1:] - cumulated_true[window_begin_rows]
+        > _MIN_OUTSIDE_SHARE * (window_end_rows - window_begin_rows)
     )
 
 
@@ -767,7 +773,7 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
     fitted_unchanged_time_s_by_column = (
         model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
     )
-    usual_unchanged_time_s_by_column = {
+    expected_longest_unchanged_time_s = {
         column_name: 0.0 if column_name in _rate_column_names(model) else np.inf
         for column_name in samples.time_since_change_s
     } | fitted_unchanged_time_s_by_column
@@ -775,12 +781,12 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
         column_name: MIN_STILL_S / 3.0
         if column_name in fitted_unchanged_time_s_by_column and column_name in _rate_column_names(model)
         else MIN_STILL_S
-        for column_name in usual_unchanged_time_s_by_column
+        for column_name in expected_longest_unchanged_time_s
     }
     return {
         column_name: max(
             min_unchanged_time_limit_s_by_column[column_name],
-            _MAX_UNCHANGED_TIME_FACTOR * usual_unchanged_time_s_by_column[column_name],
+            _MAX_UNCHANGED_TIME_FACTOR * expected_longest_unchanged_time_s[column_name],
         )
         for column_name in samples.time_since_change_s
     }

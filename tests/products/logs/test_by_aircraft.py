@@ -414,7 +414,7 @@ def test_a_column_without_a_number_is_no_warning_of_numpy():
 def test_stretches_make_one_flight():
     one = stepped.ReplayedVerdicts([1, 2], np.full((2, 2), 0.2), np.full((2, 2), 0.7), np.array([0.5, 0.9]))
     other = stepped.ReplayedVerdicts([3], np.full((1, 2), 0.3), np.full((1, 2), 0.8), np.array([0.6, 0.4]))
-    found = by_aircraft._join_stretch_diagnoses(5, 2, [(1, 3), (4, 5)], [one, other])
+    found = by_aircraft._join_stretch_verdicts(5, 2, [(1, 3), (4, 5)], [one, other])
     assert found.verdicts == [by_aircraft.Verdict(), 1, 2, by_aircraft.Verdict(), 3]
     assert (
         found.single_fault_effectiveness_low[:, 1].tolist(),

@@ -107,7 +107,7 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     series = series * np.sqrt(np.diag(np.array(model.residual_covariance)))
     monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
     monkeypatch.setattr(
-        fitting, "whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
+        fitting, "time_whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
     )
     usable_flights = fitting.flights_with_usable_rows([small.flight(model, 60)])
     found = fitting._estimate_trim_random_walk_sd(usable_flights, model)

@@ -33,7 +33,7 @@ class Proof(NamedTuple):
 
     - `certificate`: the content of certificate.json.
     - `log`: a mapping from the name of a column to its values (frames,). The mapping has the columns of
-      log.parquet. It also has the columns from which the certificate can be computed again.
+      log.parquet. It also has the columns from which a check computes the certificate again.
     - `scenario`: the text of scenario.yaml, with all defaults filled in.
     """
 

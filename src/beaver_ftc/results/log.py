@@ -126,8 +126,8 @@ class MemoryLog:
         return self._chunks[0]
 
     def frozen_copy(self) -> "MemoryLog":
-        """A second log with a copy of the rows. It does not get the rows that are later written to the first
-        log.
+        """A second log with a copy of the rows. Rows that are later written to the first log are not added to
+        the second.
         """
         now = MemoryLog()
         now.columns, now._chunks = self.columns, list(self._chunks)

@@ -76,8 +76,8 @@ class Simulation(Stepping):
     def snapshot(self) -> "Snapshot":
         """The present state of the flight. Its method `resume` returns a new `Simulation` in this state.
 
-        You can resume a snapshot any number of times. All flights that you resume from it have exactly the
-        same numbers.
+        You can resume a snapshot any number of times. All resumed flights have exactly the same
+        numbers.
         """
         plugged = tuple(
             name for name, of in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if of is not None

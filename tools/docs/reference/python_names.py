@@ -20,23 +20,26 @@ use the names in programs. The [glossary](reference/glossary.md) explains the te
 READING = """## How to read an entry
 
 - **Heading.** The name without `beaver_ftc.` in front. A name without a dot needs no further import: for the
-  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write
-  `from beaver_ftc.results.model import Fault`.
-- **Signature.** An argument with `= value` has this default. With `= ...` the default is computed. Arguments
-  after `*` must be given by name. `X | None` means that the value may be None. The text below the signature
-  explains the types.
-- **Arguments and fields.** Each line of a list has the name, the shape of an array, the unit, and the
+  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write `from
+  beaver_ftc.results.model import Fault`.
+- **Signature.** The value after `=` is the default of an argument. `= ...` means that the default is
+  computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The text
+  below the signature explains the types.
+- **Arguments and fields.** Each item of a list has the name, the shape if it is an array, the unit, and the
   meaning.
 - **Shapes.** `(3,)` is an array of three values, for roll, pitch and yaw. `(surfaces,)` has one value for
   each surface, in the order of the aircraft file. `(3, surfaces)` has three rows, and one column for each
-  surface. Elsewhere, n and m are defined in the entry.
-- **Units.** A name that ends in a unit has this unit, for example `altitude_m`. Otherwise the text states it.
-- **Methods.** They follow the class, with its name in front: `Flight.plot` is called as `flight.plot(...)`.
-- **Errors.** "Raises" names each exception of the package. [Errors](#errors) explains the two base classes.
+  surface. The letters n and m stand for other sizes.
+- **Units.** If a name ends in a unit, its value has this unit, for example `altitude_m`. Otherwise the text
+  states the unit.
+- **Methods.** The methods of a class follow the class. Each heading has the name of the class in front. Call
+  the method of an object instead: for the heading `Flight.plot` write `flight.plot(...)`.
+- **Errors.** The text after "Raises" names the exceptions of the package. [Errors](#errors) explains the two
+  base classes.
 
-The records of a flight have the fields of `metrics.json`. A sweep has them as columns with dotted names: the
-column `isolation.withdrawn` is the field `withdrawn` of `Isolation`. [Columns](reference/columns.md) lists
-all of these columns."""
+The records of a flight have the fields of `metrics.json`. The table of a sweep has these fields as columns
+with dotted names: the column `isolation.withdrawn` is the field `withdrawn` of `Isolation`.
+[Columns](reference/columns.md) lists all of these columns."""
 NEXT = """## Next
 
 [Detectors and laws](reference/plugins.md) explains the classes `Detector` and `Law` with examples."""
@@ -99,9 +102,10 @@ SAYS = {
     "point = bf.trim(airspeed_mps=40)\n"
     "model = bf.linearise(airspeed_mps=40)\n"
     "print(point.elevator_rad, model.states)\n```\n\n"
-    "`bf.aircraft(NAME)` calls `aircraft.load`. It also derives an aircraft `jsbsim:NAME` at its first use, "
-    "and checks an aircraft `./FOLDER` against its JSBSim model.",
-    "Plug-ins": "The two classes that you can write, and the records that they receive and return.",
+    "`bf.aircraft(NAME)` calls `aircraft.load`, and does more: it derives an aircraft `jsbsim:NAME` at the "
+    "first use, and it checks an aircraft `./FOLDER` against the JSBSim model in the folder.",
+    "Plug-ins": "This section has the two classes that you can write, and the records that these classes "
+    "receive and return.",
     "Errors": "Both errors have a message for the user, and an `exit_code` for a script: "
     "2 for `BadInput`, 3 for `SimulationFailed`. `BadInput` has "
     "these subclasses:\n\n"

@@ -75,21 +75,23 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model. A group whose effect is unknown has none, unless all effects are unknown."""
     n_groups, settings = len(model.groups), model.settings
     has_known_effect = is_group_effect_known(model)
-    groups_with_hypotheses = [
+    indices_of_groups_with_hypotheses = [
         group_index
         for group_index in range(n_groups)
         if has_known_effect[group_index] or not any(has_known_effect)
     ]
     hypothesis_rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
-    n_surfaces_with_hypotheses = sum(len(model.groups[group_index]) for group_index in groups_with_hypotheses)
+    n_surfaces_with_hypotheses = sum(
+        len(model.groups[group_index]) for group_index in indices_of_groups_with_hypotheses
+    )
     may_surfaces_be_stuck = "stuck" in model.vehicle.faults
-    has_pair_hypotheses = len(groups_with_hypotheses) > 1
+    has_pair_hypotheses = len(indices_of_groups_with_hypotheses) > 1
     single_fault_transition_share = (
         1.0
         - (_PAIR_LOSS_TRANSITION_SHARE if has_pair_hypotheses else 0.0)
         - (_UNKNOWN_OFFSET_TRANSITION_SHARE if may_surfaces_be_stuck else 0.0)
     )
-    for group_index in groups_with_hypotheses:
+    for group_index in indices_of_groups_with_hypotheses:
         levels, level_shares = _effectiveness_levels_and_prior_shares(model, group_index)
         group_transition_share_per_fault_kind = (
             single_fault_transition_share
@@ -107,7 +109,7 @@ def build_hypothesis_bank(model: Model) -> HypothesisBank:
                         rate_offset_variance,
                     )
                 )
-    hypothesis_rows += _pair_hypotheses(n_groups, groups_with_hypotheses)
+    hypothesis_rows += _pair_hypotheses(n_groups, indices_of_groups_with_hypotheses)
     if may_surfaces_be_stuck:
         unknown_offset_variance = (
             np.diag(np.array(model.residual_covariance)) * settings.jam_rate_offset_sd**2
@@ -181,10 +183,12 @@ def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list
     return [rate_offset_variance_by_fault_kind[kind] for kind in model.vehicle.faults]
 
 
-def _pair_hypotheses(n_groups: int, groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
+def _pair_hypotheses(n_groups: int, indices_of_groups_with_hypotheses: list[int]) -> list[HypothesisRow]:
     """Two of the known groups at once, on a coarse grid."""
     group_and_level_pairs = list(
-        product(combinations(groups_with_hypotheses, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2))
+        product(
+            combinations(indices_of_groups_with_hypotheses, 2), product(_PAIR_EFFECTIVENESS_LEVELS, repeat=2)
+        )
     )
     return [
         (

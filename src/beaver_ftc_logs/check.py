@@ -65,7 +65,7 @@ _PWM_MEDIAN_RANGE_US = (700.0, 2300.0)
 _MAX_RATE_NUMBER_READ_AS_RAD_S = 12.0
 _MIN_ANGLE_RATE_CORRELATION = 0.7
 _MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
-_PLAUSIBLE_LOG_RATES_HZ = (4.0, 2000.0)
+_PLAUSIBLE_LOG_RATE_RANGE_HZ = (4.0, 2000.0)
 
 
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
@@ -169,14 +169,14 @@ def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> li
 
 
 def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
-    correlation_text = (
+    agreement_text = (
         "they agree"
         if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
         else "they tell nothing of one another"
     )
     return (
         f"the change of {angle_column} is {fit.slope:.3f} times the integral of {rate_column} "
-        f"(correlation {fit.correlation:.2f}): {correlation_text}"
+        f"(correlation {fit.correlation:.2f}): {agreement_text}"
     )
 
 
@@ -236,7 +236,7 @@ def _propose_vehicle(
         roll_column,
         KIND_AND_SI_FACTOR_OF_UNIT[angle_unit][1],
     )
-    vehicle: Document = {"name": _as_vehicle_name(name), "reader": reader_name}
+    vehicle: Document = {"name": _as_vehicle_or_surface_name(name), "reader": reader_name}
     if time_column_and_unit and time_column_and_unit != (TIME_COLUMN, "s"):
         vehicle["time"] = {"column": time_column_and_unit[0], "unit": time_column_and_unit[1]}
     vehicle["rates"] = {
@@ -245,7 +245,7 @@ def _propose_vehicle(
     vehicle["commands"] = [
         _vehicle_file_command_entry(name, columns[name].values) for name in command_column_names
     ]
-    vehicle["surfaces"] = {_as_vehicle_name(name): {name: 1.0} for name in command_column_names}
+    vehicle["surfaces"] = {_as_vehicle_or_surface_name(name): {name: 1.0} for name in command_column_names}
     angle_column_names = {
         axis: column_of_quantity[axis] for axis in ("roll", "pitch") if column_of_quantity[axis]
     }
@@ -342,7 +342,7 @@ def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
 
 
 def _is_log_rate_plausible(rate_hz: float) -> bool:
-    return _PLAUSIBLE_LOG_RATES_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATES_HZ[1]
+    return _PLAUSIBLE_LOG_RATE_RANGE_HZ[0] <= rate_hz <= _PLAUSIBLE_LOG_RATE_RANGE_HZ[1]
 
 
 def _guess_angle_unit(column_name: str, roll_column: Column, reader_name: str) -> str:
@@ -404,7 +404,7 @@ def _vehicle_file_command_entry(column_name: str, values: Floats) -> Any:
     return {"column": column_name, "unit": "%"} if 10.0 < max_magnitude <= 105.0 else column_name
 
 
-def _as_vehicle_name(name: str) -> str:
+def _as_vehicle_or_surface_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
 
 

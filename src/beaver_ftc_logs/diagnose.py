@@ -21,7 +21,7 @@ from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
-_MIN_GROUP_SHARE_FOR_NAME = 0.5
+_MIN_FAULT_PROBABILITY_SHARE_FOR_NAME = 0.5
 _MAX_WRONG_EXCLUSION_PROBABILITY = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
@@ -143,13 +143,15 @@ def _add_surfaces_of_unknown_effect_to_names(
     is not added. If surfaces can be stuck, any is added.
     """
     surfaces = list(model.vehicle.surfaces)
-    has_moved = (
+    may_have_shown_fault = (
         np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0)
         > _MIN_COMMAND_MOTION_TRAVEL_SHARE
     )
-    has_moved |= "stuck" in model.vehicle.faults
+    may_have_shown_fault |= "stuck" in model.vehicle.faults
     surfaces_of_unknown_effect = trust.surfaces_of_unknown_effect(model)
-    may_be_added = has_moved & np.array([surface in surfaces_of_unknown_effect for surface in surfaces])
+    may_be_added = may_have_shown_fault & np.array(
+        [surface in surfaces_of_unknown_effect for surface in surfaces]
+    )
     names_by_row, effectiveness_high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
         named_surfaces = set(str(names_by_row[k]).split("+"))
@@ -409,27 +411,29 @@ def _surfaces_at_fault(
     out.
     """
     fault_probability = np.maximum(posterior[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    group_shares = [
+    group_shares_of_fault = [
         posterior[:, bank.is_fault_of_group(group_index)].sum(axis=1) / fault_probability
         for group_index in range(len(model.groups))
     ]
-    group_share_of_fault = np.column_stack(group_shares)
-    is_group_likely = (group_share_of_fault > _MIN_GROUP_SHARE_FOR_NAME) & has_isolation_evidence[:, None]
+    group_share_of_fault = np.column_stack(group_shares_of_fault)
+    is_group_likely = (group_share_of_fault > _MIN_FAULT_PROBABILITY_SHARE_FOR_NAME) & has_isolation_evidence[
+        :, None
+    ]
     if model.settings.assumes_one_group_at_fault:
-        is_single_loss = bank.hypothesis_kind == GROUP_LOSS
-        single_loss_probability = np.column_stack(
+        is_group_loss_hypothesis = bank.hypothesis_kind == GROUP_LOSS
+        group_loss_probability = np.column_stack(
             [
-                posterior[:, bank.is_fault_of_group(group_index) & is_single_loss].sum(axis=1)
+                posterior[:, bank.is_fault_of_group(group_index) & is_group_loss_hypothesis].sum(axis=1)
                 for group_index in range(len(model.groups))
             ]
         )
         is_group_likely = (
-            single_loss_probability
-            > _MAX_WRONG_EXCLUSION_PROBABILITY * single_loss_probability.max(axis=1, keepdims=True)
+            group_loss_probability
+            > _MAX_WRONG_EXCLUSION_PROBABILITY * group_loss_probability.max(axis=1, keepdims=True)
         ) & has_isolation_evidence[:, None]
-        is_candidate_group = single_loss_probability.max(axis=0) > 0.0
+        has_group_loss_hypothesis = group_loss_probability.max(axis=0) > 0.0
         is_group_likely &= ~(
-            is_group_likely[:, is_candidate_group].all(axis=1) & (is_candidate_group.sum() > 1)
+            is_group_likely[:, has_group_loss_hypothesis].all(axis=1) & (has_group_loss_hypothesis.sum() > 1)
         )[:, None]
     likely_names = join_flagged_names(is_group_likely, ["+".join(group) for group in model.groups])
     isolated_names = np.full(len(posterior), "", dtype=object)

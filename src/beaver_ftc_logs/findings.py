@@ -195,7 +195,7 @@ def _event_text(event: Document) -> str:
 def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_hypothesis_bank(model)
-    whitened_responses = _whitened_group_responses(samples, model)
+    standardized_responses = _standardized_group_responses(samples, model)
     return {
         "together": [
             {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
@@ -205,44 +205,46 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
         "groups": [
             {
                 "surfaces": group,
-                **_group_isolability_entry(whitened_responses, group_index, model, bank, samples.dt_s),
+                **_group_isolability_entry(standardized_responses, group_index, model, bank, samples.dt_s),
             }
             for group_index, group in enumerate(model.groups)
         ],
-        "alike": _group_pair_cosine_entries(whitened_responses, model),
+        "alike": _group_pair_cosine_entries(standardized_responses, model),
         "columns_held_s": {
             name: round(mean_age_s, 4) for name, mean_age_s in samples.mean_age_s_by_held_column.items()
         },
     }
 
 
-def _whitened_group_responses(samples: Samples, model: Model) -> Floats:
+def _standardized_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     is_predictable, _, group_responses = unexplained_rates_and_responses(samples, model)
     group_responses, residual_covariance = (
         group_responses[is_predictable],
         np.array(model.residual_covariance),
     )
-    whitened_responses = np.linalg.solve(
+    standardized_responses = np.linalg.solve(
         np.linalg.cholesky(residual_covariance), group_responses.reshape(-1, 3).T
     ).T
     return np.asarray(
-        whitened_responses.reshape(group_responses.shape) * np.sqrt(model.settings.effective_sample_share)
+        standardized_responses.reshape(group_responses.shape) * np.sqrt(model.settings.effective_sample_share)
     )
 
 
 def _group_isolability_entry(
-    whitened_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
+    standardized_responses: Floats, group_index: int, model: Model, bank: HypothesisBank, dt_s: float
 ) -> dict[str, Any]:
     """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
     required_log_odds = _log_odds_needed_for_alarm(model, bank, group_index, dt_s)
-    if not len(whitened_responses):
+    if not len(standardized_responses):
         return {
             "information_per_s": 0.0,
             "smallest_loss": _smallest_detectable_losses(0.0, required_log_odds),
         }
-    information_per_s = float((whitened_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
-    conditional_information_per_s = _conditional_fisher_information(whitened_responses, group_index) / dt_s
+    information_per_s = float((standardized_responses[:, group_index] ** 2).sum(axis=1).mean()) / dt_s
+    conditional_information_per_s = (
+        _conditional_information_per_sample(standardized_responses, group_index) / dt_s
+    )
     return {
         "information_per_s": information_per_s,
         "information_per_s_of_its_motion": conditional_information_per_s,
@@ -253,17 +255,17 @@ def _group_isolability_entry(
     }
 
 
-def _conditional_fisher_information(whitened_responses: Floats, group_index: int) -> float:
+def _conditional_information_per_sample(standardized_responses: Floats, group_index: int) -> float:
     """Information a sample about one group that trim (a constant an axis) and other groups cannot explain."""
-    n_samples, n_groups, n_axes = whitened_responses.shape
+    n_samples, n_groups, n_axes = standardized_responses.shape
     trim_regressors = np.tile(np.eye(n_axes), (n_samples, 1))
-    other_responses = [
-        whitened_responses[:, other_group_index].reshape(-1, 1)
+    other_group_responses = [
+        standardized_responses[:, other_group_index].reshape(-1, 1)
         for other_group_index in range(n_groups)
         if other_group_index != group_index
     ]
-    nuisance_regressors = np.column_stack([trim_regressors, *other_responses])
-    group_response = whitened_responses[:, group_index].reshape(-1)
+    nuisance_regressors = np.column_stack([trim_regressors, *other_group_responses])
+    group_response = standardized_responses[:, group_index].reshape(-1)
     unexplained_group_response = (
         group_response
         - nuisance_regressors @ np.linalg.lstsq(nuisance_regressors, group_response, rcond=None)[0]
@@ -293,19 +295,22 @@ def _smallest_detectable_losses(
         f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S
     }
     loss_by_horizon = {
-        horizon: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
-        for horizon, information in information_by_horizon.items()
+        horizon_s_text: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
+        for horizon_s_text, information in information_by_horizon.items()
     }
-    return {horizon: float(loss) if loss <= 1.0 else None for horizon, loss in loss_by_horizon.items()}
+    return {
+        horizon_s_text: float(loss) if loss <= 1.0 else None
+        for horizon_s_text, loss in loss_by_horizon.items()
+    }
 
 
-def _group_pair_cosine_entries(whitened_responses: Floats, model: Model) -> list[dict[str, Any]]:
+def _group_pair_cosine_entries(standardized_responses: Floats, model: Model) -> list[dict[str, Any]]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pair_entries = []
     for first_group_index, second_group_index in combinations(range(len(model.groups)), 2):
         first_response, second_response = (
-            whitened_responses[:, first_group_index].ravel(),
-            whitened_responses[:, second_group_index].ravel(),
+            standardized_responses[:, first_group_index].ravel(),
+            standardized_responses[:, second_group_index].ravel(),
         )
         norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
         cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)
@@ -339,8 +344,8 @@ def isolability_sentences(isolability: dict[str, Any]) -> list[str]:
 
 def _smallest_detectable_loss_text(smallest_loss_by_horizon: dict[str, float | None]) -> str:
     loss_texts = [
-        f"{loss:.0%} within {horizon} s"
-        for horizon, loss in smallest_loss_by_horizon.items()
+        f"{loss:.0%} within {horizon_s_text} s"
+        for horizon_s_text, loss in smallest_loss_by_horizon.items()
         if loss is not None
     ]
     if not loss_texts:

@@ -38,10 +38,10 @@ def load_template(name: str) -> "Template":
     """A page's template by its file name."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = Environment(
+    environment = Environment(
         loader=FileSystemLoader(_TEMPLATE_FOLDER), autoescape=True, undefined=StrictUndefined
     )
-    return loader.get_template(name)
+    return environment.get_template(name)
 
 
 def render_diagnosis(samples: Samples, model: Model, rows: DiagnosisRows, verdict: dict[str, Any]) -> str:
@@ -293,7 +293,7 @@ def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], m
     subfigures = figure.subfigures(n_subfigures, squeeze=False)[:, 0]
     for subfigure, (fold_model, held_out, name) in zip(subfigures, folds, strict=False):
         axes = subfigure.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _prediction_in_most_active_window(
+        t_s, rates, residual = _rates_and_residual_in_liveliest_window(
             fold_model, held_out, round(_PREDICTION_WINDOW_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
@@ -308,7 +308,7 @@ def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], m
     return figure
 
 
-def _prediction_in_most_active_window(
+def _rates_and_residual_in_liveliest_window(
     model: Model, held_out: fitting.FlightWithUsableRows, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
@@ -318,12 +318,12 @@ def _prediction_in_most_active_window(
         np.full_like(held_out.samples.rates, np.nan),
     )
     rates_or_nan[rows], residual_or_nan[rows] = held_out.samples.rates[rows], residual
-    first_row = _first_row_of_most_active_window(rates_or_nan, rows, window_samples)
+    first_row = _first_row_of_liveliest_window(rates_or_nan, rows, window_samples)
     window_rows = slice(first_row, first_row + window_samples)
     return held_out.samples.t_s[window_rows], rates_or_nan[window_rows], residual_or_nan[window_rows]
 
 
-def _first_row_of_most_active_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
+def _first_row_of_liveliest_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
     squared_rates = np.zeros(len(rates))
     squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
@@ -356,8 +356,8 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
 
 def _coefficient_correlation_figure(rate_regression: RateRegression, coefficient_names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
-    side_in = 2.5 + 0.19 * len(coefficient_names)
-    figure = _new_figure(side_in + 0.8, side_in)
+    side_inches = 2.5 + 0.19 * len(coefficient_names)
+    figure = _new_figure(side_inches + 0.8, side_inches)
     axis = figure.subplots()
     image = axis.imshow(rate_regression.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     axis.set_xticks(range(len(coefficient_names)), coefficient_names, rotation=90, fontsize=6)

@@ -98,19 +98,19 @@ def columns_of_topics(topics: dict[str, dict[str, Any]], stamp_field: str) -> tu
 
     topics: each topic's fields by name, one of them the stamps in us.
     """
-    rows_and_note_of_topic = {
+    kept_rows_and_note_of_topic = {
         name: rows_with_increasing_time(name, _as_floats(fields[stamp_field]))
         for name, fields in topics.items()
     }
     first_stamps_us = [
         float(topics[name][stamp_field][kept_rows[0]])
-        for name, (kept_rows, _) in rows_and_note_of_topic.items()
+        for name, (kept_rows, _) in kept_rows_and_note_of_topic.items()
         if len(kept_rows)
     ]
     origin_us = min(first_stamps_us, default=0.0)
     columns: dict[str, Column] = {}
     for name, fields in topics.items():
-        kept_rows, note = rows_and_note_of_topic[name]
+        kept_rows, note = kept_rows_and_note_of_topic[name]
         t_s = (_as_floats(fields[stamp_field])[kept_rows] - origin_us) * _S_PER_US
         columns |= {
             f"{name}.{field}": Column(t_s, _as_floats(values)[kept_rows], note)

@@ -21,7 +21,7 @@ from beaver_ftc_logs.vehicle import Vehicle
 _PARALLEL_TOLERANCE = 1e-9
 _RIDGE_SHARE = 1e-10
 _RANK_TOLERANCE = 1e-12
-_N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_WIDTH_STANDARD_ERRORS = 4, 60, 4.0
+_N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_MARGIN_STANDARD_ERRORS = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
 
 
@@ -109,14 +109,14 @@ def unexplained_rates_and_responses(
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    regressor_order = (
+    lag_counts_and_label_scaling = (
         model.n_rate_lags,
         model.n_command_lags,
         scales_by_labels,
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     past_regressors, lagged_group_commands, is_predictable = build_regressors(
-        samples, surface_indices_by_group(model), *regressor_order
+        samples, surface_indices_by_group(model), *lag_counts_and_label_scaling
     )
     _, past_coefficients, command_response, _ = model.intercept_past_response_noise()
     unexplained_rates = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
@@ -264,7 +264,7 @@ def coefficient_upper_bounds(
         np.maximum(np.diag(scaled_inverse_gram), 0.0) * squared_residuals.mean() / effective_sample_share
     )
     return (
-        scaled_coefficients + BOUND_WIDTH_STANDARD_ERRORS * scaled_standard_errors
+        scaled_coefficients + BOUND_MARGIN_STANDARD_ERRORS * scaled_standard_errors
     ) / regressor_rms, squared_residuals
 
 

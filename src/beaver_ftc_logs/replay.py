@@ -111,9 +111,15 @@ def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[fl
 def _unreplayed_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal_sensors = type(scenario.sensors)()
-    declared_sensors = [name for name, value in scenario.sensors if value != getattr(ideal_sensors, name)]
-    sensors_not_logged = [name for name in declared_sensors if name not in ("p", "q", "r")]
-    return [f"the declared errors of {name}: the log has the true value" for name in sensors_not_logged]
+    sensors_with_declared_errors = [
+        name for name, value in scenario.sensors if value != getattr(ideal_sensors, name)
+    ]
+    sensors_logged_without_errors = [
+        name for name in sensors_with_declared_errors if name not in ("p", "q", "r")
+    ]
+    return [
+        f"the declared errors of {name}: the log has the true value" for name in sensors_logged_without_errors
+    ]
 
 
 def _is_as_flown(path: Path, verdict: Document) -> bool | None:

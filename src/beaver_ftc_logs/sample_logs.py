@@ -21,7 +21,7 @@ _ELEVON_EFFECTIVENESS_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
 """Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
 _TURBULENCE_INTENSITY = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second: of the noise that drives it
 _GYRO_NOISE_RAD_S = 0.004
-_COMMAND_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
+_DEMANDED_ATTITUDE_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
 VEHICLE_FILE_TEXT = """\
 # The vehicle file of two sample logs: which column is what, and in which unit.
 name: sample-wing
@@ -67,7 +67,7 @@ def _simulate_rows(
     rates, turbulence_rad_s2, attitude, demanded_attitude = np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2)
     for k in range(round(duration_s * SAMPLE_RATE_HZ)):
         t_s = k * dt_s
-        if k % round(_COMMAND_HOLD_S * SAMPLE_RATE_HZ) == 0:
+        if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:
             demanded_attitude = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
         commands = _control_law(attitude, rates, demanded_attitude)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))

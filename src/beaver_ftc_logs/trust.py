@@ -223,7 +223,7 @@ def is_group_gain_known(model: Model) -> list[bool]:
     ):
         return has_known_effect
     return [
-        is_effect_known and regression.BOUND_WIDTH_STANDARD_ERRORS * gain_standard_error < 1.0
+        is_effect_known and regression.BOUND_MARGIN_STANDARD_ERRORS * gain_standard_error < 1.0
         for is_effect_known, gain_standard_error in zip(
             has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
         )
@@ -450,7 +450,7 @@ def _min_plausible_column_gain(model: Model, column_name: str) -> float:
         if model.fitted_ranges is not None
         else 0.0
     )
-    min_gain = 1.0 - regression.BOUND_WIDTH_STANDARD_ERRORS * gain_standard_error
+    min_gain = 1.0 - regression.BOUND_MARGIN_STANDARD_ERRORS * gain_standard_error
     return min(_MIN_COLUMN_GAIN, min_gain) if min_gain > 0.0 else -np.inf
 
 

@@ -38,7 +38,7 @@ from beaver_ftc_logs.units import (
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_SETTABLE_FALSE_ALARMS_PER_HOUR = 1000.0
-_DEFAULT_MAX_RATE_HZ, _OTHER_LAWS_MAX_RATE_HZ = 20.0, 100.0
+_STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
@@ -283,9 +283,9 @@ class Vehicle(Section):
         )
         bad_names = [name for name in self.surfaces if not _VEHICLE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
-        for surface, command_shares in self.surfaces.items():
+        for surface, weight_by_command in self.surfaces.items():
             mistakes += _unknown_name_mistakes(
-                ("surfaces", surface), command_shares, "command", self.command_columns
+                ("surfaces", surface), weight_by_command, "command", self.command_columns
             )
         surface_tables_by_key: dict[str, Collection[str]] = {
             "labels": self.labels,
@@ -364,7 +364,7 @@ class Vehicle(Section):
         """The rate above which a log is averaged. Within an average a law may answer what the same average
         shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
         is_air_still = self.moving_air is False or (self.moving_air is None and self.labels)
-        default_hz = _DEFAULT_MAX_RATE_HZ if is_air_still else _OTHER_LAWS_MAX_RATE_HZ
+        default_hz = _STILL_AIR_MAX_RATE_HZ if is_air_still else _MOVING_AIR_MAX_RATE_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:

@@ -53,7 +53,7 @@ def _read_with_reader(
     path: Path,
     reader: str | None,
     time_column_and_unit: tuple[str, str] | None,
-    table_options: dict[str, Any],
+    reading_options: dict[str, Any],
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
     reader_name = reader or detect_reader(path)
@@ -61,14 +61,14 @@ def _read_with_reader(
         raise BadInput(f"--reader {reader_name}: is not known, allowed: {', '.join(READERS)}")
     module = import_module(f"beaver_ftc_logs.readers.{reader_name}")
     if reader_name == "table":
-        yield from module.read_parts(path, *(time_column_and_unit or ()), **table_options)
+        yield from module.read_parts(path, *(time_column_and_unit or ()), **reading_options)
         return
     if time_column_and_unit is not None and time_column_and_unit != _TIME_COLUMNS[reader_name]:
         column, unit = _TIME_COLUMNS[reader_name]
         raise BadInput(
             f"{path}: time: {' in '.join(time_column_and_unit)} is not its time, allowed: {column} in {unit}"
         )
-    wanted_columns = table_options["columns"] if reader_name in ("ulog", "ardupilot") else None
+    wanted_columns = reading_options["columns"] if reader_name in ("ulog", "ardupilot") else None
     yield module.read(path, wanted_columns) if wanted_columns is not None else module.read(path)
 
 

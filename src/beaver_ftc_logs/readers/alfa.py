@@ -42,13 +42,13 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 
 
 @cache
-def _load_column_and_failure_topics() -> dict[str, dict[str, Any]]:
+def _load_column_sources_and_failure_names() -> dict[str, dict[str, Any]]:
     """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
     status' part and code, what has failed."""
-    columns_and_failures: dict[str, dict[str, Any]] = json.loads(
+    column_sources_and_failure_names: dict[str, dict[str, Any]] = json.loads(
         Path(__file__).with_name("alfa.json").read_text("utf-8")
     )
-    return columns_and_failures
+    return column_sources_and_failure_names
 
 
 def read(path: Path) -> RecordedFlight:
@@ -58,11 +58,11 @@ def read(path: Path) -> RecordedFlight:
     topics = dict(_read_topic_tables(path))
     if _GYRO_TOPIC not in topics:
         raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
-    rows_and_note_by_topic = {
+    kept_rows_and_note_by_topic = {
         topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()
     }
-    origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][rows_and_note_by_topic[_GYRO_TOPIC][0][0]])
-    columns = dict(_read_columns(topics, rows_and_note_by_topic, origin_ns))
+    origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][kept_rows_and_note_by_topic[_GYRO_TOPIC][0][0]])
+    columns = dict(_read_columns(topics, kept_rows_and_note_by_topic, origin_ns))
     _add_commanded_less_measured_attitude(columns)
     _add_airspeed_from_wind(columns)
     failures = sorted(_failure_events(topics, origin_ns), key=lambda failure: failure.t_s)
@@ -70,7 +70,7 @@ def read(path: Path) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    wanted_topics = {topic for topic, _, _ in _load_column_and_failure_topics()["columns"].values()}
+    wanted_topics = {topic for topic, _, _ in _load_column_sources_and_failure_names()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
         if topic in wanted_topics or topic.startswith(_FAILURE_TOPIC_PREFIX):
@@ -81,12 +81,12 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 
 def _read_columns(
     topics: dict[str, TopicTable],
-    rows_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
+    kept_rows_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
     origin_ns: float,
 ) -> Iterator[tuple[str, Column]]:
-    for name, (topic, field, unit) in _load_column_and_failure_topics()["columns"].items():
+    for name, (topic, field, unit) in _load_column_sources_and_failure_names()["columns"].items():
         if field in topics.get(topic, {}):
-            kept_rows, note = rows_and_note_by_topic[topic]
+            kept_rows, note = kept_rows_and_note_by_topic[topic]
             t_s = (topics[topic][_TIME_FIELD][kept_rows] - origin_ns) * _S_PER_NS
             yield name, Column(t_s, _CONVERSION_OF_UNIT[unit](topics[topic][field])[kept_rows], note)
 
@@ -110,8 +110,10 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
         column = columns[name]
         return column.values[np.maximum(np.searchsorted(column.t_s, stamps, side="right") - 1, 0)]
 
-    north_mps, east_mps = (held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2))
-    columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north_mps, east_mps))
+    airspeed_north_mps, airspeed_east_mps = (
+        held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2)
+    )
+    columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(airspeed_north_mps, airspeed_east_mps))
 
 
 def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
@@ -125,7 +127,7 @@ def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator
                 t_s = float((stamps[first_row] - origin_ns) * _S_PER_NS)
                 yield LoggedFailure(
                     t_s,
-                    _load_column_and_failure_topics()["failures"].get(
+                    _load_column_sources_and_failure_names()["failures"].get(
                         f"{failed_part} {int(code)}", failed_part
                     ),
                 )

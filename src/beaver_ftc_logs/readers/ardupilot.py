@@ -28,10 +28,10 @@ def read(path: Path, wanted_columns: Collection[str] | None = None) -> RecordedF
 
     wanted_columns: the columns that are kept in memory, all where None.
     """
-    messages = _read_messages(path, wanted_columns)
-    if not messages:
+    values_by_message_and_field = _read_messages(path, wanted_columns)
+    if not values_by_message_and_field:
         raise BadInput(f"{path}: holds no message with a time stamp, allowed: a dataflash log of a flight")
-    return RecordedFlight(path.stem, columns_of_topics(messages, _TIME_FIELD)[0])
+    return RecordedFlight(path.stem, columns_of_topics(values_by_message_and_field, _TIME_FIELD)[0])
 
 
 def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[str, ValuesByField]:

@@ -16,7 +16,7 @@ from beaver_ftc_logs.readers.text import (
     find_layout,
     join_blocks,
     read_cells,
-    text_cell_remarks,
+    text_cell_and_layout_remarks,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
 from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
@@ -61,9 +61,9 @@ def read_parts(
         path, None if columns is None else {time_column, *columns}, rows_per_part
     )
     if time_column not in all_columns:
-        reason = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
+        allowed_text = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         raise BadInput(
-            f"{path}: no column {time_column}, allowed: {reason}; it has "
+            f"{path}: no column {time_column}, allowed: {allowed_text}; it has "
             f"{nearest_names(time_column, all_columns)}"
         )
     for part_number, (cells, column_remarks, has_more) in enumerate(parts, 1):
@@ -74,7 +74,7 @@ def read_parts(
                 f"{note_of_column[column]}\n{remark}" if column in note_of_column else remark
             )
         t_s = table.pop(time_column) * SECONDS_PER_TIME_UNIT[time_unit]
-        is_row_kept, left_out_row_notes = _rows_with_time(path, time_column, t_s)
+        is_row_kept, left_out_row_notes = _timed_row_mask_and_notes(path, time_column, t_s)
         row_selection = slice(None) if is_row_kept is None else is_row_kept
         t_s = t_s[row_selection]
         check_time(path, t_s, time_column, cells.n_rows_before)
@@ -97,7 +97,7 @@ def _with_unread_columns_as_nan(all_columns: Sequence[str], cells: TableCells) -
     return {name: cells.numbers.get(name, nan_values) for name in all_columns}
 
 
-def _rows_with_time(path: Path, time_column: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
+def _timed_row_mask_and_notes(path: Path, time_column: str, t_s: Floats) -> tuple[Floats | None, list[str]]:
     """Rows whose time is a number, None for all, and a line on the others."""
     n_without_time = int(np.isnan(t_s).sum())
     if not n_without_time:
@@ -168,13 +168,13 @@ def _column_names_and_parts(
     """The names of a table's columns, and its parts of so many rows; the whole where None."""
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
     with _refuse_unreadable(path):
-        names, number_columns = (
-            _parquet_and_number_columns(path, columns)
+        names, readable_columns = (
+            _all_and_number_columns_of_parquet(path, columns)
             if layout is None
             else (list(layout.column_names), list(layout.column_names))
         )
     _check_names_unique(path, names)
-    wanted_columns = [name for name in number_columns if columns is None or name in columns]
+    wanted_columns = [name for name in readable_columns if columns is None or name in columns]
     blocks = (
         _read_parquet_batches(path, wanted_columns)
         if layout is None
@@ -204,14 +204,20 @@ def _join_blocks_into_parts(
                     joined_cells.broken_lines,
                 )
                 held_blocks, n_held_rows = [remaining_cells], remaining_cells.n_rows
-                yield part_cells, list(text_cell_remarks(layout, part_cells)) if layout else [], True
+                yield (
+                    part_cells,
+                    list(text_cell_and_layout_remarks(layout, part_cells)) if layout else [],
+                    True,
+                )
         joined_cells = join_blocks(held_blocks)
         if layout:
             check_broken_lines(path, layout, joined_cells)
-        yield joined_cells, list(text_cell_remarks(layout, joined_cells)) if layout else [], False
+        yield joined_cells, list(text_cell_and_layout_remarks(layout, joined_cells)) if layout else [], False
 
 
-def _parquet_and_number_columns(path: Path, columns: Collection[str] | None) -> tuple[list[str], list[str]]:
+def _all_and_number_columns_of_parquet(
+    path: Path, columns: Collection[str] | None
+) -> tuple[list[str], list[str]]:
     """The columns of a Parquet file, and those of numbers: the others are not even looked into, a list in a
     cell may be any size."""
     from pyarrow import parquet
@@ -233,7 +239,7 @@ def _read_parquet_batches(path: Path, names: Sequence[str]) -> Iterator[TableCel
     with parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
             yield TableCells(
-                {name: _column_as_numbers(batch[name]) for name in names}, batch.num_rows, n_rows_read
+                {name: _number_column_as_floats(batch[name]) for name in names}, batch.num_rows, n_rows_read
             )
             n_rows_read += batch.num_rows
     yield TableCells({name: np.empty(0) for name in names}, 0, n_rows_read)
@@ -269,5 +275,5 @@ def _is_number_type(arrow_type: Any) -> bool:
     return bool(pa.types.is_integer(arrow_type) or pa.types.is_floating(arrow_type))
 
 
-def _column_as_numbers(column: Any) -> Floats:
+def _number_column_as_floats(column: Any) -> Floats:
     return np.asarray(column.to_numpy(), dtype=float)

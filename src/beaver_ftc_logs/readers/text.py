@@ -28,7 +28,7 @@ _MAX_BROKEN_LINE_SHARE = 0.1
 class TableLayout:
     """How a table is written: the place of the line with the names, what is between cells and in numbers."""
 
-    header_line: int
+    header_line_index: int
     column_names: tuple[str, ...]
     delimiter: str
     decimal_mark: str
@@ -144,7 +144,7 @@ def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -
     broken_lines: list[str] = []
     options = {
         "read_options": csv.ReadOptions(
-            column_names=layout.column_names, skip_rows=layout.header_line + 1, block_size=_BLOCK_BYTES
+            column_names=layout.column_names, skip_rows=layout.header_line_index + 1, block_size=_BLOCK_BYTES
         ),
         "parse_options": csv.ParseOptions(
             delimiter=layout.delimiter, invalid_row_handler=_broken_line_recorder(broken_lines)
@@ -208,15 +208,15 @@ def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, table_ce
     try:
         numbers = compute.cast(cells, pa.float64())
     except pa.ArrowInvalid:
-        is_number = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
-        _record_text_cells(column_name, cells, is_number, table_cells)
-        numbers = compute.cast(compute.if_else(is_number, cells, None), pa.float64())
+        is_number_or_null = compute.fill_null(compute.match_substring_regex(cells, _NUMBER_PATTERN), True)
+        _record_text_cells(column_name, cells, is_number_or_null, table_cells)
+        numbers = compute.cast(compute.if_else(is_number_or_null, cells, None), pa.float64())
     values = numbers.to_numpy(zero_copy_only=False)
     return np.where(np.isfinite(values), values, np.nan)
 
 
-def _record_text_cells(column_name: str, cells: Any, is_number: Any, table_cells: TableCells) -> None:
-    rows_without_number = np.flatnonzero(~is_number.to_numpy(zero_copy_only=False))
+def _record_text_cells(column_name: str, cells: Any, is_number_or_null: Any, table_cells: TableCells) -> None:
+    rows_without_number = np.flatnonzero(~is_number_or_null.to_numpy(zero_copy_only=False))
     text_rows = [row for row in rows_without_number.tolist() if cells[row].as_py()]
     if text_rows:
         table_cells.text_cell_summaries[column_name] = (
@@ -226,20 +226,20 @@ def _record_text_cells(column_name: str, cells: Any, is_number: Any, table_cells
         )
 
 
-def text_cell_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
+def text_cell_and_layout_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
     for name, (n_cells, first_text_row, first_cell) in table_cells.text_cell_summaries.items():
         if np.isfinite(table_cells.numbers[name]).any():
-            cells_text = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
+            count_text = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
             yield (
                 name,
-                f"{name}: {cells_text} no number, the first in row {first_text_row}: {first_cell[:30]!r}",
+                f"{name}: {count_text} no number, the first in row {first_text_row}: {first_cell[:30]!r}",
             )
-    if layout.header_line:
-        yield "", f"names are in line {layout.header_line + 1}, what is above is left out"
+    if layout.header_line_index:
+        yield "", f"names are in line {layout.header_line_index + 1}, what is above is left out"
     if layout.delimiter != ",":
-        comma_text = ", with a decimal comma" if layout.decimal_mark == "," else ""
-        yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{comma_text}"
+        decimal_comma_text = ", with a decimal comma" if layout.decimal_mark == "," else ""
+        yield "", f"cells are parted by {_DELIMITER_TITLES[layout.delimiter]}{decimal_comma_text}"
     if table_cells.broken_lines:
         yield "", f"lines with too few or too many cells, left out: {len(table_cells.broken_lines)}"

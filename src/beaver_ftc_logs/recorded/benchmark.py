@@ -132,7 +132,7 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
             for method, rows in _diagnosis_rows_of_methods(recording, held_out, model)
         ]
     has_labels = "classes" in flight_entries[0]
-    summarize = summarize_labels if has_labels else summarize_failures
+    summarize = summarize_label_scores if has_labels else summarize_failure_scores
     methods = dict.fromkeys(one["method"] for one in flight_entries)
     entries_of_method = {name: [one for one in flight_entries if one["method"] == name] for name in methods}
     return {
@@ -188,7 +188,7 @@ def labels_in_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
     return labels
 
 
-def summarize_failures(flight_scores: Sequence[Document]) -> Document:
+def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
     failed_flights = [one for one in flight_scores if one["failure"]]
@@ -244,7 +244,7 @@ def _summarize_delays(surface_failures: Sequence[Document], surface_kind: str) -
     }
 
 
-def summarize_labels(part_scores: Sequence[Document]) -> Document:
+def summarize_label_scores(part_scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
     part_scores = [one for one in part_scores if one["rows"]]
     if not part_scores:
@@ -304,13 +304,17 @@ FAILURE_TABLE_HEADER = [
 
 
 def _label_score_cells(row: Document) -> list[str]:
-    return [row["method"], *_share_texts(row, SCORE_TITLES)]
+    return [row["method"], *_score_texts_or_empty(row, SCORE_TITLES)]
 
 
 def _failure_score_cells(row: Document) -> list[str]:
     """Return the cells of a method's row; figures that its authors did not publish are left empty."""
     delay_summaries = [row["delay_s"].get(surface_kind, {}) for surface_kind in SURFACE_KINDS]
-    cells = [row["method"], *_share_texts(row, FAILURE_TABLE_HEADER[1:4]), *map(_delay_text, delay_summaries)]
+    cells = [
+        row["method"],
+        *_score_texts_or_empty(row, FAILURE_TABLE_HEADER[1:4]),
+        *map(_mean_delay_text, delay_summaries),
+    ]
     if "false_alarms_per_hour" not in row:
         return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
     n_within_5_s, n_failures = (
@@ -326,11 +330,11 @@ def _failure_score_cells(row: Document) -> list[str]:
     ]
 
 
-def _share_texts(row: Document, keys: Iterable[str]) -> list[str]:
+def _score_texts_or_empty(row: Document, keys: Iterable[str]) -> list[str]:
     return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
 
 
-def _delay_text(delay_summary: Document) -> str:
+def _mean_delay_text(delay_summary: Document) -> str:
     if delay_summary.get("mean") is None:
         return "not found" if delay_summary.get("failures") else ""
     count_text = (
@@ -370,7 +374,7 @@ def draw_comparison_figure(document: Document) -> Any:
         len(data_sets), 1, 8.6, sum(0.27 * len(_method_titles(data_set)) + 1.3 for data_set in data_sets)
     )
     for axis, data_set in zip(axes_grid[:, 0], data_sets, strict=True):
-        draw_panel = _draw_label_shares if data_set["scored_by"] == "labels" else _draw_failure_delays
+        draw_panel = _draw_shares_of_right_rows if data_set["scored_by"] == "labels" else _draw_failure_delays
         draw_panel(axis, data_set)
         axis.set_title(f"{data_set['set']}: left out, {data_set['left_out']}", fontsize=10, loc="left")
         axis.set_yticks(range(len(_method_titles(data_set))), _method_titles(data_set))
@@ -419,15 +423,15 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     axis.set_xlabel(f"delay, s (grey: not found within {_MAX_SHOWN_DELAY_S:g} s)", fontsize=9)
 
 
-def _draw_label_shares(axis: Any, data_set: Document) -> None:
+def _draw_shares_of_right_rows(axis: Any, data_set: Document) -> None:
     """A line a method, a mark for each share of the rows that are right; as published where they are."""
-    label_of_score = {
+    legend_label_of_score = {
         "classes": "class",
         "healthy_or_faulty": "healthy or faulty",
         "side": "side of the aircraft",
     }
     rows = [*data_set["rows"], *data_set["published"]]
-    for i, (key, label) in enumerate(label_of_score.items()):
+    for i, (key, label) in enumerate(legend_label_of_score.items()):
         indices_of_rows_with_score = [
             row_index for row_index, row in enumerate(rows) if row.get(key) is not None
         ]

@@ -241,11 +241,11 @@ def _score_days(
                         diagnose_with_detector(detector_name, altered_samples, model), labels
                     )
                 )
-        rival_class_score = benchmark.summarize_labels(scores_by_detector[_RIVAL_DETECTOR])["classes"]
+        rival_class_score = benchmark.summarize_label_scores(scores_by_detector[_RIVAL_DETECTOR])["classes"]
         yield {
             "kind": kind,
             "day": day.name,
-            **benchmark.summarize_labels(scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
+            **benchmark.summarize_label_scores(scores_by_detector[BANK_OF_FILTERS_DETECTOR]),
             "beside": rival_class_score,
         }
 

@@ -325,7 +325,7 @@ def test_names_as_the_patterns_have_them():
     }  # fmt: skip
     assert {name: check._normalized_name(name) for name in spelled} == spelled
     plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
-    assert {name: check._as_vehicle_name(name) for name in plain} == plain
+    assert {name: check._as_vehicle_or_surface_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
     assert check._matching_column(check._COLUMN_NAME_PATTERNS["p"], rates) == "GyrX"
     assert (

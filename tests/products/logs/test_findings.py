@@ -143,7 +143,7 @@ def test_what_a_flight_can_separate_in_words():
 def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
     """The Schur complement of the whole information matrix, trim of each axis and the other groups out."""
     model, samples = flown
-    ok_answers = _whitened_group_responses(samples, model)
+    ok_answers = _standardized_group_responses(samples, model)
     n, groups, _ = ok_answers.shape
     design = np.concatenate([ok_answers.transpose(0, 2, 1), np.tile(np.eye(3), (n, 1, 1))], axis=2)
     flat = design.reshape(-1, groups + 3)
@@ -153,7 +153,7 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
         assert entry["information_per_s_of_its_motion"] == pytest.approx(left, rel=1e-9)
 
 
-def _whitened_group_responses(samples, model):
+def _standardized_group_responses(samples, model):
     ok, _, answers = unexplained_rates_and_responses(samples, model)
     root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
         model.settings.effective_sample_share

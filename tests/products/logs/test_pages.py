@@ -250,12 +250,12 @@ def test_the_liveliest_window():
     rates[[2, 3, 8, 9]] = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
     rates[6] = np.nan
     known = np.array([0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11])
-    assert pages._first_row_of_most_active_window(rates, known, 2) == 8
-    assert pages._first_row_of_most_active_window(rates, known[:6], 2) == 2
-    assert pages._first_row_of_most_active_window(rates, known, 3) == 7
-    assert pages._first_row_of_most_active_window(rates, known, 11) == 0
-    assert pages._first_row_of_most_active_window(rates, known, 12) == 0
-    assert pages._first_row_of_most_active_window(rates[1:], known[:-1] - 0, 10) == 0
+    assert pages._first_row_of_liveliest_window(rates, known, 2) == 8
+    assert pages._first_row_of_liveliest_window(rates, known[:6], 2) == 2
+    assert pages._first_row_of_liveliest_window(rates, known, 3) == 7
+    assert pages._first_row_of_liveliest_window(rates, known, 11) == 0
+    assert pages._first_row_of_liveliest_window(rates, known, 12) == 0
+    assert pages._first_row_of_liveliest_window(rates[1:], known[:-1] - 0, 10) == 0
 
 
 def test_a_prediction_is_shown_over_forty_seconds():

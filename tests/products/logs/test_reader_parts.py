@@ -29,7 +29,7 @@ def folder(tmp_path):
     root = tmp_path / "carbonZ"
     root.mkdir()
     topics = {}
-    for i, (topic, field, _) in enumerate(alfa._load_column_and_failure_topics()["columns"].values()):
+    for i, (topic, field, _) in enumerate(alfa._load_column_sources_and_failure_names()["columns"].values()):
         topics.setdefault(topic, []).append((field, 1500.0 + 10.0 * i if "channels" in field else 1.0 + i))
     for k, (topic, fields) in enumerate(topics.items()):
         header = ",".join(["%time", *(field for field, _ in fields)])
@@ -256,7 +256,7 @@ def test_of_a_stored_table_the_numbers_that_are_asked_for_count(tmp_path, monkey
     parquet.write_table(pa.table(columns), path)
     monkeypatch.setattr(table, "_check_parquet_size", lambda path, footer, names: seen.append(names))
     for asked in (None, {"t", "b", "words"}):
-        assert table._parquet_and_number_columns(path, asked) == (list(columns), ["t", "a", "b"])
+        assert table._all_and_number_columns_of_parquet(path, asked) == (list(columns), ["t", "a", "b"])
     assert seen == [["t", "a", "b"], ["t", "b"]]
 
 

@@ -119,7 +119,7 @@ def test_each_flight_is_held_against_its_own_recording_and_the_model_of_the_othe
         "_score_against_log": lambda kept, rows, model: {
             "of": kept.samples.name, "rows": rows, "model": model
         },
-        "summarize_failures": lambda scores: {"flights": [one["of"] for one in scores]},
+        "summarize_failure_scores": lambda scores: {"flights": [one["of"] for one in scores]},
     }  # fmt: skip
     for name, stub in stubs.items():
         monkeypatch.setattr(benchmark, name, stub)

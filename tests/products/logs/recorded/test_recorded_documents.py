@@ -41,7 +41,10 @@ FLIGHTS = [
 EVENTS = {
     "set": "gliders", "left_out": "each flight in turn", "scored_by": "events", "flights": FLIGHTS,
     "rows": [
-        {"method": method, **benchmark.summarize_failures([of for of in FLIGHTS if of["method"] == method])}
+        {
+            "method": method,
+            **benchmark.summarize_failure_scores([of for of in FLIGHTS if of["method"] == method]),
+        }
         for method in DELAYS
     ],
     "published": [
@@ -247,7 +250,7 @@ def test_data_sets_below_a_folder(tmp_path):
 
 
 def test_the_delay_of_a_flight_in_words():
-    assert [benchmark._delay_text(of) for of in (
+    assert [benchmark._mean_delay_text(of) for of in (
         {}, {"failures": 2, "mean": None, "found": 0}, {"mean": 1.25},
         {"mean": 1.27, "found": 2, "failures": 3},
     )] == ["", "not found", "1.2", "1.3 (2 of 3)"]  # fmt: skip

@@ -214,13 +214,13 @@ def _withdraw_contradicted_isolation(
     direction_norms = np.linalg.norm(response_directions, axis=0)
     squared_projections = (residual @ (response_directions / np.maximum(direction_norms, MIN_DIVISOR))) ** 2
     cumulated_squared_projections = np.cumsum(squared_projections, axis=0)
-    window_begin_row = np.maximum(
+    window_begin_rows = np.maximum(
         np.arange(len(cumulated_squared_projections)) - round(_RESIDUAL_DIRECTION_WINDOW_S * model.rate_hz), 0
     )
     log_likelihood_gain_by_group = (
         0.5
         * model.settings.effective_sample_share
-        * (cumulated_squared_projections - cumulated_squared_projections[window_begin_row])
+        * (cumulated_squared_projections - cumulated_squared_projections[window_begin_rows])
     )
     max_log_likelihood_gain, is_contradicted = (
         log_likelihood_gain_by_group.max(axis=1),

@@ -26,7 +26,7 @@ DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
 _MIN_COSINE_OF_PROPORTIONAL_EFFECTS = 0.9
 _MIN_CREDIBLE_ROW_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
-_PROPORTIONAL_GROUP_NOTE = (
+_PROPORTIONAL_COMMANDS_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
     "together."
@@ -198,7 +198,7 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
     standardized_responses = _standardized_group_responses(samples, model)
     return {
         "together": [
-            {"surfaces": group, "says": _PROPORTIONAL_GROUP_NOTE.format(", ".join(group))}
+            {"surfaces": group, "says": _PROPORTIONAL_COMMANDS_NOTE.format(", ".join(group))}
             for group in model.groups
             if len(group) > 1
         ],

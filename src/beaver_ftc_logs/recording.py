@@ -71,12 +71,12 @@ def nearest_names(wanted_name: str, names: Iterable[str]) -> str:
 
 @contextmanager
 def refuse_log_unreadable_by_package(
-    path: Path, log_kind: str, package: str, file_form: str
+    path: Path, log_kind: str, package: str, allowed_file_text: str
 ) -> Iterator[None]:
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
     here. Raises BadInput where the package is missing, or the file is none that it can read.
 
-    log_kind: such a log is called; file_form: of the files that hold one.
+    log_kind: such a log is called; allowed_file_text: says which files hold one.
     """
     try:
         with redirect_stdout(StringIO()):
@@ -89,7 +89,7 @@ def refuse_log_unreadable_by_package(
     except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
         reason = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(
-            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {file_form}"
+            f"{path}: is no {log_kind} that can be read ({reason}), allowed: {allowed_file_text}"
         ) from None
 
 
@@ -153,15 +153,15 @@ def _longest_increasing_rows(stamps: Floats) -> NDArray[np.int64]:
 
     From the end, so that of a row and one that comes late behind it the late one is left out.
     """
-    negated_first_stamps: list[float] = []
-    first_rows: list[int] = []
+    negated_first_stamp_by_length: list[float] = []
+    first_row_by_length: list[int] = []
     next_rows = np.full(len(stamps), -1)
     for k in range(len(stamps) - 1, -1, -1):
-        longest_following_length = bisect_left(negated_first_stamps, -stamps[k])
-        next_rows[k] = first_rows[longest_following_length - 1] if longest_following_length else -1
-        negated_first_stamps[longest_following_length : longest_following_length + 1] = [-stamps[k]]
-        first_rows[longest_following_length : longest_following_length + 1] = [k]
-    kept_rows = first_rows[-1:]
+        longest_following_length = bisect_left(negated_first_stamp_by_length, -stamps[k])
+        next_rows[k] = first_row_by_length[longest_following_length - 1] if longest_following_length else -1
+        negated_first_stamp_by_length[longest_following_length : longest_following_length + 1] = [-stamps[k]]
+        first_row_by_length[longest_following_length : longest_following_length + 1] = [k]
+    kept_rows = first_row_by_length[-1:]
     while kept_rows and next_rows[kept_rows[-1]] >= 0:
         kept_rows.append(int(next_rows[kept_rows[-1]]))
     return np.array(kept_rows, dtype=np.int64)

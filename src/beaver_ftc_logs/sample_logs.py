@@ -17,9 +17,9 @@ EffectivenessAtTime = Callable[[float], float]
 SAMPLE_RATE_HZ, HEALTHY_FLIGHT_S, FAULTY_FLIGHT_S = 20.0, 600.0, 180.0
 WEAK_ELEVON_FROM_S, WEAK_ELEVON_EFFECTIVENESS = 90.0, 0.4
 _DAMPING_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
-_ELEVON_EFFECTIVENESS_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
+_ACCELERATION_BY_FULL_ELEVON_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
 """Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
-_TURBULENCE_INTENSITY = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second: of the noise that drives it
+_TURBULENCE_DRIVING_NOISE = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second
 _GYRO_NOISE_RAD_S = 0.004
 _DEMANDED_ATTITUDE_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
 VEHICLE_FILE_TEXT = """\
@@ -72,14 +72,16 @@ def _simulate_rows(
         commands = _control_law(attitude, rates, demanded_attitude)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
         yield [1000.0 * t_s, *measured_rates_deg_s, *commands, *attitude]
-        elevon_positions = (
+        effective_elevon_positions = (
             np.array([commands.sum(), commands[0] - commands[1]]) / 2.0 * [1.0, left_effectiveness(t_s)]
         )
         turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + np.sqrt(
             dt_s
-        ) * _TURBULENCE_INTENSITY * rng.standard_normal(3)
+        ) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
         rates = rates + dt_s * (
-            _DAMPING_PER_S @ rates + elevon_positions @ _ELEVON_EFFECTIVENESS_RAD_S2 + turbulence_rad_s2
+            _DAMPING_PER_S @ rates
+            + effective_elevon_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
+            + turbulence_rad_s2
         )
         attitude = attitude + dt_s * _euler_rates(rates, attitude)
 

@@ -66,8 +66,8 @@ class Verdict(NamedTuple):
     - `axis`: axis of the alarm: `p`, `q` or `r`.
     - `isolated`: name of the faulty surface, or `unanticipated`; None if no fault is isolated.
     - `type`: fault type of the isolated fault.
-    - `estimate`: estimated size of the fault. A loss of effectiveness has the size theta, from -1 to 0. Other
-      faults have an angle, rad.
+    - `estimate`: estimated size of the fault. The size of a loss of effectiveness is theta, from -1 to 0. The
+      size of any other fault is an angle, rad.
     - `effectiveness` (surfaces,): estimated effectiveness of every surface, 1 if it is healthy. The adaptive
       laws use it. None if the detector does not estimate it.
     - `statistic`: number that exceeds 1 when the alarm is raised. Compute this number in every frame, also

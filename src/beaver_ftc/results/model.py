@@ -194,8 +194,8 @@ class Named(Part):
     - `candidates`: names or fault types that are not excluded.
     - `type_correct`: True if `type` is the type of the true fault.
     - `type_delay_s`: time from the fault to the instant at which its type was named, s.
-    - `estimate`: estimated size of the fault. A loss of effectiveness has the size theta, from -1 to 0. Other
-      faults have an angle, rad.
+    - `estimate`: estimated size of the fault. The size of a loss of effectiveness is theta, from -1 to 0. The
+      size of any other fault is an angle, rad.
     - `estimate_deg`: the same size as an angle, deg.
     - `estimate_interval`: lower and upper end of the interval that contains the size of the fault, in the
       unit of `estimate`.

@@ -51,7 +51,7 @@ class Simulation(Stepping):
       lower and upper stops.
     - `readout`: further values of the last frame, with names and units, for example `readout.G`.
 
-    The first call of `step` also flies frame 0. In this frame the aircraft in trim is measured.
+    The first call of `step` also flies frame 0. In this frame the sensors measure the aircraft in trim.
     """
 
     def __init__(

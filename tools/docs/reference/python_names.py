@@ -20,8 +20,8 @@ use the names in programs. The [glossary](reference/glossary.md) explains the te
 READING = """## How to read an entry
 
 - **Heading.** The name without `beaver_ftc.` in front. A name without a dot needs no further import: for the
-  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write `from
-  beaver_ftc.results.model import Fault`.
+  heading "fly" write `bf.fly`. A name with a dot needs an import: for "results.model.Fault" write
+  `from beaver_ftc.results.model import Fault`.
 - **Signature.** The value after `=` is the default of an argument. `= ...` means that the default is
   computed. Arguments after `*` must be given by name. `X | None` means that the value may be None. The text
   below the signature explains the types.

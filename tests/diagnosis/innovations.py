@@ -155,7 +155,9 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, has_regre
             likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(first + k))
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
+        likelihood.whiten(
+            block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
+        )
         for j in range(block.n_regressors):
             likelihood.whiten(
                 block, block.regressor_filter_state[j], regressors[k, j], dt, block.regressor_response[j]
@@ -173,10 +175,12 @@ def bounded_all(block, d, signatures, onset, dt):
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = d[k]
-        likelihood.whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
+        likelihood.whiten(
+            block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
+        )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[: block.n_axes] = signatures[k, h]
-        likelihood.fill_uncertainty_response(block, bounded, dt)
+        likelihood.fill_uncertainty_response_bounds(block, bounded, dt)
         if k >= onset:
             likelihood.accumulate_evidence(block, False, dt, 1.0)
 

@@ -61,7 +61,9 @@ class Statistical:
     @staticmethod
     def look(record, fdi, design, x, y, u, attitude, dt):
         parts = (record[name] for name in ("test_config", "noise", "block", "gust"))
-        statistical.add_instant_to_tests(*parts, fdi["bound"], design, _measured(x, y, attitude), u, dt)
+        statistical.add_instant_to_gust_and_regressors(
+            *parts, fdi["bound"], design, _measured(x, y, attitude), u, dt
+        )
 
     @staticmethod
     def shows(fdi, surface):
@@ -94,7 +96,7 @@ class Across:
     @staticmethod
     def part(fdi, view, innovation, i):
         parts = (fdi["statistical"][name] for name in ("forces", "gust", "inertial_gust"))
-        return parity.innovation_component(view, *parts, innovation, i)
+        return parity.innovation_component_for_view(view, *parts, innovation, i)
 
     @staticmethod
     def turn(fdi, view, G):
@@ -128,7 +130,7 @@ class Across:
         views, tests = views_of(record), record["test_config"]
         parity.update_view_directions_and_signatures(views, record["forces"], record["gust"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.project_innovation(views, int(tests["has_regressors"]), *parts, innovation, y[2])
+        parity.fill_view_innovations_and_noise(views, int(tests["has_regressors"]), *parts, innovation, y[2])
         parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
@@ -137,7 +139,7 @@ class Across:
 
     @staticmethod
     def shown(record, view):
-        return parity.vane_confirmed_score(
+        return parity.score_confirmed_without_vane(
             view, views_of(record), record["test_config"], record["forces"], record["gust"]
         )
 

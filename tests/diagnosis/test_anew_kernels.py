@@ -58,7 +58,11 @@ def test_the_drift_of_the_detectors_blocks(moving):
         ) = np.eye(3), 1e-3, 0.5
         record["gust"]["output"]["gust_axes_in_body"] = np.arange(9.0).reshape(3, 3)
         for block, axes in zip(record["block"], ((1,), (0, 2)), strict=False):
-            block["n_axes"], block["axes"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
+            block["n_axes"], block["axes"][: len(axes)], block["gust_drift_intensity_factor"] = (
+                len(axes),
+                axes,
+                1.0,
+            )
         record["noise"]["uncertainty_bound"] = record["block"]["drift_intensity"] = record["block"][
             "model_noise_variance"
         ] = before
@@ -83,8 +87,8 @@ def test_the_gusts_effect():
         (
             "specific_force",
             "air_rotation_in_body_axes",
-            "gust_acceleration",
-            "coarse_gust_acceleration",
+            "angular_acceleration_by_gust",
+            "angular_acceleration_by_coarse_gust",
             "rate_damping",
         ),
     )

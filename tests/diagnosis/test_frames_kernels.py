@@ -139,7 +139,7 @@ def test_what_is_known_of_a_fault_is_expected_from_the_alarm_on(known, whole_cla
             control["surfaces"]["output"]["offset"][ELEVATOR] = stuck_at if whole_class else 0.0
     left = (
         flown.frame["prediction"]["acceleration_with_known_faults"]
-        - flown.frame["prediction"]["frame_means"]["acceleration"]
+        - flown.frame["prediction"]["frame_means"]["predicted_acceleration"]
     )
     phi = np.array(flown.innovations[-2])
     assert np.abs(phi).max() > 0.05

@@ -89,8 +89,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 ):
     flown = _flown(turbulence, airspeed_mps, seed)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[1]
-    assert left[2] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[2]
     assert np.corrcoef(flown.true[:, 1], flown.seen[:, 1])[0, 1] > 0.98
     assert np.corrcoef(flown.true[:, 2], flown.seen[:, 2])[0, 1] > 0.95
 
@@ -99,8 +99,8 @@ def test_pitching_and_yawing_gusts_are_seen_but_for_less_than_the_share_declared
 def test_and_at_other_rates_and_between_jsbsims_frames(keys):
     flown = Flown("light", duration_s=20, seed=3, **keys)
     left = flown.intensity(flown.true - flown.seen)
-    assert left[1] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[1]
-    assert left[2] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[2]
 
 
 def test_a_steady_wind_is_not_taken_for_a_gust():
@@ -150,19 +150,19 @@ def test_where_no_model_has_the_forces_only_accelerometers_tell_a_gust(tmp_path,
     statistical = loop.frames["fdi"]["statistical"][0]
     assert statistical["gust"]["output"]["uses_accelerometers"] == 1
     if forces != "felt":
-        gusts.stop_accelerometers(statistical["gust"])
+        gusts.stop_using_accelerometers(statistical["gust"])
     if forces == "claimed":
         (
             statistical["gust"]["output"]["is_gust_measured"],
             statistical["gust"]["memory"]["unmeasured_intensity_share"],
         ) = (
             1,
-            gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES,
+            gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES,
         )
     for _ in loop.chunks():
         pass
     assert bool(statistical["alarm"]["max_score_over_alarm_level_so_far"] > 0.2) is (forces == "claimed")
-    seen = float(np.abs(statistical["gust"]["output"]["gust_acceleration"]).max())
+    seen = float(np.abs(statistical["gust"]["output"]["angular_acceleration_by_gust"]).max())
     assert (seen == 0.0) is (forces == "nobody's")
     assert (seen > 0.05) is (forces == "claimed")
 
@@ -189,7 +189,7 @@ def test_where_no_gust_is_seen_each_returns_as_late_as_it_does(without_forces):
     for g in range(3):
         true = 1.0 / (1.0 / lengths[g] ** 2 + omega**2)
         reckoned = (
-            long["drift_intensity_scale"]
+            long["gust_drift_intensity_factor"]
             * gusts.intensity_scale_for_rolling_length(record, g)
             / (1.0 / long["drift_correlation_length_m"] ** 2 + omega**2)
         )
@@ -210,9 +210,9 @@ def test_where_no_model_has_the_forces_the_vanes_show_a_gust_roughly_for_a_law_t
         assert np.corrcoef(seen[:, axis], true[:, axis])[0, 1] > 0.95
     record = flown.record
     assert (
-        np.abs(record["output"]["coarse_gust_acceleration"]).max()
+        np.abs(record["output"]["angular_acceleration_by_coarse_gust"]).max()
         > 0.0
-        == np.abs(record["output"]["gust_acceleration"]).max()
+        == np.abs(record["output"]["angular_acceleration_by_gust"]).max()
     )
 
 
@@ -253,5 +253,5 @@ def test_the_rolling_gust_rolls_whatever_the_heading(wind_mps):
     across = np.abs(np.cos(flown.heading)) < 0.5
     assert across.sum() > 400
     left = flown.intensity((flown.true - flown.seen)[across])
-    assert left[1] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[1]
-    assert left[2] < gusts.MIN_UNMEASURED_GUST_ROTATION_SHARES[2]
+    assert left[1] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[1]
+    assert left[2] < gusts.MIN_UNMEASURED_GUST_INTENSITY_SHARES[2]

@@ -210,14 +210,14 @@ def test_level_axes_are_a_rotation(seed):
 def test_a_diagnosis_that_begins_in_flight_has_seen_no_gust():
     flight = Flight(3)
     record = new_air(
-        has_level_acceleration_before=1,
+        has_acceleration_before=1,
         unmeasured_yawing_share_by_turn_now=0.4,
         unmeasured_yawing_share_by_past_turns=0.3,
         air_rotation_in_level_axes=(0.1, 0.2, 0.3),
     )
     gusts.start_gust_estimate(record, *flight.reading())
     assert (
-        record["memory"]["has_level_acceleration_before"],
+        record["memory"]["has_acceleration_before"],
         record["memory"]["unmeasured_yawing_share_by_turn_now"],
         record["memory"]["unmeasured_yawing_share_by_past_turns"],
     ) == (
@@ -257,18 +257,18 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
 
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
-    assert record["output"]["gust_acceleration"] == pytest.approx(expected, rel=1e-6)
+    assert record["output"]["angular_acceleration_by_gust"] == pytest.approx(expected, rel=1e-6)
     gusts.fill_gust_effect(record, design[0], X, Y, U)
     gusts.begin_gust_sums(record, 45.0, 0.01)
-    record["output"]["gust_acceleration"] = 0.0
-    assert record["memory"]["gust_angular_acceleration_sum"] == pytest.approx(expected, rel=1e-6)
+    record["output"]["angular_acceleration_by_gust"] = 0.0
+    assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_what_an_earlier_diagnosis_kept_is_gone_when_one_begins():
     kept = dict.fromkeys(
         (
             "air_rotation_in_level_axes",
-            "has_level_acceleration_before",
+            "has_acceleration_before",
             "unmeasured_yawing_share_by_turn_now",
             "unmeasured_yawing_share_by_past_turns",
             "acceleration_variance_by_axes_turn_now",

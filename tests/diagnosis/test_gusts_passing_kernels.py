@@ -88,7 +88,7 @@ def test_an_unknown_speed_leaves_a_share_of_the_gusts_that_vanes_show(g, further
         record["output"]["speed_relative_to_mean_air"],
         record["config"]["speed_error_variance"],
         record["config"]["gust_velocity_variance"],
-        record["config"]["unmeasured_share_per_speed_variance"],
+        record["config"]["unmeasured_share_per_speed_error_variance"],
     ) = 40.0, 1.3, 4.7, 2.5
     off = 2.5 * (1.3 + 0.8 * 4.7) / 40.0**2
     assert gusts.unmeasured_gust_intensity_share(record, g) == pytest.approx(
@@ -103,7 +103,7 @@ def test_a_speed_that_is_off_leaves_no_more_than_is_reckoned_with():
     e, tau, level = 1e-3, 0.37, 6.6
     s = 1j * np.geomspace(1e-3, 1e3, 20001)
     error = np.abs(s / (s + 1.0 / tau) - s / (s + (1.0 + e) / tau)) ** 2
-    assert gusts.unmeasured_share_per_speed_variance(level) / (0.5 * level) ** 2 == pytest.approx(
+    assert gusts.unmeasured_share_per_speed_error_variance(level) / (0.5 * level) ** 2 == pytest.approx(
         error.max() / e**2, rel=2e-3
     )
 

@@ -356,7 +356,7 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     G, Gu = rng.normal(size=(2, 3, 4))
     (
         fdi["bound"]["has_declared_surface_errors"],
-        fdi["bound"]["surface_error_per_rad"],
+        fdi["bound"]["surface_effect_error_per_rad"],
         fdi["bound"]["frame_innovation_bound"],
     ) = (
         errors,

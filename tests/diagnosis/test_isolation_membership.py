@@ -95,7 +95,10 @@ def test_how_far_a_surface_can_have_been_is_narrowed_round_by_round(instants):
         (0.0, 0.9, 0.0),
         0.05,
     )
-    fdi["bound"]["surface_error_per_rad"][:, 1], fdi["bound"]["surface_error_at_command"][:, 1] = (
+    (
+        fdi["bound"]["surface_effect_error_per_rad"][:, 1],
+        fdi["bound"]["surface_effect_error_at_command"][:, 1],
+    ) = (
         (0.1, 0.4, 0.2),
         (0.01, 0.02, 0.2),
     )
@@ -132,7 +135,7 @@ def test_where_no_position_agrees_the_whole_travel_stays_possible():
         (0.0, 9.0, 0.0),
         0.05,
     )
-    fdi["bound"]["surface_error_per_rad"][:, 1] = 0.1
+    fdi["bound"]["surface_effect_error_per_rad"][:, 1] = 0.1
     fie["frame_mean_effect"]["regressor"] = 0.1, 5.0, 1.0
     on(isolation.widen_tolerance_by_surface_errors, fdi, fie)
     assert fie["max_abs_deflection_in_last_frame"] == 0.6

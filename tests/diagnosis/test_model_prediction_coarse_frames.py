@@ -68,7 +68,7 @@ def test_what_is_believed_is_the_mean_over_the_instants(substeps):
         another(frames)
     over(frames)
     believed = np.mean([f + G @ u for f, G, u, _ in seen], axis=0)
-    assert frames[0]["prediction"]["frame_means"]["acceleration"] == pytest.approx(believed)
+    assert frames[0]["prediction"]["frame_means"]["predicted_acceleration"] == pytest.approx(believed)
     assert frames[0]["fdi"]["bound"]["eta_bar"] == pytest.approx(
         np.mean([bound for *_, bound in seen], axis=0)
     )

@@ -98,13 +98,13 @@ def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     gusts.start_gust_estimate(record, Y, np.zeros(3))
     record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
     gusts.fill_gust_effect(record, design, X, Y, U)
-    first = record["output"]["gust_acceleration"].copy()
+    first = record["output"]["angular_acceleration_by_gust"].copy()
     gusts.begin_gust_sums(record, V, 0.01)
     gusts.add_instant_to_gust(record, design, X, Y, U, np.zeros(3), 0.01)
-    assert record["memory"]["gust_angular_acceleration_sum"] == pytest.approx(
-        first + record["output"]["gust_acceleration"]
+    assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(
+        first + record["output"]["angular_acceleration_by_gust"]
     )
-    assert np.abs(record["output"]["gust_acceleration"] - first).max() > 1e-5
+    assert np.abs(record["output"]["angular_acceleration_by_gust"] - first).max() > 1e-5
 
 
 @pytest.mark.parametrize("swings", [0, 1])
@@ -302,8 +302,15 @@ def new_detector(**fields):
         (0.01, 0.02, 0.03),
     )
     for block, axes in zip(record["block"], ((1,), (0, 2), (0, 2)), strict=True):
-        block["n_axes"], block["axes"][: len(axes)], block["drift_intensity_scale"] = len(axes), axes, 1.0
-    record["block"][2]["drift_intensity_scale"], record["block"][2]["drift_correlation_length_m"] = 4.0, 90.0
+        block["n_axes"], block["axes"][: len(axes)], block["gust_drift_intensity_factor"] = (
+            len(axes),
+            axes,
+            1.0,
+        )
+    record["block"][2]["gust_drift_intensity_factor"], record["block"][2]["drift_correlation_length_m"] = (
+        4.0,
+        90.0,
+    )
     put(record, **fields)
     return fdi, record, design_record().view(np.recarray)[0]
 
@@ -508,16 +515,22 @@ def test_the_estimate_is_that_of_whoever_counts():
 
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
-    record = new_air(gust_angular_acceleration_sum=(0.4, -0.8, 1.2))
+    record = new_air(angular_acceleration_by_gust_sum=(0.4, -0.8, 1.2))
     gusts.fill_frame_mean_gust_acceleration(record, share)
-    assert record["output"]["mean_gust_acceleration"] == pytest.approx(share * np.array([0.4, -0.8, 1.2]))
+    assert record["output"]["mean_angular_acceleration_by_gust"] == pytest.approx(
+        share * np.array([0.4, -0.8, 1.2])
+    )
 
 
 def test_a_leap_of_the_air_widens_what_a_drift_may_be():
     """By the axes of the block, so much stronger as the gusts are taken to be."""
     block = np.zeros(1, block_dtype(USUAL_RECORD_SIZE.rate_block_capacity)).view(np.recarray)[0]
     record, rng = new_air(), np.random.default_rng(2)
-    record["output"]["acceleration_variance_by_axes_turn"], block["drift_intensity_scale"], block["P_dd"] = (
+    (
+        record["output"]["acceleration_variance_by_axes_turn"],
+        block["gust_drift_intensity_factor"],
+        block["P_dd"],
+    ) = (
         rng.normal(size=(3, 3)),
         1.7,
         0.3,

@@ -142,7 +142,7 @@ def test_each_number_of_a_frame_is_read_from_its_own_field():
     now = frame["prediction"]
     now["u"], now["G"] = (1.0, 2.0), np.arange(3.0, 9.0).reshape(3, 2)
     now["frame_means"]["G"] = np.arange(9.0, 15.0).reshape(3, 2)
-    now["frame_means"]["acceleration"] = (15.0, 16.0, 17.0)
+    now["frame_means"]["predicted_acceleration"] = (15.0, 16.0, 17.0)
     for first, name in enumerate(("low", "high", "approach", "step")):
         now["actuators"][name] = (18.0 + 2 * first, 19.0 + 2 * first)
     readout = FrameReadout(frame)

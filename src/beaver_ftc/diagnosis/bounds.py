@@ -137,9 +137,9 @@ def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
 def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
     gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_innovation_bound: on the innovation
-    of one frame, rad/s2. surface_error_per_rad, surface_error_at_command: error of each surface's own terms
-    in the acceleration, per rad of deflection (rad/s2 per rad) and at the command (rad/s2), means over the
-    frame.
+    of one frame, rad/s2. surface_effect_error_per_rad, surface_effect_error_at_command: error of each
+    surface's own terms in the acceleration, per rad of deflection (rad/s2 per rad) and at the command
+    (rad/s2), means over the frame.
     additional_error_by_travel_level: by how much the map's error with a surface at each share of its travel
     exceeds that in eta_bar."""
     return record(
@@ -148,7 +148,8 @@ def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
         model_error_map=error_map_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
         gyro_error_change_bound_before=3,
         frame_innovation_bound=3,
-        has_declared_surface_errors=int, surface_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        has_declared_surface_errors=int,
+        surface_effect_error_per_rad=(3, n), surface_effect_error_at_command=(3, n),
         additional_error_by_travel_level=(MAX_LEVELS, 3),
     )  # fmt: skip
 

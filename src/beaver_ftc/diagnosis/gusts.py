@@ -20,7 +20,7 @@ V is the speed relative to the field of gusts. The mean wind carries that field 
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
 sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
 `gust_velocity_change_since_start` is that sum, with a decay as slow as this drift permits. A relative error e
-of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_variance`).
+of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`unmeasured_share_per_speed_error_variance`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
@@ -59,7 +59,7 @@ from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
-MIN_UNMEASURED_GUST_ROTATION_SHARES = (1.0, 0.003, 0.03)
+MIN_UNMEASURED_GUST_INTENSITY_SHARES = (1.0, 0.003, 0.03)
 UNMEASURED_SHARE_BY_FORCE_ERROR = 0.01  # share left unmeasured by an error of a tenth in the forces
 ADAMS_BASHFORTH_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
@@ -81,22 +81,23 @@ GUST_CONFIG_RECORD = record(
     max_gust_velocity=float, gust_velocity_decay_rate=float,
     # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
     # relative error of the speed leaves, over the variance of that error.
-    speed_error_variance=float, gust_velocity_variance=float, unmeasured_share_per_speed_variance=float,
+    speed_error_variance=float, gust_velocity_variance=float, unmeasured_share_per_speed_error_variance=float,
     rolling_gust_correlation_length=float,  # lag of the rolling gust times airspeed, m
     turbulence_scale_length=float,  # of the gusts, m
     starts_in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
-    has_level_acceleration_before=int,  # whether `level_acceleration_before` is valid
+    has_acceleration_before=int,  # whether `acceleration_in_level_axes_before` is valid
     accelerometer_reading=3,  # reading of the accelerometers, m/s2
     force_table=TABLE, scratch=MAX_MONOMIALS,  # force coefficients, evaluated at this instant
     # Velocity relative to the air, m/s in level axes; specific force, m/s2 in body axes; attitude.
     air_relative_velocity=3, specific_force=3, level_to_body=(3, 3), heading=float,
     # an instant before, by forces and gravity, m/s2 in the level axes of this one
-    level_acceleration_before=3,
+    acceleration_in_level_axes_before=3,
     air_rotation_in_level_axes=3, air_rotation_in_body_axes=3,  # rad/s
-    gust_angular_acceleration_sum=3,  # sum of `gust_acceleration` over the instants of a frame, rad/s2
+    # sum of `angular_acceleration_by_gust` over the instants of a frame, rad/s2
+    angular_acceleration_by_gust_sum=3,
     # intensity over airspeed of the drift of the rotation at this height, rad2/s3 per m/s
     gust_rotation_intensity_per_airspeed=3,
     unmeasured_intensity_share=3,  # share of it that the vanes do not measure
@@ -120,8 +121,8 @@ GUST_OUTPUT_RECORD = record(
     # filled by configure, and end with the accelerometers.
     accounts_for_gusts=int, uses_accelerometers=int, is_gust_measured=int,
     # effect of the measured gust, rad/s2: at this instant; mean of the elapsed frame
-    gust_acceleration=3, mean_gust_acceleration=3,
-    coarse_gust_acceleration=3,  # effect of the coarse estimate, rad/s2
+    angular_acceleration_by_gust=3, mean_angular_acceleration_by_gust=3,
+    angular_acceleration_by_coarse_gust=3,  # effect of the coarse estimate, rad/s2
     # `acceleration_variance_by_axes_turn_now` plus `acceleration_variance_by_axes_turn_before`, (rad/s2)2
     acceleration_variance_by_axes_turn=(3, 3),
     speed_relative_to_mean_air=float,  # relative to the mean air, m/s
@@ -197,7 +198,7 @@ def start_gust_estimate(gust, y, attitude):
     measure_air_relative_velocity(gust, y, attitude)
     update_gust_axes(gust, 0.0, 1.0)
     gust.memory.air_rotation_in_level_axes[:] = 0.0
-    gust.memory.has_level_acceleration_before, gust.memory.unmeasured_yawing_share_by_turn_now = 0, 0.0
+    gust.memory.has_acceleration_before, gust.memory.unmeasured_yawing_share_by_turn_now = 0, 0.0
     gust.memory.unmeasured_yawing_share_by_past_turns = gust.memory.unmeasured_pitching_share_by_start = (
         gust.memory.remaining_initial_gust_variance_share
     ) = float(gust.config.starts_in_flight)
@@ -278,38 +279,47 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
     vertical, the yawing gust only decays, and the sum of changes `gust_velocity_change_since_start` starts
     again. It does so one instant longer: JSBSim's gusts turn a step after the heading.
     """
-    level_acceleration = gust.memory.scratch
+    acceleration_in_level_axes = gust.memory.scratch
     for i in range(3):
-        level_acceleration[i] = level_component(gust.memory.level_to_body, gust.memory.specific_force, i)
-    level_acceleration[2] += gust.config.gravity
-    if not gust.memory.has_level_acceleration_before:
-        gust.memory.level_acceleration_before[:] = level_acceleration[:3]
-        gust.memory.has_level_acceleration_before = 1
+        acceleration_in_level_axes[i] = level_component(
+            gust.memory.level_to_body, gust.memory.specific_force, i
+        )
+    acceleration_in_level_axes[2] += gust.config.gravity
+    if not gust.memory.has_acceleration_before:
+        gust.memory.acceleration_in_level_axes_before[:] = acceleration_in_level_axes[:3]
+        gust.memory.has_acceleration_before = 1
     for i in range(3):
         gust.memory.air_relative_velocity[i] += dt * (
-            1.5 * level_acceleration[i] - 0.5 * gust.memory.level_acceleration_before[i]
+            1.5 * acceleration_in_level_axes[i] - 0.5 * gust.memory.acceleration_in_level_axes_before[i]
         )
     heading_change = wrapped(attitude[2] - gust.memory.heading)
     sin_heading_change, cos_heading_change = np.sin(heading_change), np.cos(heading_change)
-    predicted_forward_velocity = (
+    predicted_horizontal_velocity_ahead = (
         gust.memory.air_relative_velocity[0] * cos_heading_change
         + gust.memory.air_relative_velocity[1] * sin_heading_change
     )
-    predicted_right_velocity = (
+    predicted_horizontal_velocity_right = (
         gust.memory.air_relative_velocity[1] * cos_heading_change
         - gust.memory.air_relative_velocity[0] * sin_heading_change
     )
-    predicted_down_velocity = gust.memory.air_relative_velocity[2]
-    gust.memory.level_acceleration_before[0] = (
-        level_acceleration[0] * cos_heading_change + level_acceleration[1] * sin_heading_change
+    predicted_vertical_velocity_down = gust.memory.air_relative_velocity[2]
+    gust.memory.acceleration_in_level_axes_before[0] = (
+        acceleration_in_level_axes[0] * cos_heading_change
+        + acceleration_in_level_axes[1] * sin_heading_change
     )
-    gust.memory.level_acceleration_before[1] = (
-        level_acceleration[1] * cos_heading_change - level_acceleration[0] * sin_heading_change
+    gust.memory.acceleration_in_level_axes_before[1] = (
+        acceleration_in_level_axes[1] * cos_heading_change
+        - acceleration_in_level_axes[0] * sin_heading_change
     )
-    gust.memory.level_acceleration_before[2] = level_acceleration[2]
+    gust.memory.acceleration_in_level_axes_before[2] = acceleration_in_level_axes[2]
     measure_air_relative_velocity(gust, y, attitude)
     update_gust_velocity_and_speed(
-        gust, predicted_forward_velocity, predicted_right_velocity, predicted_down_velocity, y[AIRSPEED], dt
+        gust,
+        predicted_horizontal_velocity_ahead,
+        predicted_horizontal_velocity_right,
+        predicted_vertical_velocity_down,
+        y[AIRSPEED],
+        dt,
     )
     V = gust.output.speed_relative_to_mean_air
     update_gust_axes(gust, sin_heading_change, cos_heading_change)
@@ -333,14 +343,14 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
     gust.memory.air_rotation_in_level_axes[1] = np.exp(
         -dt / pitching_lag_s
     ) * gust.memory.air_rotation_in_level_axes[1] + (
-        predicted_down_velocity - gust.memory.air_relative_velocity[2]
+        predicted_vertical_velocity_down - gust.memory.air_relative_velocity[2]
     ) / (V * pitching_lag_s)
     gust.memory.air_rotation_in_level_axes[2] = (
         np.exp(-dt / yawing_lag_s) * gust.memory.air_rotation_in_level_axes[2]
     )
     if unmeasured_yawing_share_by_turn < 1.0:
         gust.memory.air_rotation_in_level_axes[2] += (
-            predicted_right_velocity - gust.memory.air_relative_velocity[1]
+            predicted_horizontal_velocity_right - gust.memory.air_relative_velocity[1]
         ) / (V * yawing_lag_s)
     else:
         gust.memory.gust_velocity_change_since_start[:], gust.memory.remaining_initial_gust_variance_share = (
@@ -351,12 +361,17 @@ def update_gust_rotation_rates(gust, y, attitude, dt):
 
 @kernel
 def update_gust_velocity_and_speed(
-    gust, predicted_forward_velocity, predicted_right_velocity, predicted_down_velocity, airspeed, dt
+    gust,
+    predicted_horizontal_velocity_ahead,
+    predicted_horizontal_velocity_right,
+    predicted_vertical_velocity_down,
+    airspeed,
+    dt,
 ):
     """Update `gust_velocity_change_since_start` and `speed_relative_to_mean_air` for the elapsed dt s.
 
-    predicted_forward_velocity, _right, _down, m/s: velocity relative to the air if the gust had not changed.
-    airspeed m/s: it is the speed if no gust is measured.
+    predicted_horizontal_velocity_ahead, _right and predicted_vertical_velocity_down, m/s: velocity relative
+    to the air if the gust had not changed. airspeed m/s: it is the speed if no gust is measured.
     """
     gust.output.speed_relative_to_mean_air = airspeed
     if not gust.output.is_gust_measured:
@@ -365,17 +380,17 @@ def update_gust_velocity_and_speed(
     gust.memory.remaining_initial_gust_variance_share *= decay_factor * decay_factor
     gust.memory.gust_velocity_change_since_start[0] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[0]
-        + predicted_forward_velocity
+        + predicted_horizontal_velocity_ahead
         - gust.memory.air_relative_velocity[0]
     )
     gust.memory.gust_velocity_change_since_start[1] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[1]
-        + predicted_right_velocity
+        + predicted_horizontal_velocity_right
         - gust.memory.air_relative_velocity[1]
     )
     gust.memory.gust_velocity_change_since_start[2] = (
         decay_factor * gust.memory.gust_velocity_change_since_start[2]
-        + predicted_down_velocity
+        + predicted_vertical_velocity_down
         - gust.memory.air_relative_velocity[2]
     )
     squared_speed_relative_to_mean_air = 0.0
@@ -418,7 +433,8 @@ def update_gust_estimate(gust, y, attitude, dt, frame_index):
 
 @kernel
 def fill_gust_effect(gust, design, x, y, u):
-    """Fill `gust_acceleration` (3,) rad/s2, the effect of the gust from now on, and `specific_force`, m/s2.
+    """Fill `angular_acceleration_by_gust` (3,) rad/s2, the effect of the gust from now on, and
+    `specific_force`, m/s2.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
@@ -446,7 +462,7 @@ def fill_gust_effect(gust, design, x, y, u):
         acceleration_by_gust = 0.0
         for j in range(3):
             acceleration_by_gust -= gust.output.rate_damping[i, j] * gust.memory.air_rotation_in_body_axes[j]
-        gust.output.gust_acceleration[i], gust.output.coarse_gust_acceleration[i] = (
+        gust.output.angular_acceleration_by_gust[i], gust.output.angular_acceleration_by_coarse_gust[i] = (
             (acceleration_by_gust, 0.0) if gust.output.is_gust_measured else (0.0, acceleration_by_gust)
         )
 
@@ -454,7 +470,7 @@ def fill_gust_effect(gust, design, x, y, u):
 @kernel
 def begin_gust_sums(gust, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
-    gust.memory.gust_angular_acceleration_sum[:] = gust.output.gust_acceleration
+    gust.memory.angular_acceleration_by_gust_sum[:] = gust.output.angular_acceleration_by_gust
     add_acceleration_variance_by_axes_turn(gust, V, dt)
 
 
@@ -467,7 +483,7 @@ def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
     update_gust_rotation_rates(gust, y, attitude, dt)
     fill_gust_effect(gust, design, x, y, u)
     for i in range(3):
-        gust.memory.gust_angular_acceleration_sum[i] += gust.output.gust_acceleration[i]
+        gust.memory.angular_acceleration_by_gust_sum[i] += gust.output.angular_acceleration_by_gust[i]
     add_acceleration_variance_by_axes_turn(gust, y[AIRSPEED], dt)
 
 
@@ -484,7 +500,7 @@ def stop_gust_estimate(gust):
 
 
 @kernel
-def stop_accelerometers(gust):
+def stop_using_accelerometers(gust):
     """Stop using the accelerometers.
 
     Without a model of the forces the gust is then unmeasured, and all of its variance counts as unknown.
@@ -515,7 +531,7 @@ def unmeasured_gust_intensity_share(gust, gust_axis):
     if gust_axis == 0:
         return min(gust.memory.unmeasured_intensity_share[gust_axis], 1.0)
     unmeasured_share_by_speed_error = (
-        gust.config.unmeasured_share_per_speed_variance
+        gust.config.unmeasured_share_per_speed_error_variance
         * (
             gust.config.speed_error_variance
             + gust.memory.remaining_initial_gust_variance_share * gust.config.gust_velocity_variance
@@ -618,14 +634,15 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
 
 @kernel
 def fill_frame_mean_gust_acceleration(gust, frame_share_per_instant):
-    """Fill `mean_gust_acceleration` and `acceleration_variance_by_axes_turn` for the elapsed frame.
+    """Fill `mean_angular_acceleration_by_gust` and `acceleration_variance_by_axes_turn` for the elapsed
+    frame.
 
     frame_share_per_instant: one over the number of instants. Axes may turn in the middle of a frame. A part
     of the effect is then in this frame and the rest in the next, so the variance counts in both frames.
     """
     for i in range(3):
-        gust.output.mean_gust_acceleration[i] = (
-            frame_share_per_instant * gust.memory.gust_angular_acceleration_sum[i]
+        gust.output.mean_angular_acceleration_by_gust[i] = (
+            frame_share_per_instant * gust.memory.angular_acceleration_by_gust_sum[i]
         )
     if gust.memory.n_frames_left_with_axes_turn_variance > 0:
         gust.memory.n_frames_left_with_axes_turn_variance -= 1
@@ -729,7 +746,7 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
     gust["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = turbulence.rotation_walk_at_1_m(span_m)
     gust["memory"]["gust_rotation_intensity_per_airspeed"], gust["memory"]["unmeasured_intensity_share"] = (
         gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
-        MIN_UNMEASURED_GUST_ROTATION_SHARES if gust["output"]["is_gust_measured"] else 1.0,
+        MIN_UNMEASURED_GUST_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
     gust["config"]["altitude_error_offset_m"] = sensor_errors["altitude"].worst
     gust["config"]["altitude_error_slope"] = sensor_errors["altitude"].slope
@@ -757,10 +774,12 @@ def add_gust_estimate_noise(
             ADAMS_BASHFORTH_NOISE_GAIN * sensor_errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
         )
     if statistical["forces"]["in_use"]:
-        forces_normal_first = statistical["forces"]["component"][::-1]  # normal to the body, and across
+        force_records_normal_first = statistical["forces"]["component"][
+            ::-1
+        ]  # normal to the body, and across
         flow_angle_noise_std_by_forces = np.sqrt(
-            forces_normal_first["accelerometer_innovation_variance"]
-        ) / np.abs(forces_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
+            force_records_normal_first["accelerometer_innovation_variance"]
+        ) / np.abs(force_records_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
         statistical["forces"]["gust_acceleration_noise_std"] = gust_acceleration_noise_std(
             flow_angle_noise_std_by_forces, design, y, u, span_m
         )
@@ -809,10 +828,12 @@ def configure_speed_error(gust: np.void, declared: Declared, alarm_level: float,
     gust["config"]["speed_error_variance"] += (
         airspeed_errors.steady + airspeed_errors.slope * airspeed_mps
     ) ** 2
-    gust["config"]["unmeasured_share_per_speed_variance"] = unmeasured_share_per_speed_variance(alarm_level)
+    gust["config"]["unmeasured_share_per_speed_error_variance"] = unmeasured_share_per_speed_error_variance(
+        alarm_level
+    )
 
 
-def unmeasured_share_per_speed_variance(alarm_level: float) -> float:
+def unmeasured_share_per_speed_error_variance(alarm_level: float) -> float:
     """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
 
     The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2

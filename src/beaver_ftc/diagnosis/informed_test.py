@@ -19,7 +19,7 @@ through the same filter as R c. The part of the fault that they can explain is n
 with s and R scaled by S^-1/2 and the frames stacked.
 
 The unexplained acceleration of the published bound is a sinusoid of unknown frequency; here it is a
-first-order process of the same power with a memory of UNEXPLAINED_ACCELERATION_MEMORY_S.
+first-order process of the same power with a memory of UNEXPLAINED_ACCELERATION_CORRELATION_S.
 """
 
 from collections.abc import Mapping
@@ -33,9 +33,9 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_GUST_ROTATION_SHARES
+from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_GUST_INTENSITY_SHARES
 
-UNEXPLAINED_ACCELERATION_MEMORY_S = 0.1
+UNEXPLAINED_ACCELERATION_CORRELATION_S = 0.1
 MIN_GYRO_NOISE_STD_RAD_S = 1e-5  # what perfect instruments are taken for
 _KALMAN_SETTLING_FRAMES = 400
 
@@ -49,7 +49,7 @@ class WhiteningFilter:
     def __init__(self, context: Context) -> None:
         declared, dt = context.declared, context.dt_s
         time_constants_s = np.concatenate(
-            (declared.gust_time_s, np.full(3, UNEXPLAINED_ACCELERATION_MEMORY_S))
+            (declared.gust_time_s, np.full(3, UNEXPLAINED_ACCELERATION_CORRELATION_S))
         )
         stationary_std = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
         decay_factors = np.exp(-dt / time_constants_s)
@@ -74,16 +74,16 @@ class WhiteningFilter:
     def whitened_response(self, added_acceleration: np.ndarray) -> np.ndarray:
         """Compute the effect of added_acceleration (n, 3, ...) rad/s2 on the innovations, scaled to variance
         one."""
-        state_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
+        estimation_error_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
-        state_response, whitened = (
+        prediction_error_response, whitened = (
             np.zeros((9, *added_acceleration.shape[2:])),
             np.empty_like(added_acceleration),
         )
         for k, acceleration in enumerate(added_acceleration):
-            state_response = state_transition @ state_response
-            state_response[:3] += self.dt * acceleration
-            whitened[k] = whitener @ state_response[:3]
+            prediction_error_response = estimation_error_transition @ prediction_error_response
+            prediction_error_response[:3] += self.dt * acceleration
+            whitened[k] = whitener @ prediction_error_response[:3]
         return whitened
 
     def deflection_coefficient_by_frame(self, fault_acceleration: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ def context_with_measured_gust(context: Context, gust_estimate_noise_rad_s2: np.
         return context
     errors_with_measured_gust = replace(
         declared,
-        gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_GUST_ROTATION_SHARES),
+        gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_GUST_INTENSITY_SHARES),
         model_rad_s2=np.hypot(declared.model_rad_s2, gust_estimate_noise_rad_s2),
     )
     return replace(context, declared=errors_with_measured_gust)

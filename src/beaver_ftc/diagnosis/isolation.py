@@ -150,8 +150,9 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
     first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         extra_error_bound = max(
-            bound_record.surface_error_per_rad[axis, s] * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_error_at_command[axis, s],
+            bound_record.surface_effect_error_per_rad[axis, s]
+            * (max_abs_deflection + first_substep_allowance_rad)
+            - bound_record.surface_effect_error_at_command[axis, s],
             0.0,
         )
         extra_error_bound += bound_record.additional_error_by_travel_level[travel_level_index, axis]
@@ -178,8 +179,9 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
         )
     for i in range(3):
         fault_effect.error_bound[i] += max(
-            bound_record.surface_error_per_rad[i, s] * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_error_at_command[i, s],
+            bound_record.surface_effect_error_per_rad[i, s]
+            * (max_abs_deflection + first_substep_allowance_rad)
+            - bound_record.surface_effect_error_at_command[i, s],
             0.0,
         )
         fault_effect.error_bound[i] += bound_record.additional_error_by_travel_level[travel_level_index, i]

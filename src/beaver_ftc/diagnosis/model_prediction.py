@@ -28,7 +28,7 @@ def frame_sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
         f=3, G=(3, n), Gu=(3, n), eta_bar=3,
-        surface_error_per_rad=(3, n), surface_error_at_command=(3, n),
+        surface_effect_error_per_rad=(3, n), surface_effect_error_at_command=(3, n),
         first_instant_Gu=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
@@ -41,7 +41,7 @@ def frame_means_dtype(n: int) -> np.dtype:
     return record(
         # rad/s2 per rad; rad/s2; see `fill_effect_tolerance_for_fault_change`, rad/s2
         G=(3, n), Gu=(3, n), Gu_tolerance_for_fault_change=(3, n),
-        acceleration=3,  # f + G u, rad/s2
+        predicted_acceleration=3,  # f + G u, rad/s2
         # With G of the frame before. It does not depend on the measurement noise of this frame, to which the
         # control law reacts: with G of this frame that reaction would correlate with the noise.
         previous_G=(3, n), Gu_with_previous_G=(3, n),
@@ -101,10 +101,10 @@ def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
             sums.G[i, s] += G[i, s]
             sums.Gu[i, s] += G[i, s] * u[s]
             if bound_record.has_declared_surface_errors:
-                sums.surface_error_per_rad[i, s] += bound_record.declared_errors.acceleration_error_per_rad[
-                    i, s
-                ]
-                sums.surface_error_at_command[i, s] += (
+                sums.surface_effect_error_per_rad[i, s] += (
+                    bound_record.declared_errors.acceleration_error_per_rad[i, s]
+                )
+                sums.surface_effect_error_at_command[i, s] += (
                     bound_record.declared_errors.acceleration_error_per_rad[i, s] * abs(u[s])
                 )
     if bound_record.model_error_map.one_surface_may_be_anywhere:
@@ -135,13 +135,17 @@ def fill_frame_means(prediction, bound_record):
             frame_means.G[i, s] = frame_share_per_instant * sums.G[i, s]
             frame_means.Gu[i, s] = frame_share_per_instant * sums.Gu[i, s]
             mean_predicted_acceleration += frame_means.Gu[i, s]
-        frame_means.acceleration[i] = mean_predicted_acceleration
+        frame_means.predicted_acceleration[i] = mean_predicted_acceleration
         bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
     frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
     frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max
     if bound_record.has_declared_surface_errors:
-        bound_record.surface_error_per_rad[:] = frame_share_per_instant * sums.surface_error_per_rad
-        bound_record.surface_error_at_command[:] = frame_share_per_instant * sums.surface_error_at_command
+        bound_record.surface_effect_error_per_rad[:] = (
+            frame_share_per_instant * sums.surface_effect_error_per_rad
+        )
+        bound_record.surface_effect_error_at_command[:] = (
+            frame_share_per_instant * sums.surface_effect_error_at_command
+        )
     if frame_share_per_instant < 1.0:
         fill_effect_tolerance_for_fault_change(prediction)
 
@@ -206,7 +210,7 @@ def begin_frame_sums(prediction, bound_record, layout, diagnoses_all_types, meas
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
     if bound_record.has_declared_surface_errors:
-        sums.surface_error_per_rad[:], sums.surface_error_at_command[:] = 0.0, 0.0
+        sums.surface_effect_error_per_rad[:], sums.surface_effect_error_at_command[:] = 0.0, 0.0
     bound_record.additional_error_by_travel_level[:] = 0.0
     add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu
@@ -220,7 +224,7 @@ def repeat_move_of_healthy_surfaces(prediction, command):
 
 
 @kernel
-def add_instant_to_frame(prediction, bound_record, layout, diagnoses_all_types, measured):
+def add_instant_and_move_healthy_surfaces(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Add an instant inside the frame to its sums, and move the healthy surfaces on."""
     fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
     add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
@@ -239,7 +243,7 @@ def predict_acceleration(prediction, include_known_faults, effectiveness, deflec
         prediction.acceleration_with_known_faults,
         prediction.frame_means,
     )
-    acceleration_with_known_faults[:] = frame_means.acceleration
+    acceleration_with_known_faults[:] = frame_means.predicted_acceleration
     if not include_known_faults:
         return
     for s in range(effectiveness.size):

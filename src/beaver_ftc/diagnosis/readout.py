@@ -294,7 +294,7 @@ class DiagnosisReadout:
         return GustReadout(
             bool(gust_output["accounts_for_gusts"]),
             bool(gust_output["is_gust_measured"]),
-            gust_output["gust_acceleration"].copy(),
+            gust_output["angular_acceleration_by_gust"].copy(),
         )
 
     @cached_property
@@ -407,7 +407,7 @@ def certificate_arrays_until_alarm(
             "bounded": statistical_detector["noise"]["uncertainty_bound"],
         }
         array_by_name |= {
-            "air": gust_output["mean_gust_acceleration"],
+            "air": gust_output["mean_angular_acceleration_by_gust"],
             "leap": gust_output["acceleration_variance_by_axes_turn"],
         }
     return array_by_name
@@ -451,7 +451,7 @@ def _read_block(block_record: np.void) -> StatisticalBlock:
     )
     return StatisticalBlock(
         tuple(block_record["axes"][: block_record["n_axes"]].tolist()),
-        float(block_record["drift_correlation_length_m"]), float(block_record["drift_intensity_scale"]),
+        float(block_record["drift_correlation_length_m"]), float(block_record["gust_drift_intensity_factor"]),
         block_record["regressor_tolerance"][: block_record["n_regressors"]].copy(),
         hypotheses, OnsetTests(*onset_tests),
     )  # fmt: skip

@@ -37,7 +37,7 @@ from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acce
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import filter_nearest_to_alarm
 from beaver_ftc.diagnosis.model_prediction import (
-    add_instant_to_frame,
+    add_instant_and_move_healthy_surfaces,
     begin_frame_sums,
     evaluate_bound_and_frame_means,
     evaluate_design_model,
@@ -446,7 +446,7 @@ def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
     schemes.accumulate_substep(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
-    add_instant_to_frame(
+    add_instant_and_move_healthy_surfaces(
         frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured
     )
 
@@ -553,7 +553,7 @@ def record_row(frame, commanded, row):
     column = put(row, column, fdi.fdae.output.threshold)
     column = put(row, column, fdi.bound.eta_bar)
     column = put(row, column, fdi.fdae.network.output)
-    column = put(row, column, prediction.frame_means.acceleration)
+    column = put(row, column, prediction.frame_means.predicted_acceleration)
     for e in range(logged.estimators):
         if e < fdi.isolation.config.n_estimators:  # else another diagnosis has taken their place
             record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)

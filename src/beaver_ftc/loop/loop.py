@@ -14,7 +14,7 @@ import numpy as np
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import direct
 from beaver_ftc.compiled.cache import expect
-from beaver_ftc.diagnosis.gusts import stop_accelerometers
+from beaver_ftc.diagnosis.gusts import stop_using_accelerometers
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.loop import assembly, stepping
@@ -334,7 +334,7 @@ class Loop:
         redundancy.configure_sensor_monitor(
             fdi["sensor_monitor"], scenario, design, self.trimmed.y, enabled=True
         )
-        stop_accelerometers(fdi["statistical"]["gust"])
+        stop_using_accelerometers(fdi["statistical"]["gust"])
         fdi["statistical"]["inertial_gust"]["output"]["accounts_for_gusts"] = 0
         return True
 

@@ -186,7 +186,7 @@ def measured_of(frame: np.void) -> Measured:
         float(frame["t"]),
         frame["measured"]["x"].copy(),
         frame["measured"]["y"][: len(y_places(frame))].copy(),
-        frame["prediction"]["frame_means"]["acceleration"].copy(),
+        frame["prediction"]["frame_means"]["predicted_acceleration"].copy(),
         frame["prediction"]["frame_means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),
     )

@@ -91,7 +91,7 @@ class FrameReadout:
     @cached_property
     def model_rad_s2(self) -> np.ndarray:
         """f + G u by the design model, mean over the elapsed frame, (3,) rad/s2."""
-        return np.array(self._frame["prediction"]["frame_means"]["acceleration"])
+        return np.array(self._frame["prediction"]["frame_means"]["predicted_acceleration"])
 
     @cached_property
     def inertia(self) -> InertiaCoefficients:

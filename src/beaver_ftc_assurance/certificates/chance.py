@@ -314,7 +314,7 @@ def _run_filter(said: Document, frames: _FilterInputs, P: np.ndarray, R: np.ndar
 def add_whitened_frames(blocks, inputs, drift, frame_parameters, states, sums, room, dt):
     """Run a filter, blocks (1,), over `_FilterInputs`, and add w.g of each frame to `sums` (columns,): g, the
     whitened innovation of each column, w = S^-1 g of the second, the signature. See
-    `likelihood.accumulate_correlations`.
+    `likelihood.accumulate_correlations_and_bounds`.
 
     states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
     pace, in the last frame, as it stays; and of the first of `sums` the prediction for calm air.
@@ -336,10 +336,10 @@ def add_whitened_frames(blocks, inputs, drift, frame_parameters, states, sums, r
             before, w[i] = w[i], 0.0
             for j in range(block.n_axes):
                 w[i] += block.S_inverse[i, j] * g[1, j]
-            room[0] += block.transient_uncertainty_response[i] * abs(w[i] - before)
-            room[1] += given[DRIFT_COLUMN, 1] * block.transient_uncertainty_response[i] * abs(w[i])
-            room[2] += block.transient_uncertainty_response[i] * abs(w[i])
-            room[3] += block.constant_uncertainty_response[i] * abs(w[i])
+            room[0] += block.transient_response_sum_bound[i] * abs(w[i] - before)
+            room[1] += given[DRIFT_COLUMN, 1] * block.transient_response_sum_bound[i] * abs(w[i])
+            room[2] += block.transient_response_sum_bound[i] * abs(w[i])
+            room[3] += block.settled_uncertainty_response_bound[i] * abs(w[i])
             room[4] += w[i] * given[CALM_PREDICTION_COLUMN, i]
             for c in range(len(states)):
                 sums[c] += w[i] * g[c, i]

@@ -77,7 +77,7 @@ def fdi(rng):
         air["output"]["acceleration_variance_by_axes_turn"]
         @ air["output"]["acceleration_variance_by_axes_turn"].T
     )
-    fdi["bound"]["surface_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
+    fdi["bound"]["surface_effect_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
         1,
     )
@@ -213,10 +213,12 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
-    e = fdi["bound"]["surface_error_per_rad"][[0, 2], AILERON]
+    e = fdi["bound"]["surface_effect_error_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE * size)
+    least = max(
+        size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS * size
+    )
     shown = has_declared_surface_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)

@@ -178,7 +178,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
-    record["sums"]["surface_error_at_command"], record["sums"]["surface_error_per_rad"] = (
+    record["sums"]["surface_effect_error_at_command"], record["sums"]["surface_effect_error_per_rad"] = (
         (99.0, 99.0) if has_declared_surface_errors else (0.0, 0.0)
     )
     fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
@@ -210,8 +210,10 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["surface_error_per_rad"] == pytest.approx(own if has_declared_surface_errors else 0.0)
-    assert fdi["bound"]["surface_error_at_command"] == pytest.approx(
+    assert fdi["bound"]["surface_effect_error_per_rad"] == pytest.approx(
+        own if has_declared_surface_errors else 0.0
+    )
+    assert fdi["bound"]["surface_effect_error_at_command"] == pytest.approx(
         at_command if has_declared_surface_errors else 0.0
     )
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0

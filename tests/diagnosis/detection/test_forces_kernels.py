@@ -192,10 +192,13 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
         )
         drawn.append(record["component"]["innovation"].copy())
     update_all_force_innovations(record, fdi["statistical"]["gust"], measured(), U, DT)
-    assert np.sqrt(record["component"]["noise_variance"][:, 0]) == pytest.approx(
+    assert np.sqrt(record["component"]["noise_variance_with_without_vane"][:, 0]) == pytest.approx(
         np.std(drawn, axis=0), rel=0.06
     )
-    without = record["component"]["noise_variance"][:, 0] - record["component"]["noise_variance"][:, 1]
+    without = (
+        record["component"]["noise_variance_with_without_vane"][:, 0]
+        - record["component"]["noise_variance_with_without_vane"][:, 1]
+    )
     slopes = record["component"]["axis_and_force_innovation_per_vane_error"][:, 1] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
 
@@ -210,7 +213,7 @@ def test_noise_of_the_pressure_is_jitter_as_the_innovation_moves_with_it():
         )
         innovation.append(record["component"]["innovation"].copy())
     slopes = innovation[0] - innovation[1]
-    assert record["component"]["noise_variance"] == pytest.approx(
+    assert record["component"]["noise_variance_with_without_vane"] == pytest.approx(
         np.outer((4.0 * slopes) ** 2, [1, 1]), rel=1e-6
     )
 
@@ -227,7 +230,7 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
             )
             drawn.append(record["component"]["innovation"].copy())
         for inertial in range(2):
-            jitter = record["component"]["noise_variance"][:, inertial]
+            jitter = record["component"]["noise_variance_with_without_vane"][:, inertial]
             assert np.sqrt(jitter) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     more = (
         record["component"]["inertial_innovation_drift_intensity"]
@@ -285,7 +288,7 @@ def test_accelerometers_that_may_break_raise_no_alarm_and_tell_no_gust(viewed):
         (0.0, 0.3, 0.0, 0.0, -0.95),
         9.0,
     )
-    air["output"]["mean_gust_acceleration"] = 0.1, 0.2, 0.3
+    air["output"]["mean_angular_acceleration_by_gust"] = 0.1, 0.2, 0.3
     views["block"]["hypothesis"]["score"][0, 0] = 7.0
     for read in (1, 0):
         air["output"]["uses_accelerometers"] = read
@@ -342,7 +345,9 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
         view = statistical["views"][v]
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
-        own = 0.8 * np.sqrt(statistical["forces"]["component"][NORMAL_COMPONENT]["noise_variance"][0])
+        own = 0.8 * np.sqrt(
+            statistical["forces"]["component"][NORMAL_COMPONENT]["noise_variance_with_without_vane"][0]
+        )
         assert view["block"]["model_noise_variance"][0] == pytest.approx(
             (own + 0.6 * 0.2 * gust_acceleration_noise_std) ** 2
         )
@@ -688,7 +693,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
         np.eye(3),
     )
     air["memory"]["gust_rotation_intensity_per_airspeed"] = 1e-5, 2e-5, 3e-5
-    component["noise_variance"], component["deflection_error_effect_bound"] = (
+    component["noise_variance_with_without_vane"], component["deflection_error_effect_bound"] = (
         ((2e-6, 1e-7), (3e-5, 2e-5)),
         (0.001, 0.002),
     )
@@ -727,7 +732,7 @@ def test_what_is_declared_of_rate_and_force_is_seen_along_a_direction(viewed, v)
     sizes = np.sqrt(
         [
             *statistical["noise"]["acceleration_variance_by_input_noise"],
-            *component["noise_variance"][:, int(view["uses_inertial_flow_angle"])],
+            *component["noise_variance_with_without_vane"][:, int(view["uses_inertial_flow_angle"])],
         ]
     )
     assert block["model_noise_variance"][0] == pytest.approx((np.abs(m) @ sizes) ** 2)
@@ -752,7 +757,9 @@ def test_noise_and_slopes_of_forces_go_with_the_pressure(dynamic_pressure_over_t
     )
     noise = np.radians([0.02, 0.03])
     assert record["dynamic_pressure_over_trim"] == pytest.approx(dynamic_pressure_over_trim)
-    assert record["component"]["noise_variance"][:, 0] == pytest.approx((slopes * noise) ** 2, rel=0.01)
+    assert record["component"]["noise_variance_with_without_vane"][:, 0] == pytest.approx(
+        (slopes * noise) ** 2, rel=0.01
+    )
     assert record["component"]["innovation_per_flow_angle_drift"] == pytest.approx(DT * slopes)
 
 
@@ -788,8 +795,8 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
     """Of surfaces by the vanes; of what clears a vane without them."""
     statistical = viewed["statistical"]
     (
-        statistical["gust"]["output"]["mean_gust_acceleration"],
-        statistical["inertial_gust"]["output"]["mean_gust_acceleration"],
+        statistical["gust"]["output"]["mean_angular_acceleration_by_gust"],
+        statistical["inertial_gust"]["output"]["mean_angular_acceleration_by_gust"],
     ) = (
         (0.1, 0.2, 0.3),
         (0.4, 0.5, 0.6),

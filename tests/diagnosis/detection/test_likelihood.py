@@ -180,7 +180,7 @@ def _allowed(block):
     return np.array(
         [
             likelihood.max_correlation_by_uncertainty(
-                block["onset_tests"][0], k, *block["transient_uncertainty_response"]
+                block["onset_tests"][0], k, *block["transient_response_sum_bound"]
             )
             for k in range(N_ONSET_SLOTS)
         ]

@@ -75,23 +75,23 @@ def test_an_onset_that_starts_knows_nothing_and_the_others_stay():
 def test_of_a_constant_the_filter_leaves_what_stay_says():
     """One axis, a drift that returns: after its transient a constant of eta_bar shows as g_0."""
     block = steady_block(1)
-    likelihood.fill_uncertainty_response(block, np.array([0.3, 9.0, 9.0]), DT)
+    likelihood.fill_uncertainty_response_bounds(block, np.array([0.3, 9.0, 9.0]), DT)
     assert through(block, np.full((600, 1), 0.3))[-1] == pytest.approx(
-        block["constant_uncertainty_response"][:1]
+        block["settled_uncertainty_response_bound"][:1]
     )
     still = steady_block(1, keep=1.0)
-    likelihood.fill_uncertainty_response(still, np.array([0.3, 0.0, 0.0]), DT)
-    assert not still["constant_uncertainty_response"].any()  # a walk takes in all that is constant
+    likelihood.fill_uncertainty_response_bounds(still, np.array([0.3, 0.0, 0.0]), DT)
+    assert not still["settled_uncertainty_response_bound"].any()  # a walk takes in all that is constant
 
 
 @pytest.mark.parametrize("axes", [1, 2])
 def test_a_steps_transient_sums_to_the_inverse_gain(axes):
     """Sum of what the filter leaves of a step: K_d^-1, by axes; RINGING is kept for its swings."""
     block, bounded = steady_block(axes, keep=1.0), np.array([0.3, 0.2, 9.0])
-    likelihood.fill_uncertainty_response(block, bounded, DT)
+    likelihood.fill_uncertainty_response_bounds(block, bounded, DT)
     sums = np.array([through(block, np.tile(unit, (600, 1))).sum(axis=0) for unit in np.eye(axes)]).T
     expected = likelihood.TRANSIENT_RINGING_SUM_FACTOR * np.abs(sums) @ bounded[:axes]
-    assert block["transient_uncertainty_response"][:axes] == pytest.approx(expected, rel=1e-6)
+    assert block["transient_response_sum_bound"][:axes] == pytest.approx(expected, rel=1e-6)
     assert np.linalg.inv(block["K_d"][:axes, :axes]) == pytest.approx(sums, rel=1e-6)
 
 
@@ -99,8 +99,8 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     rng, frames, keep = np.random.default_rng(4), 12, 0.9
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), STEP_FAULT)
     (
-        block["constant_uncertainty_response"],
-        block["transient_uncertainty_response"],
+        block["settled_uncertainty_response_bound"],
+        block["transient_response_sum_bound"],
         block["uncertainty_change_over_bound_per_frame"],
     ) = (
         (0.1, 0.2),
@@ -112,7 +112,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     onset_tests, lane = block["onset_tests"][0], 2
     for each in w:
         onset_tests["signature_for_onset"][:, lane] = each
-        likelihood.accumulate_correlations(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
+        likelihood.accumulate_correlations_and_bounds(block, onset_tests, N_ONSET_SLOTS, 1.0, keep)
     old = keep ** np.arange(frames)[::-1]
     changes = np.abs(np.diff(np.vstack([np.zeros(2), w]), axis=0))
     max_correlation_by_constant_uncertainty, swings = (
@@ -129,7 +129,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     )
     last = np.abs(w[-1]) @ [0.3, 0.4]
     allowed = likelihood.max_correlation_by_uncertainty(
-        onset_tests, lane, *block["transient_uncertainty_response"]
+        onset_tests, lane, *block["transient_response_sum_bound"]
     )
     assert allowed == pytest.approx(
         max_correlation_by_constant_uncertainty
@@ -137,7 +137,7 @@ def test_the_room_of_a_bounded_uncertainty_is_summed_up_by_parts():
     )
     onset_tests["max_correlation_by_rate_limited_uncertainty"][lane] = 99.0
     allowed = likelihood.max_correlation_by_uncertainty(
-        onset_tests, lane, *block["transient_uncertainty_response"]
+        onset_tests, lane, *block["transient_response_sum_bound"]
     )
     assert allowed == pytest.approx(max_correlation_by_constant_uncertainty + swings + last)
 
@@ -152,7 +152,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     K_x, K_d, S = rng.normal(size=(3, 2, 2))
     block["K_x"], block["K_d"], block["S_inverse"], block["drift_decay_factor"] = K_x, K_d, S, kept
     seen, regressors = rng.normal(size=2), rng.normal(size=(len(tolerance), 2))
-    block["whitened_innovation"], block["regressor_response"][: len(tolerance)] = seen, regressors
+    block["unscaled_white_innovation_rad_s"], block["regressor_response"][: len(tolerance)] = seen, regressors
     for name in (
         "signature_for_onset",
         "signature_filter_state",
@@ -171,7 +171,7 @@ def test_a_frame_is_whitened_weighed_and_summed_as_matrices_say(tolerance):
     )
     before = {name: onset_tests_of(block, name) for name in kept_by_name}
     for onset_tests, overlap in zip(block["onset_tests"], block["regressor_correlation"], strict=True):
-        likelihood.accumulate_correlations(block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep)
+        likelihood.accumulate_correlations_and_bounds(block, onset_tests, N_ONSET_TESTS_PER_GROUP, dt, keep)
         likelihood.accumulate_regressor_correlation(
             block, onset_tests, overlap, N_ONSET_TESTS_PER_GROUP, keep
         )
@@ -225,14 +225,16 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
         block["no_gust_filter"][name] = block[name]
     block["no_gust_filter"]["drift_intensity"][:] = 0.1 * TOGETHER
     alone = block["no_gust_filter"].copy()
-    block["whitened_innovation"], block["frame_innovation"] = (0.003, -0.001), (0.4, -0.2)
+    block["unscaled_white_innovation_rad_s"], block["frame_innovation"] = (0.003, -0.001), (0.4, -0.2)
     block["calm_air_cross_correlation"], block["calm_air_information"] = calm_air_cross_correlation, size
-    inverse, g = block["S_inverse"].copy(), block["whitened_innovation"].copy()
+    inverse, g = block["S_inverse"].copy(), block["unscaled_white_innovation_rad_s"].copy()
     likelihood.whiten_by_no_gust_filter(block, DT)
     likelihood.fill_predictable_innovation(block, DT)
     likelihood.advance_covariance(alone, DT)
-    likelihood.whiten(alone, alone["state"], np.array([0.4, -0.2]), DT, alone["whitened_innovation"])
-    foretold = g - alone["whitened_innovation"]
+    likelihood.whiten(
+        alone, alone["state"], np.array([0.4, -0.2]), DT, alone["unscaled_white_innovation_rad_s"]
+    )
+    foretold = g - alone["unscaled_white_innovation_rad_s"]
     kept = np.exp(-DT / 2.0)
     calm_air_cross_correlation, size = (
         kept * calm_air_cross_correlation + foretold @ inverse @ g,
@@ -615,7 +617,10 @@ def test_what_the_beliefs_leave_unexplained_is_followed_by_the_drift(b):
     _, record = detector()
     rng = np.random.default_rng(b)
     surprise, mean = rng.normal(size=3), rng.normal(size=3)
-    record["gust"]["output"]["mean_gust_acceleration"], record["gust"]["output"]["gust_acceleration"] = (
+    (
+        record["gust"]["output"]["mean_angular_acceleration_by_gust"],
+        record["gust"]["output"]["angular_acceleration_by_gust"],
+    ) = (
         mean,
         (0.1, 0.2, 0.3),
     )

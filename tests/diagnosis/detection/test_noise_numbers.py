@@ -195,8 +195,10 @@ def test_the_second_view_returns_with_a_gust_as_strong_where_it_is_slow(alone):
     assert last["drift_correlation_length_m"] == pytest.approx(
         statistical.derive_drift_correlation_length_m(alone.detector, V, 50.0, rolling)
     )
-    assert last["drift_intensity_scale"] == pytest.approx((rolling / last["drift_correlation_length_m"]) ** 2)
-    assert [float(block["drift_intensity_scale"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
+    assert last["gust_drift_intensity_factor"] == pytest.approx(
+        (rolling / last["drift_correlation_length_m"]) ** 2
+    )
+    assert [float(block["gust_drift_intensity_factor"]) for block in alone.blocks[:-1]] == [1.0, 1.0]
     assert air["output"]["accounts_for_gusts"] == 1
     assert air["config"]["wing_area_per_mass"] == pytest.approx(AIRCRAFT.geometry.wing_area_m2 / MASS.mass_kg)
     assert air["memory"]["unmeasured_intensity_share"] == pytest.approx([1.0, 0.003, 0.03])

@@ -99,7 +99,7 @@ def test_what_the_vanes_show_of_the_gust_is_taken_off_the_innovation():
     kept = []
     for mean in (np.zeros(3), gust):
         alone = Detector(100.0, bounds={"turbulence": "light"})
-        alone.detector["gust"]["output"]["mean_gust_acceleration"] = mean
+        alone.detector["gust"]["output"]["mean_angular_acceleration_by_gust"] = mean
         alone.watch(innovations + mean, Gu, np.ones(2))
         kept.append([block["onset_tests"] for block in alone.blocks])
     still, moving = kept

@@ -54,7 +54,7 @@ def tone_config():
 
 def listen(view, tone_config, samples, regressors=None, heard=True, has_regressors=False, alarm_level=6.0):
     for k, sample in enumerate(samples):
-        view["block"]["whitened_innovation"][0] = sample
+        view["block"]["unscaled_white_innovation_rad_s"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
         parity.update_tone_tests(view, tone_config, alarm_level, heard, has_regressors, DT)

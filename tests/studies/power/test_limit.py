@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.informed_test import (
-    UNEXPLAINED_ACCELERATION_MEMORY_S,
+    UNEXPLAINED_ACCELERATION_CORRELATION_S,
     WhiteningFilter,
     detection_probability,
 )
@@ -37,7 +37,9 @@ def covariance(context, n):
         gust = process(declared.gust_rad_s[j], declared.gust_time_s[j])
         effect = declared.gust_effect[:, j]
         accelerations += np.einsum("a,b,kl->akbl", effect, effect, gust)
-        unexplained = process(context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_ACCELERATION_MEMORY_S)
+        unexplained = process(
+            context.constant_rad_s2[j] / np.sqrt(2.0), UNEXPLAINED_ACCELERATION_CORRELATION_S
+        )
         accelerations[j, :, j] += unexplained + declared.model_rad_s2[j] ** 2 * np.eye(n)
     summed = DT * np.tril(np.ones((n, n)), -1)
     rates = np.einsum("kl,albm,nm->akbn", summed, accelerations, summed, optimize=True)

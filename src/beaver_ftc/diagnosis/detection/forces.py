@@ -22,7 +22,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
-from beaver_ftc.diagnosis.gusts import stop_accelerometers, stop_gust_estimate
+from beaver_ftc.diagnosis.gusts import stop_gust_estimate, stop_using_accelerometers
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
@@ -57,7 +57,7 @@ FORCE_RECORD = record(
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     axis_and_force_innovation_per_vane_error=2, roll_innovation_per_vane_error=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
-    trim_noise_variance_with_without_vane=2, noise_variance=2,
+    trim_noise_variance_with_without_vane=2, noise_variance_with_without_vane=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
     innovation_per_air_rotation=3, deflection_error_effect_bound=float,
     predicted_scaled_force=float,  # e of the model, rad/s2
@@ -135,7 +135,7 @@ def fill_readings_without_vanes(forces, air_rotation, y):
 @kernel
 def stop_using_forces(forces, gust, inertial_gust):
     """Stop using forces, and estimate the gust without accelerometers."""
-    stop_accelerometers(gust)
+    stop_using_accelerometers(gust)
     stop_gust_estimate(inertial_gust)
     forces.in_use = 0
 
@@ -209,7 +209,7 @@ def update_force_innovation(forces, gust, force_index, measured, u):
         predicted_scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     )
     for k in range(2):
-        force_record.noise_variance[k] = (
+        force_record.noise_variance_with_without_vane[k] = (
             force_record.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
             + pressure_noise_scaled_force_std * pressure_noise_scaled_force_std
             + force_record.accelerometer_innovation_variance

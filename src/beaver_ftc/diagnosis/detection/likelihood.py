@@ -144,8 +144,8 @@ ONSET_TESTS_RECORD = record(
 
 
 _FILTER_FIELDS = {
-    "n_axes": int, "drift_decay_factor": float, "state": 4, "whitened_innovation": 2, "P_xx": (2, 2),
-    "P_xd": (2, 2), "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2,
+    "n_axes": int, "drift_decay_factor": float, "state": 4, "unscaled_white_innovation_rad_s": 2,
+    "P_xx": (2, 2), "P_xd": (2, 2), "P_dd": (2, 2), "drift_intensity": (2, 2), "model_noise_variance": 2,
     "gyro_noise_variance": 2, "S_inverse": (2, 2), "K_x": (2, 2), "K_d": (2, 2),
 }  # fmt: skip
 FILTER_RECORD = record(**_FILTER_FIELDS)
@@ -172,7 +172,8 @@ def block_dtype(capacity: BlockCapacity) -> np.dtype:
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
-        drift_correlation_length_m=float, drift_intensity_scale=float, filter_state_after_known_faults=4,
+        drift_correlation_length_m=float, gust_drift_intensity_factor=float,
+        filter_state_after_known_faults=4,
         frame_innovation=2,  # rad/s2
         # in turbulence: the filter without gust, lambda p, and numerator and denominator of lambda
         no_gust_filter=FILTER_RECORD, predictable_innovation_in_calm_air=2, calm_air_cross_correlation=float,
@@ -180,9 +181,9 @@ def block_dtype(capacity: BlockCapacity) -> np.dtype:
         # whether vanes show a gust roughly; its whitened effect, rad/s; the state of its filter
         has_coarse_gust_estimate=int, coarse_gust_response=2, coarse_gust_filter_state=4,
         # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty;
-        # omega dt of that uncertainty; its responses: see `fill_uncertainty_response`
+        # omega dt of that uncertainty; its responses: see `fill_uncertainty_response_bounds`
         alarm_level=float, noise_share_of_alarm_level=float, uncertainty_change_over_bound_per_frame=float,
-        constant_uncertainty_response=2, transient_uncertainty_response=2,
+        settled_uncertainty_response_bound=2, transient_response_sum_bound=2,
         n_regressors=int, regressor_tolerance=capacity.max_regressors, regressor=(capacity.max_regressors, 2),
         regressor_filter_state=(capacity.max_regressors, 4), regressor_response=(capacity.max_regressors, 2),
         n_hypotheses=int, hypothesis=(HYPOTHESIS_RECORD, capacity.max_hypotheses),
@@ -325,7 +326,7 @@ def whiten_by_no_gust_filter(block, dt):
         block.no_gust_filter.state,
         block.frame_innovation,
         dt,
-        block.no_gust_filter.whitened_innovation,
+        block.no_gust_filter.unscaled_white_innovation_rad_s,
     )
 
 
@@ -339,16 +340,18 @@ def fill_predictable_innovation(block, dt):
     """
     no_gust_filter = block.no_gust_filter
     predictable_innovation = block.predictable_innovation_in_calm_air
-    whitened_innovation = block.whitened_innovation
+    unscaled_white_innovation_rad_s = block.unscaled_white_innovation_rad_s
     sum_decay_factor = np.exp(-dt / CALM_AIR_SHARE_MEMORY_S)
     block.calm_air_cross_correlation *= sum_decay_factor
     block.calm_air_information *= sum_decay_factor
     for i in range(block.n_axes):
-        predictable_innovation[i] = whitened_innovation[i] - no_gust_filter.whitened_innovation[i]
+        predictable_innovation[i] = (
+            unscaled_white_innovation_rad_s[i] - no_gust_filter.unscaled_white_innovation_rad_s[i]
+        )
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             block.calm_air_cross_correlation += (
-                predictable_innovation[i] * block.S_inverse[i, j] * whitened_innovation[j]
+                predictable_innovation[i] * block.S_inverse[i, j] * unscaled_white_innovation_rad_s[j]
             )
             block.calm_air_information += (
                 predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
@@ -410,8 +413,8 @@ def reset_onset_slot(block, onset_slot):
 
 
 @kernel
-def fill_uncertainty_response(block, uncertainty_bound, dt):
-    """Fill `constant_uncertainty_response` and `transient_uncertainty_response` (2,) with eta_bar |g_0|
+def fill_uncertainty_response_bounds(block, uncertainty_bound, dt):
+    """Fill `settled_uncertainty_response_bound` and `transient_response_sum_bound` (2,) with eta_bar |g_0|
     and eta_bar RINGING / K_d.
 
     uncertainty_bound (3,) rad/s2: eta_bar.
@@ -423,12 +426,12 @@ def fill_uncertainty_response(block, uncertainty_bound, dt):
         else drift_gain[0, 0]
     )
     for i in range(block.n_axes):
-        block.constant_uncertainty_response[i] = block.transient_uncertainty_response[i] = 0.0
+        block.settled_uncertainty_response_bound[i] = block.transient_response_sum_bound[i] = 0.0
         for j in range(block.n_axes):
             drift_gain_cofactor = (
                 1.0 if block.n_axes == 1 else (drift_gain[1 - i, 1 - i] if i == j else drift_gain[i, j])
             )
-            block.transient_uncertainty_response[i] += (
+            block.transient_response_sum_bound[i] += (
                 TRANSIENT_RINGING_SUM_FACTOR
                 * abs(drift_gain_cofactor / drift_gain_determinant)
                 * uncertainty_bound[block.axes[j]]
@@ -439,7 +442,7 @@ def fill_uncertainty_response(block, uncertainty_bound, dt):
                 * drift_share_lost_per_frame
                 / (block.K_x[i, i] * drift_share_lost_per_frame + dt * drift_gain[i, i])
             )
-            block.constant_uncertainty_response[i] = (
+            block.settled_uncertainty_response_bound[i] = (
                 settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
             )
 
@@ -471,7 +474,7 @@ def fill_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
 
 
 @kernel
-def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_factor):
+def accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence_decay_factor):
     """Whiten `signature_for_onset` of the first n_tests tests, and add the frame to N, D and the bounds on N.
 
     evidence_decay_factor: factor by which earlier sums decay. In a block of one axis all values of a second
@@ -484,14 +487,14 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
     drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
     S_inv00, S_inv01, S_inv10, S_inv11 = S_inverse[0, 0], S_inverse[0, 1], S_inverse[1, 0], S_inverse[1, 1]
     drift_decay_factor = block.drift_decay_factor
-    whitened_innovation_0 = block.whitened_innovation[0]
-    whitened_innovation_1 = block.whitened_innovation[1]
+    unscaled_white_innovation_0 = block.unscaled_white_innovation_rad_s[0]
+    unscaled_white_innovation_1 = block.unscaled_white_innovation_rad_s[1]
     predictable_0 = block.predictable_innovation_in_calm_air[0]
     predictable_1 = block.predictable_innovation_in_calm_air[1]
-    transient_response_0 = block.transient_uncertainty_response[0]
-    transient_response_1 = block.transient_uncertainty_response[1]
-    constant_response_0 = block.constant_uncertainty_response[0]
-    constant_response_1 = block.constant_uncertainty_response[1]
+    transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
+    transient_response_sum_bound_1 = block.transient_response_sum_bound[1]
+    settled_response_bound_0 = block.settled_uncertainty_response_bound[0]
+    settled_response_bound_1 = block.settled_uncertainty_response_bound[1]
     signature_filter_state = onset_tests.signature_filter_state
     signature_for_onset = onset_tests.signature_for_onset
     correlation_weight = onset_tests.correlation_weight
@@ -518,7 +521,7 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
         weight_0 = S_inv00 * signature_response_0 + S_inv01 * signature_response_1
         weight_1 = S_inv10 * signature_response_0 + S_inv11 * signature_response_1
         onset_tests.correlation[k] = evidence_decay_factor * onset_tests.correlation[k] + (
-            weight_0 * whitened_innovation_0 + weight_1 * whitened_innovation_1
+            weight_0 * unscaled_white_innovation_0 + weight_1 * unscaled_white_innovation_1
         )
         onset_tests.information[k] = (
             evidence_decay_factor * onset_tests.information[k]
@@ -528,10 +531,12 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
         onset_tests.correlation_by_calm_air[k] = (
             evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
         ) + (weight_0 * predictable_0 + weight_1 * predictable_1)
-        varying_bound_increment = transient_response_0 * abs(
+        varying_bound_increment = transient_response_sum_bound_0 * abs(
             weight_0 - correlation_weight[0, k]
-        ) + transient_response_1 * abs(weight_1 - correlation_weight[1, k])
-        constant_bound_increment = constant_response_0 * abs(weight_0) + constant_response_1 * abs(weight_1)
+        ) + transient_response_sum_bound_1 * abs(weight_1 - correlation_weight[1, k])
+        constant_bound_increment = settled_response_bound_0 * abs(weight_0) + settled_response_bound_1 * abs(
+            weight_1
+        )
         onset_tests.max_correlation_by_constant_uncertainty[k] = (
             evidence_decay_factor * onset_tests.max_correlation_by_constant_uncertainty[k]
             + constant_bound_increment
@@ -543,7 +548,10 @@ def accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_fact
         onset_tests.max_correlation_by_rate_limited_uncertainty[k] = (
             evidence_decay_factor * onset_tests.max_correlation_by_rate_limited_uncertainty[k]
             + uncertainty_change_over_bound_per_frame
-            * (transient_response_0 * abs(weight_0) + transient_response_1 * abs(weight_1))
+            * (
+                transient_response_sum_bound_0 * abs(weight_0)
+                + transient_response_sum_bound_1 * abs(weight_1)
+            )
         )
         correlation_weight[0, k], correlation_weight[1, k] = weight_0, weight_1
 
@@ -598,7 +606,7 @@ def accumulate_regressor_correlation(
 def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor):
     """Add the frame to the share of N that a roughly visible gust contributes.
 
-    `accumulate_correlations` must have filled the weights of the frame.
+    `accumulate_correlations_and_bounds` must have filled the weights of the frame.
     """
     gust_response_0, gust_response_1 = block.coarse_gust_response[0], block.coarse_gust_response[1]
     for k in range(n_tests):
@@ -623,7 +631,7 @@ def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
         )
     for group_index in range(n_test_groups(block)):
         onset_tests, n_tests = block.onset_tests[group_index], n_onset_tests_in_group(block, group_index)
-        accumulate_correlations(block, onset_tests, n_tests, dt, evidence_decay_factor)
+        accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence_decay_factor)
         if block.has_coarse_gust_estimate:
             accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
         if has_regressors:
@@ -633,16 +641,18 @@ def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
 
 
 @kernel
-def max_correlation_by_uncertainty(onset_tests, k, transient_response_0, transient_response_1):
+def max_correlation_by_uncertainty(
+    onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
+):
     """The largest share of |N| in test k that a bounded uncertainty explains.
 
-    transient_response_0, _1: the two entries of the block's `transient_uncertainty_response`.
+    transient_response_sum_bound_0, _1: the two entries of the block's `transient_response_sum_bound`.
     """
-    bound_by_last_weight_change = transient_response_0 * abs(
+    bound_by_final_drop_of_weight = transient_response_sum_bound_0 * abs(
         onset_tests.correlation_weight[0, k]
-    ) + transient_response_1 * abs(onset_tests.correlation_weight[1, k])
+    ) + transient_response_sum_bound_1 * abs(onset_tests.correlation_weight[1, k])
     return onset_tests.max_correlation_by_constant_uncertainty[k] + min(
-        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_by_last_weight_change,
+        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_by_final_drop_of_weight,
         onset_tests.max_correlation_by_rate_limited_uncertainty[k],
     )
 
@@ -687,20 +697,22 @@ def normalised_evidence(
 
 
 @kernel
-def evaluate_onset_tests(block, onset_tests, n_tests, loss_bounds_ignore_uncertainty, has_error_map):
+def evaluate_onset_tests(
+    block, onset_tests, n_tests, llr_bounds_ignore_uncertainty, has_model_error_bound_table
+):
     """Fill the score and the log-likelihood ratios of n onset tests; those of a test without information are
     0.
 
-    loss_bounds_ignore_uncertainty: the bounds on the ratio of a loss leave out the bounded uncertainty.
-    has_error_map: the model's error is mapped; it is then large and lasting, so the bounds on other
-    hypotheses always include it.
+    llr_bounds_ignore_uncertainty: the bounds on the ratios leave out the bounded uncertainty.
+    has_model_error_bound_table: the model's error is mapped; it is then large and lasting, so the bounds on
+    hypotheses other than a loss always include it.
     """
     supporting_correlation_sign = onset_tests.supporting_correlation_sign
-    transient_response_0 = block.transient_uncertainty_response[0]
-    transient_response_1 = block.transient_uncertainty_response[1]
+    transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
+    transient_response_sum_bound_1 = block.transient_response_sum_bound[1]
     alarm_level = block.alarm_level
     noise_share_of_alarm_level = block.noise_share_of_alarm_level
-    uncertainty_weight_of_losses = 0.0 if loss_bounds_ignore_uncertainty else 1.0
+    uncertainty_weight_in_llr_bounds = 0.0 if llr_bounds_ignore_uncertainty else 1.0
     for k in range(n_tests):
         N, D = onset_tests.correlation[k], onset_tests.information[k]
         evidence_by_errors_and_air = onset_tests.max_correlation_by_coefficient_errors[k] + max(
@@ -712,12 +724,12 @@ def evaluate_onset_tests(block, onset_tests, n_tests, loss_bounds_ignore_uncerta
         is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
         evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
         max_evidence_by_uncertainty = max_correlation_by_uncertainty(
-            onset_tests, k, transient_response_0, transient_response_1
+            onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
         )
         evidence_error_bound = evidence_by_errors_and_air + (
             max_evidence_by_uncertainty
-            if has_error_map and not is_loss_or_its_end
-            else uncertainty_weight_of_losses * max_evidence_by_uncertainty
+            if has_model_error_bound_table and not is_loss_or_its_end
+            else uncertainty_weight_in_llr_bounds * max_evidence_by_uncertainty
         )
         score = normalised_evidence(
             alarm_level,
@@ -736,25 +748,28 @@ def evaluate_onset_tests(block, onset_tests, n_tests, loss_bounds_ignore_uncerta
 
 
 @kernel
-def evaluate_hypotheses(block, upper_bound_decay_factor=0.0, has_error_map=False):
+def evaluate_hypotheses(block, upper_bound_decay_factor_per_frame=0.0, has_model_error_bound_table=False):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
-    upper_bound_decay_factor: if a loss may end, the factor by which its earlier upper bound decays per frame;
-    else 0. has_error_map: see `evaluate_onset_tests`.
+    upper_bound_decay_factor_per_frame: if a loss may end, the factor by which earlier upper bounds decay;
+    else 0. has_model_error_bound_table: see `evaluate_onset_tests`.
     """
     for group_index in range(n_test_groups(block)):
         evaluate_onset_tests(
             block,
             block.onset_tests[group_index],
             n_onset_tests_in_group(block, group_index),
-            upper_bound_decay_factor > 0.0,
-            has_error_map,
+            upper_bound_decay_factor_per_frame > 0.0,
+            has_model_error_bound_table,
         )
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]
         first_test_index = (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS
         max_score, best_llr, likeliest_test_index = 0.0, -1.0, -1
-        max_llr_lower_bound, max_llr_upper_bound = 0.0, upper_bound_decay_factor * hypothesis.llr_upper_bound
+        max_llr_lower_bound, max_llr_upper_bound = (
+            0.0,
+            upper_bound_decay_factor_per_frame * hypothesis.llr_upper_bound,
+        )
         for k in range(first_test_index, first_test_index + N_ONSET_SLOTS):
             max_score = max(max_score, onset_tests.score[k])
             max_llr_lower_bound = max(max_llr_lower_bound, onset_tests.llr_lower_bound[k])
@@ -776,20 +791,20 @@ def update_block(
     has_regressors,
     dt,
     evidence_decay_factor,
-    upper_bound_decay_factor=0.0,
-    has_error_map=False,
+    upper_bound_decay_factor_per_frame=0.0,
+    has_model_error_bound_table=False,
 ):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
     The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `has_regressors`,
-    regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response`;
-    evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor, has_error_map:
-    `evaluate_hypotheses`.
+    regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response_bounds`;
+    evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor_per_frame,
+    has_model_error_bound_table: `evaluate_hypotheses`.
     """
     advance_covariance(block, dt)
     if block.alarm_level > 0.0:
-        fill_uncertainty_response(block, uncertainty_bound, dt)
-    whiten(block, block.state, block.frame_innovation, dt, block.whitened_innovation)
+        fill_uncertainty_response_bounds(block, uncertainty_bound, dt)
+    whiten(block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s)
     if block.no_gust_filter.n_axes > 0:
         fill_predictable_innovation(block, dt)
     if block.has_coarse_gust_estimate:
@@ -799,7 +814,7 @@ def update_block(
     if has_regressors:
         whiten_regressors(block, dt)
     accumulate_evidence(block, has_regressors, dt, evidence_decay_factor)
-    evaluate_hypotheses(block, upper_bound_decay_factor, has_error_map)
+    evaluate_hypotheses(block, upper_bound_decay_factor_per_frame, has_model_error_bound_table)
 
 
 @kernel
@@ -812,7 +827,7 @@ def estimate_theta(kind, N, D):
 
 
 @kernel
-def set_block_coarse_gust_acceleration(block, acceleration):
+def set_coarse_gust_acceleration_of_block(block, acceleration):
     """Store the effect of the coarsely estimated gust, acceleration (3,) rad/s2, in `coarse_gust_response`.
 
     `update_block` whitens it in place.

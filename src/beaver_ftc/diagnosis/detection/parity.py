@@ -154,7 +154,7 @@ def update_tone_tests(view, tone_config, detector_alarm_level, inside_envelope, 
     tone_tests, block = view.tone_tests, view.block
     n_regressors = block.n_regressors if has_regressors else 0
     inverse_innovation_std = np.sqrt(block.S_inverse[0, 0]) if inside_envelope else 0.0
-    tone_tests.normalised_innovation_sum += inverse_innovation_std * block.whitened_innovation[0]
+    tone_tests.normalised_innovation_sum += inverse_innovation_std * block.unscaled_white_innovation_rad_s[0]
     for j in range(n_regressors):
         tone_tests.normalised_regressor_sums[j] += inverse_innovation_std * block.regressor_response[j, 0]
     tone_tests.frames_since_update += 1
@@ -372,7 +372,9 @@ PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO = (
 MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
     0.9  # component of a direction of length 1, above which a view counts as one of the force
 )
-MIN_COLUMN_LENGTH_SHARE = 0.1  # least length that the errors leave of a column, as a share of its length
+MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS = (
+    0.1  # least length that the errors leave of a column, as a share of its length
+)
 PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL_FORCE), (ROLL, YAW), (YAW, SIDE_FORCE)
 
 # Values of `orthogonal_to_surface` in a view without one: a view of an axis; one across the column of an
@@ -386,7 +388,7 @@ class StatisticalRecordSize(NamedTuple):
     rate_block_capacity: BlockCapacity
     view_block_capacity: BlockCapacity
     n_views: int
-    n_error_map_boxes: int
+    n_model_error_bound_boxes: int
 
 
 USUAL_RECORD_SIZE = StatisticalRecordSize(
@@ -418,15 +420,15 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
 
 
 @kernel
-def innovation_component(view, forces, gust, inertial_gust, innovation, component):
+def innovation_component_for_view(view, forces, gust, inertial_gust, innovation, component):
     """One component of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if component < SIDE_FORCE:
-        mean_gust_acceleration = 0.0
+        mean_angular_acceleration_by_gust = 0.0
         if subtracts_gust_estimate(view, gust):
-            mean_gust_acceleration = gust_estimate_of_view(
+            mean_angular_acceleration_by_gust = gust_estimate_of_view(
                 view, gust, inertial_gust
-            ).output.mean_gust_acceleration[component]
-        return innovation[component] - mean_gust_acceleration
+            ).output.mean_angular_acceleration_by_gust[component]
+        return innovation[component] - mean_angular_acceleration_by_gust
     force_record = forces.component[component - SIDE_FORCE]
     return (
         force_record.innovation_at_inertial_flow_angle
@@ -436,7 +438,7 @@ def innovation_component(view, forces, gust, inertial_gust, innovation, componen
 
 
 @kernel
-def column_entry_and_error(view, forces, bound_record, G, plane_axis_index):
+def column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index):
     """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     component, s = view.plane_axes[plane_axis_index], view.orthogonal_to_surface
     if s == VANE_VIEW:
@@ -449,7 +451,9 @@ def column_entry_and_error(view, forces, bound_record, G, plane_axis_index):
         column_entry = force_record.previous_scaled_force_per_surface_rad[s]
         return column_entry, force_record.scaled_force_per_surface_rad_error_bound[s]
     error_bound = (
-        bound_record.surface_error_per_rad[component, s] if bound_record.has_declared_surface_errors else 0.0
+        bound_record.surface_effect_error_per_rad[component, s]
+        if bound_record.has_declared_surface_errors
+        else 0.0
     )
     return G[component, s], error_bound
 
@@ -463,8 +467,8 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
     if view.is_orthogonal_to_rolling_gust:
         return set_direction_across_vane_and_rolling_gust(view, forces, gust)
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
-    first_entry, first_error_bound = column_entry_and_error(view, forces, bound_record, G, 0)
-    second_entry, second_error_bound = column_entry_and_error(view, forces, bound_record, G, 1)
+    first_entry, first_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 0)
+    second_entry, second_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 1)
     column_length = np.sqrt(first_entry * first_entry + second_entry * second_entry)
     if column_length == 0.0:
         return 0.0
@@ -481,7 +485,7 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
         + abs(view.direction[first_component]) * second_error_bound
     )
     return error_bound_along_direction / max(
-        column_length - column_length_error_bound, MIN_COLUMN_LENGTH_SHARE * column_length
+        column_length - column_length_error_bound, MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS * column_length
     )
 
 
@@ -592,7 +596,7 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         )
     for force_index, force_record in enumerate(forces.component):
         model_noise_std += abs(m[SIDE_FORCE + force_index]) * np.sqrt(
-            force_record.noise_variance[view.uses_inertial_flow_angle]
+            force_record.noise_variance_with_without_vane[view.uses_inertial_flow_angle]
         )
         if view.uses_inertial_flow_angle:
             drift_intensity += (
@@ -659,7 +663,9 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
         block.regressor[next_regressor_index, 0] = 0.0
         for i in range(m.size):
             if view.unit_column[i] != 0.0:
-                component_innovation = innovation_component(view, forces, gust, inertial_gust, innovation, i)
+                component_innovation = innovation_component_for_view(
+                    view, forces, gust, inertial_gust, innovation, i
+                )
                 block.regressor[next_regressor_index, 0] += (
                     view.column_leak_share * view.unit_column[i] * component_innovation
                 )
@@ -685,7 +691,7 @@ def update_view_directions_and_signatures(views, forces, gust, bound_record, G, 
 
 
 @kernel
-def project_innovation(
+def fill_view_innovations_and_noise(
     views, has_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
 ):
     """Project the innovation (3,) rad/s2 on the direction of each view, into `frame_innovation` of its block.
@@ -700,7 +706,7 @@ def project_innovation(
         projected_innovation[0] = 0.0
         for i in range(m.size):
             if m[i] != 0.0:
-                projected_innovation[0] += m[i] * innovation_component(
+                projected_innovation[0] += m[i] * innovation_component_for_view(
                     view, forces, gust, inertial_gust, innovation, i
                 )
         if has_regressors or view.always_has_regressors:
@@ -758,7 +764,7 @@ def max_test_score_of_view(view):
 
 
 @kernel
-def vane_confirmed_score(view, views, test_config, forces, gust):
+def score_confirmed_without_vane(view, views, test_config, forces, gust):
     """The score of a view, limited by the views that confirm that it is not an error of a vane.
 
     A view of the rates alone needs no confirmation: no error of a vane changes the rates alone. Peak scores
@@ -793,7 +799,7 @@ def view_alarm_score(view, views, test_config, forces, gust):
         and abs(view.direction[view.plane_axes[1]]) > MIN_FORCE_COMPONENT_OF_FORCE_VIEW
     )
     if view.orthogonal_to_surface >= 0 and is_mostly_force and gust.output.uses_accelerometers == 1:
-        return vane_confirmed_score(view, views, test_config, forces, gust)
+        return score_confirmed_without_vane(view, views, test_config, forces, gust)
     return 0.0
 
 
@@ -807,7 +813,7 @@ def views_exclude_surface(views, test_config, forces, gust, s, effectiveness_col
         )
         if (
             can_exclude_surface
-            and vane_confirmed_score(view, views, test_config, forces, gust) > test_config.alarm_level
+            and score_confirmed_without_vane(view, views, test_config, forces, gust) > test_config.alarm_level
         ):
             return True
     return False
@@ -872,8 +878,8 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
         (NORMAL_COMPONENT, PITCH_PLANE, pitch_surface_indices),
         (SIDE_COMPONENT, YAW_PLANE, lateral_surface_indices),
     ):
-        separated_surface_indices = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
-        for s in separated_surface_indices:
+        surfaces_distinguished_by_force = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+        for s in surfaces_distinguished_by_force:
             column_components = aircraft.dominant_axis[s], plane_axes[1]
             yield ParityDirection(
                 s,
@@ -885,7 +891,7 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
                     if other_surface_index != s
                 ],
             )
-        if separated_surface_indices:
+        if surfaces_distinguished_by_force:
             yield ParityDirection(
                 VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, plane_moving_surface_indices
             )
@@ -937,14 +943,14 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
 def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    separated_surface_indices_by_force = [
+    surfaces_distinguished_by_each_force = [
         aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
         for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT)
     ]
     subtracts_gust_estimate_from_rates = (
         forces["in_use"]
         and statistical["gust"]["output"]["accounts_for_gusts"]
-        and all(separated_surface_indices_by_force)
+        and all(surfaces_distinguished_by_each_force)
     )
     parity_directions = list(parity_directions_of(aircraft, bool(forces["in_use"])))[
         : len(statistical["views"])
@@ -1018,11 +1024,11 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
 
 
 @kernel
-def fill_block_signatures(blocks, Gu, alpha_cubed_acceleration):
+def fill_block_signatures(blocks, Gu, acceleration_per_alpha_cubed_coefficient):
     """Fill the signatures of the blocks of the rates, rad/s2.
 
-    Gu (3, n) rad/s2: effect of each surface, mean over the frame; alpha_cubed_acceleration rad/s2:
-    pitch acceleration of a coefficient 1 of alpha^3.
+    Gu (3, n) rad/s2: effect of each surface, mean over the frame; acceleration_per_alpha_cubed_coefficient
+    rad/s2: pitch acceleration of a coefficient 1 of alpha^3.
     """
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
@@ -1032,7 +1038,7 @@ def fill_block_signatures(blocks, Gu, alpha_cubed_acceleration):
                 elif hypothesis.kind == STEP_FAULT:
                     hypothesis.signature[i] = 1.0 if hypothesis.axis == block.axes[i] else 0.0
                 else:
-                    hypothesis.signature[i] = alpha_cubed_acceleration
+                    hypothesis.signature[i] = acceleration_per_alpha_cubed_coefficient
 
 
 @kernel

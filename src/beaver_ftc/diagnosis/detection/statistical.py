@@ -72,7 +72,7 @@ from beaver_ftc.diagnosis.detection.parity import (
 )
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
-    MIN_UNMEASURED_GUST_ROTATION_SHARES,
+    MIN_UNMEASURED_GUST_INTENSITY_SHARES,
     UNMEASURED_SHARE_BY_FORCE_ERROR,
     add_gust_estimate_noise,
     configure_gust_estimate,
@@ -213,7 +213,9 @@ def configure_statistical_detector(
         statistical_settings, aircraft, dt_s
     )
     test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
-    test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    test_config["has_model_error_bound_table"] = (
+        aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    )
     statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust, declared, mass)
@@ -263,7 +265,7 @@ def configure_statistical_detector(
                 "uses_accelerometers"
             ]
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
-                np.add(MIN_UNMEASURED_GUST_ROTATION_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
+                np.add(MIN_UNMEASURED_GUST_INTENSITY_SHARES, UNMEASURED_SHARE_BY_FORCE_ERROR), 1.0
             )
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
@@ -284,7 +286,7 @@ def configure_statistical_detector(
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][field_name] = statistical["block"][field_name]
-        mean_reverting_block["drift_intensity_scale"] = (
+        mean_reverting_block["gust_drift_intensity_factor"] = (
             rolling_gust_correlation_length_m / mean_reverting_block["drift_correlation_length_m"]
         ) ** 2
         if not gust["output"]["is_gust_measured"]:
@@ -292,7 +294,7 @@ def configure_statistical_detector(
             pitch_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
                 statistical, airspeed_mps, rate_hz, pitching_gust_correlation_length_m
             )
-            pitch_block["drift_intensity_scale"] = (
+            pitch_block["gust_drift_intensity_factor"] = (
                 pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
             ) ** 2
         add_gust_estimate_noise(statistical, sensor_errors, design, *trim[1:], dt_s)
@@ -307,7 +309,7 @@ def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraf
     for block, (axes, hypothesis_entries) in zip(statistical["block"], axes_and_hypotheses, strict=True):
         block["n_axes"], block["n_hypotheses"] = len(axes), len(hypothesis_entries)
         block["n_regressors"] = sum(moment_axis_of_term(term) in axes for term in aircraft.moments)
-        block["drift_decay_factor"], block["drift_intensity_scale"] = 1.0, 1.0
+        block["drift_decay_factor"], block["gust_drift_intensity_factor"] = 1.0, 1.0
         for i, axis in enumerate(axes):
             block["axes"][i] = axis
             gyro_noise_variance = max(sensor_errors[AXES[axis]].random, MIN_GYRO_NOISE_STD_RAD_S) ** 2
@@ -387,10 +389,10 @@ def _configure_drift_and_model_noise(
     u."""
     reading_noise_std = declared.sensors.each("random")
     gyro_noise_std = float(reading_noise_std[:3].max())
-    max_constant_error_bound = max(declared.constant_rad_s2)
+    max_constant_part_of_uncertainty_bound = max(declared.constant_rad_s2)
     alarm_level = float(statistical["test_config"]["alarm_level"])
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
-        max_constant_error_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
+        max_constant_part_of_uncertainty_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
     _, G, acceleration_slopes_by_x, acceleration_slopes_by_y = jacobian(design, *trim)
     statistical["noise"]["acceleration_variance_without_air_data"] = (
@@ -398,7 +400,7 @@ def _configure_drift_and_model_noise(
     )
     acceleration_variance_by_air_data = (
         acceleration_slopes_by_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
-    )  # later as `add_reading_regressors` says
+    )  # later as `add_reading_regressors_and_model_noise` says
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
     )
@@ -539,7 +541,9 @@ def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_c
 
 
 @kernel
-def add_reading_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u):
+def add_reading_regressors_and_model_noise(
+    frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u
+):
     """Add this instant, a `frame_share_per_instant` of the frame, to the readings' regressors, rad/s2 per
     unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
     moment_table = design.moments
@@ -595,7 +599,7 @@ TEST_CONFIG_RECORD = record(
     n_score_columns=int,
     has_regressors=int,  # whether unknown constants have tolerances
     frame_share_per_instant=float,  # one over the number of instants in a frame
-    has_error_map=int,  # whether the model's error is mapped
+    has_model_error_bound_table=int,  # whether the model's error is mapped
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
@@ -657,27 +661,29 @@ def update_blocks(
         if not is_alarm_latched:
             likelihood.reset_onset_slot(block, onset_slot)
         for i, axis in enumerate(block.axes[: block.n_axes]):
-            block.frame_innovation[i] = innovation[axis] - gust.output.mean_gust_acceleration[axis]
+            block.frame_innovation[i] = innovation[axis] - gust.output.mean_angular_acceleration_by_gust[axis]
         block.has_coarse_gust_estimate = gust.config.has_only_coarse_estimate
         if gust.config.has_only_coarse_estimate:
-            likelihood.set_block_coarse_gust_acceleration(block, gust.output.coarse_gust_acceleration)
+            likelihood.set_coarse_gust_acceleration_of_block(
+                block, gust.output.angular_acceleration_by_coarse_gust
+            )
         if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)
             if block_index < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
-                block.no_gust_filter.whitened_innovation[:] = blocks[
+                block.no_gust_filter.unscaled_white_innovation_rad_s[:] = blocks[
                     LATERAL_BLOCK
-                ].no_gust_filter.whitened_innovation
-        upper_bound_decay_factor = test_config.evidence_decay_factor if may_loss_end else 0.0
+                ].no_gust_filter.unscaled_white_innovation_rad_s
+        upper_bound_decay_factor_per_frame = test_config.evidence_decay_factor if may_loss_end else 0.0
         likelihood.update_block(
             block,
             uncertainty_bound,
             test_config.has_regressors,
             dt,
             evidence_decay_factor,
-            upper_bound_decay_factor,
-            test_config.has_error_map,
+            upper_bound_decay_factor_per_frame,
+            test_config.has_model_error_bound_table,
         )
 
 
@@ -687,7 +693,7 @@ def add_gust_axes_turn_to_drift_covariance(gust, block):
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             block.P_dd[i, j] += (
-                block.drift_intensity_scale
+                block.gust_drift_intensity_factor
                 * gust.output.acceleration_variance_by_axes_turn[block.axes[i], block.axes[j]]
             )
 
@@ -698,7 +704,7 @@ def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_fa
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
         for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = (
-                innovation_after_known_faults[axis] - gust.output.mean_gust_acceleration[axis]
+                innovation_after_known_faults[axis] - gust.output.mean_angular_acceleration_by_gust[axis]
             )
         likelihood.whiten(
             block, block.filter_state_after_known_faults, block.frame_innovation, dt, block.frame_innovation
@@ -713,7 +719,9 @@ def fill_statistical_unmodelled_acceleration(blocks, gust, out):
     """
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
         for i, axis in enumerate(block.axes[: block.n_axes]):
-            out[axis] = block.filter_state_after_known_faults[2 + i] + gust.output.gust_acceleration[axis]
+            out[axis] = (
+                block.filter_state_after_known_faults[2 + i] + gust.output.angular_acceleration_by_gust[axis]
+            )
 
 
 @kernel
@@ -968,7 +976,9 @@ def update_uncertainty_change(noise_model, blocks, model_error_map, u):
 
 
 @kernel
-def add_instant_to_tests(test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt):
+def add_instant_to_gust_and_regressors(
+    test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt
+):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if gust.output.accounts_for_gusts:
         gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
@@ -993,7 +1003,9 @@ def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors
         frame_share_per_instant, noise_model.coefficient_regressor, blocks, design, y, u
     )
     if noise_model.has_reading_errors:
-        add_reading_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u)
+        add_reading_regressors_and_model_noise(
+            frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u
+        )
 
 
 @kernel
@@ -1010,10 +1022,10 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
         bound_record.earth_rate_rad_s,
         uncertainty_bound,
     )
-    has_error_map = bound_record.model_error_map.n_boxes > 0
+    has_model_error_bound_table = bound_record.model_error_map.n_boxes > 0
     for i in range(3):
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
-        if has_error_map:
+        if has_model_error_bound_table:
             uncertainty_bound[i] += min(
                 bound_record.model_error_map.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
             )
@@ -1029,7 +1041,7 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
                     gust_drift_intensity = gusts.unmeasured_gust_drift_intensity(
                         gust, V, axis, block.axes[j], block_index == likelihood.MEAN_REVERTING_LATERAL_BLOCK
                     )
-                    block.drift_intensity[i, j] = block.drift_intensity_scale * gust_drift_intensity
+                    block.drift_intensity[i, j] = block.gust_drift_intensity_factor * gust_drift_intensity
             uncertainty_bound_for_drift = max(
                 uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2
             )

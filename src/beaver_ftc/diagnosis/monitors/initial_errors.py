@@ -18,7 +18,7 @@ samples, s; test t; and filter pole m
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
                                     and for each test, or pair of tests, that couples with the error
                                       b <- min(b, (r + B + 2 d W_tm)
-                                                  / (MIN_REMAINING_COUPLING_EFFECT_SHARE C))
+                                                  / (MIN_REMAINING_ERROR_EFFECT_SHARE C))
     error_change_bound              d: bound on the change of x within the memory of the slowest filter,
                                     d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
                                     of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
@@ -92,30 +92,34 @@ MAX_CHORD_OF_ATTITUDE_ERROR = 2.0  # of 2 sin(error / 2): an attitude may be off
 MAX_DENSITY_DEVIATION_SHARE = (
     0.25  # of the density from the standard atmosphere at a height, as a share of it
 )
-MIN_TEMPERATURE_OVER_SEA_LEVEL = 0.05  # temperature over that at sea level, below which none is extrapolated
-# Share of a coupling that is left, at least, when speed and flow have changed within a filter's memory
-MIN_REMAINING_COUPLING_EFFECT_SHARE = 0.8
+MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL = (
+    0.05  # temperature over that at sea level, below which none is extrapolated
+)
+# Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
+MIN_REMAINING_ERROR_EFFECT_SHARE = 0.8
 SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 
-# Places in `coupling_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
+# Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
 # per sample. Two of them, at right angles, make the effect of phi on the attitude, and on the velocity. The
 # reading that is off comes first; VANE: of alpha and of beta.
 (
-    PHI_PITCH_RATE_COUPLING_INDEX,  # h q
-    PHI_YAW_RATE_COUPLING_INDEX,  # h r
-    PHI_GRAVITY_DOWN_COUPLING_INDEX,  # h g cos(theta) cos(phi)
-    PHI_GRAVITY_SIDE_COUPLING_INDEX,  # h g cos(theta) sin(phi)
-    THETA_GRAVITY_COUPLING_INDEX,  # h g cos(largest mean of reading and truth)
+    PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX,  # h q
+    PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX,  # h r
+    PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX,  # h g cos(theta) cos(phi)
+    PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX,  # h g cos(theta) sin(phi)
+    THETA_ERROR_EFFECT_BY_GRAVITY_INDEX,  # h g cos(largest mean of reading and truth)
     # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
-    ALPHA_CLIMB_COUPLING_INDEX,
-    VANE_ROLL_RATE_COUPLING_INDEX,  # h (p cos(alpha) + r sin(alpha))
-    VANE_YAW_RATE_COUPLING_INDEX,  # h (p sin(alpha) - r cos(alpha))
-    ALPHA_FORCE_UNCERTAINTY_INDEX,  # of the coupling of alpha with BETA_FLOW: bound on the part of the force
-    BETA_FORCE_UNCERTAINTY_INDEX,  # of the coupling of beta with ALPHA_FLOW: the same
-    AIRSPEED_NORMAL_FORCE_COUPLING_INDEX,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
-    AIRSPEED_SIDE_FORCE_COUPLING_INDEX,  # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
-    AIRSPEED_DENSITY_COUPLING_INDEX,  # 2 (log V - log V before)
-    THETA_HEADING_RATE_COUPLING_INDEX,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
+    ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX,
+    VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX,  # h (p cos(alpha) + r sin(alpha))
+    VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX,  # h (p sin(alpha) - r cos(alpha))
+    # of the effect of alpha on BETA_FLOW, of beta on ALPHA_FLOW: bound on the part of the force
+    ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
+    BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
+    AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX,  # h (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
+    # h (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
+    AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX,
+    AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX,  # 2 (log V - log V before)
+    THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX,  # h (q sin(phi) + r cos(phi)) = h psi' cos(theta)
 ) = range(14)
 
 
@@ -134,7 +138,7 @@ def chord_of_angle(angle_rad):
 @kernel
 def standard_air_density(altitude_m):
     """Return the density of the standard troposphere, kg/m3, at altitude_m."""
-    temperature_ratio = max(1.0 - 2.25577e-5 * altitude_m, MIN_TEMPERATURE_OVER_SEA_LEVEL)
+    temperature_ratio = max(1.0 - 2.25577e-5 * altitude_m, MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL)
     return 1.225 * temperature_ratio**4.2559
 
 
@@ -201,7 +205,7 @@ def update_error_change_bounds(redundancy, initial_errors):
 @kernel
 def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     """Fill `max_effect_per_unit_error` (N_INITIAL_ERROR_HYPOTHESES, RPM_TEST) and, with signs,
-    `coupling_effect_per_unit_error` (N_INITIAL_ERROR_COUPLINGS,).
+    `signed_effect_per_unit_error` (N_SIGNED_INITIAL_ERROR_EFFECTS,).
 
     Both are taken at the sample before, from which this sample, readings (N_SENSORS,), is predicted.
     """
@@ -212,9 +216,9 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
         previous_reading[PHI],
         previous_reading[THETA],
     )
-    max_effect_per_unit, coupling_effect_per_unit = (
+    max_effect_per_unit, signed_effect_per_unit = (
         initial_errors.max_effect_per_unit_error,
-        initial_errors.coupling_effect_per_unit_error,
+        initial_errors.signed_effect_per_unit_error,
     )
     max_effect_per_unit[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
@@ -244,9 +248,9 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
             (max_heading_turn if i != 1 else 0.0) + max_theta_secant * second_order_turn_rad2
         )
     (
-        coupling_effect_per_unit[PHI_PITCH_RATE_COUPLING_INDEX],
-        coupling_effect_per_unit[PHI_YAW_RATE_COUPLING_INDEX],
-        coupling_effect_per_unit[THETA_HEADING_RATE_COUPLING_INDEX],
+        signed_effect_per_unit[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
+        signed_effect_per_unit[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
+        signed_effect_per_unit[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX],
     ) = (
         h * q,
         h * r,
@@ -257,12 +261,12 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     # times twice that.
     log_airspeed_change = np.log(max(readings[AIRSPEED], MIN_AIRSPEED_MPS) / V)
     max_effect_per_unit[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
-    coupling_effect_per_unit[AIRSPEED_DENSITY_COUPLING_INDEX] = 2.0 * log_airspeed_change
+    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX] = 2.0 * log_airspeed_change
 
 
 @kernel
 def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
-    """Fill `max_effect_per_unit_error` and `coupling_effect_per_unit_error` for the tests of speed, flow and
+    """Fill `max_effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and
     climb, and by gravity.
 
     V m/s; p, q, r rad/s: of the sample before. Each row times h, and times 1 + h (|a| / V + |p| + |q| + |r|)
@@ -270,8 +274,8 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
     reading, a = memory.previous_reading, memory.body_acceleration
-    largest = initial_errors.max_effect_per_unit_error
-    coupling = initial_errors.coupling_effect_per_unit_error
+    max_effect_per_unit = initial_errors.max_effect_per_unit_error
+    signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
     sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
     sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
     sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
@@ -294,60 +298,68 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     roll_yaw_rate = np.hypot(p, r)
     predicted_climb_m = memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
-    largest[ALPHA_HYPOTHESIS, SPEED_TEST] = largest[BETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * a_max
+    max_effect_per_unit[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect_per_unit[BETA_HYPOTHESIS, SPEED_TEST] = (
+        widened_step_s * a_max
+    )
     # alpha' with alpha off: (a_z, a_x) / (V cos(beta)), and tan(beta) (p, r), each turned by alpha
-    largest[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+    max_effect_per_unit[ALPHA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
         widened_step_s * beta_secant * (a_max / V + roll_yaw_rate * abs(sin_beta))
     )
     # beta' with alpha off: (p, r), and sin(beta) (a_x, a_z) / V, each turned by alpha
-    largest[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (roll_yaw_rate + a_max * abs(sin_beta) / V)
+    max_effect_per_unit[ALPHA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * (
+        roll_yaw_rate + a_max * abs(sin_beta) / V
+    )
     # alpha' with beta off: tangents, and secants, of reading and truth differ by x over both cosines
-    largest[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
+    max_effect_per_unit[BETA_HYPOTHESIS, ALPHA_FLOW_TEST] = (
         widened_step_s * beta_secant * max_beta_secant * (abs(flow_roll_rate) + a_max / V)
     )
     # beta' with beta off: a turned by beta
-    largest[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * a_max / V
+    max_effect_per_unit[BETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * a_max / V
     # alpha', beta' with V off: a / truth = (1 + x) a / reading
-    largest[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * beta_secant * a_max / V
-    )
+    max_effect_per_unit[AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
+        AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST
+    ] = widened_step_s * beta_secant * a_max / V
     # phi off: a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
     # which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of it
-    largest[PHI_HYPOTHESIS, SPEED_TEST] = (
+    max_effect_per_unit[PHI_HYPOTHESIS, SPEED_TEST] = (
         widened_step_s * g * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
     )
-    largest[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = largest[PHI_HYPOTHESIS, BETA_FLOW_TEST] = (
-        widened_step_s * g * cos_theta * beta_secant / V
-    )
+    max_effect_per_unit[PHI_HYPOTHESIS, ALPHA_FLOW_TEST] = max_effect_per_unit[
+        PHI_HYPOTHESIS, BETA_FLOW_TEST
+    ] = widened_step_s * g * cos_theta * beta_secant / V
     # theta off: a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
     # take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest
-    largest[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
-    largest[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
-    largest[THETA_HYPOTHESIS, BETA_FLOW_TEST] = widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    max_effect_per_unit[THETA_HYPOTHESIS, SPEED_TEST] = widened_step_s * g
+    max_effect_per_unit[THETA_HYPOTHESIS, ALPHA_FLOW_TEST] = widened_step_s * beta_secant * g / V
+    max_effect_per_unit[THETA_HYPOTHESIS, BETA_FLOW_TEST] = (
+        widened_step_s * g * (abs(sin_phi) + abs(sin_beta)) / V
+    )
     # altitude' with alpha off: (cos(alpha), sin(alpha)) turned, times V cos(beta), along
     # (sin(theta), -cos(phi) cos(theta))
     vertical_length_in_symmetry_plane = np.hypot(sin_theta, cos_phi * cos_theta)
-    largest[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_length_in_symmetry_plane
+    max_effect_per_unit[ALPHA_HYPOTHESIS, CLIMB_TEST] = h * V * cos_beta * vertical_length_in_symmetry_plane
     # with beta off: (cos(beta), -sin(beta)) turned, times V
-    largest[BETA_HYPOTHESIS, CLIMB_TEST] = (
+    max_effect_per_unit[BETA_HYPOTHESIS, CLIMB_TEST] = (
         h * V * np.hypot(cos_alpha * sin_theta - sin_alpha * cos_phi * cos_theta, sin_phi * cos_theta)
     )
     # with V off: the true climb is the predicted one over 1 + x, which differ by x / (1 + x) of the latter
-    largest[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
+    max_effect_per_unit[AIRSPEED_HYPOTHESIS, CLIMB_TEST] = abs(predicted_climb_m) / (
         1.0 - min(initial_errors.error_bound[AIRSPEED_HYPOTHESIS], 1.0 - 1.0 / MAX_AIRSPEED_READING_RATIO)
     )
     # with phi off: the vertical's part cos(theta) is turned, against the part of v across the first axis
-    largest[PHI_HYPOTHESIS, CLIMB_TEST] = h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    max_effect_per_unit[PHI_HYPOTHESIS, CLIMB_TEST] = (
+        h * V * cos_theta * np.hypot(sin_beta, sin_alpha * cos_beta)
+    )
     # with theta off: the vertical is turned, against v
-    largest[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
-    # Couplings. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi), cos(phi))
-    # is turned by the error
-    coupling[PHI_GRAVITY_DOWN_COUPLING_INDEX] = h * g * cos_theta * cos_phi
-    coupling[PHI_GRAVITY_SIDE_COUPLING_INDEX] = h * g * cos_theta * sin_phi
+    max_effect_per_unit[THETA_HYPOTHESIS, CLIMB_TEST] = h * V
+    # Signed effects. phi: the error of gravity across the first axis, exactly: g cos(theta) (sin(phi),
+    # cos(phi)) is turned by the error
+    signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX] = h * g * cos_theta * cos_phi
+    signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch_magnitude = abs(reading[THETA])
-    coupling[THETA_GRAVITY_COUPLING_INDEX] = (
+    signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX] = (
         h
         * g
         * np.cos(
@@ -363,26 +375,26 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     max_mean_path_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
         0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     )
-    coupling[ALPHA_CLIMB_COUPLING_INDEX] = (
+    signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX] = (
         h * V * cos_beta * vertical_length_in_symmetry_plane * np.cos(min(max_mean_path_angle, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + negative_flow_yaw_rate sin(e / 2)). beta
     # off by e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of
     # either sign, is an uncertainty of both
-    coupling[VANE_ROLL_RATE_COUPLING_INDEX] = h * flow_roll_rate
-    coupling[VANE_YAW_RATE_COUPLING_INDEX] = h * negative_flow_yaw_rate
-    coupling[ALPHA_FORCE_UNCERTAINTY_INDEX] = h * abs(sin_beta) * a_max / V
-    coupling[BETA_FORCE_UNCERTAINTY_INDEX] = (
+    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX] = h * flow_roll_rate
+    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX] = h * negative_flow_yaw_rate
+    signed_effect_per_unit[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = h * abs(sin_beta) * a_max / V
+    signed_effect_per_unit[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = (
         h * np.sin(min(max_sideslip, 0.5 * np.pi)) * beta_secant * max_beta_secant * abs(a_normal) / V
     )
     # V: a across the flow, over the airspeed
-    coupling[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX] = h * a_normal * beta_secant / V
-    coupling[AIRSPEED_SIDE_FORCE_COUPLING_INDEX] = h * a_side / V
+    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX] = h * a_normal * beta_secant / V
+    signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX] = h * a_side / V
 
 
 @kernel
 def filter_effects_per_unit_error(redundancy, initial_errors):
-    """Pass effects per unit error and couplings through the filters of the tests."""
+    """Pass effects per unit error, largest and signed, through the filters of the tests."""
     filter_decay = redundancy.config.filter_decay
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         for test_index in range(RPM_TEST):
@@ -391,11 +403,11 @@ def filter_effects_per_unit_error(redundancy, initial_errors):
                     filter_decay[m] * initial_errors.filtered_max_effect_per_unit_error[i, test_index, m]
                     + initial_errors.max_effect_per_unit_error[i, test_index]
                 )
-    for coupling_index in range(initial_errors.coupling_effect_per_unit_error.size):
+    for signed_effect_index in range(initial_errors.signed_effect_per_unit_error.size):
         for m in range(filter_decay.size):
-            initial_errors.filtered_coupling_effect_per_unit_error[coupling_index, m] = (
-                filter_decay[m] * initial_errors.filtered_coupling_effect_per_unit_error[coupling_index, m]
-                + initial_errors.coupling_effect_per_unit_error[coupling_index]
+            initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m] = (
+                filter_decay[m] * initial_errors.filtered_signed_effect_per_unit_error[signed_effect_index, m]
+                + initial_errors.signed_effect_per_unit_error[signed_effect_index]
             )
 
 
@@ -425,7 +437,7 @@ def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect
     if min_effect_per_unit_error > 0.0:
         initial_errors.error_bound[hypothesis_index] = min(
             initial_errors.error_bound[hypothesis_index],
-            max_effect / (MIN_REMAINING_COUPLING_EFFECT_SHARE * min_effect_per_unit_error),
+            max_effect / (MIN_REMAINING_ERROR_EFFECT_SHARE * min_effect_per_unit_error),
         )
 
 
@@ -460,14 +472,14 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_in
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, m]
+        filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect_per_unit[PHI_PITCH_RATE_COUPLING_INDEX],
-                filtered_coupling_effect_per_unit[PHI_YAW_RATE_COUPLING_INDEX],
+                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
+                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
             ),
         )
         tighten_error_bound(
@@ -475,15 +487,15 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             PHI_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_coupling_effect_per_unit[PHI_GRAVITY_DOWN_COUPLING_INDEX],
-                filtered_coupling_effect_per_unit[PHI_GRAVITY_SIDE_COUPLING_INDEX],
+                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX],
+                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX],
             ),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
             max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            filtered_coupling_effect_per_unit[THETA_GRAVITY_COUPLING_INDEX],
+            filtered_signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX],
         )
         max_rotation_effect = np.hypot(
             max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
@@ -493,7 +505,7 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             initial_errors,
             THETA_HYPOTHESIS,
             max_rotation_effect,
-            abs(filtered_coupling_effect_per_unit[THETA_HEADING_RATE_COUPLING_INDEX]),
+            abs(filtered_signed_effect_per_unit[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX]),
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -502,18 +514,20 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     max_half_alpha_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
-        np.cos(max_half_alpha_error) * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
-        - np.sin(max_half_alpha_error) * abs(filtered_coupling_effect_per_unit[VANE_YAW_RATE_COUPLING_INDEX])
-        - filtered_coupling_effect_per_unit[ALPHA_FORCE_UNCERTAINTY_INDEX]
+        np.cos(max_half_alpha_error)
+        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        - np.sin(max_half_alpha_error)
+        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX])
+        - filtered_signed_effect_per_unit[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        filtered_coupling_effect_per_unit[ALPHA_CLIMB_COUPLING_INDEX],
+        filtered_signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX],
     )
     tighten_error_bound(
         initial_errors,
@@ -523,8 +537,8 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_coupling_effect_per_unit[VANE_ROLL_RATE_COUPLING_INDEX])
-        - filtered_coupling_effect_per_unit[BETA_FORCE_UNCERTAINTY_INDEX]
+        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        - filtered_signed_effect_per_unit[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(
         initial_errors,
@@ -541,7 +555,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    filtered_coupling_effect_per_unit = initial_errors.filtered_coupling_effect_per_unit_error[:, pole_index]
+    filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     max_reading_over_truth = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]
     tighten_error_bound(
         initial_errors,
@@ -550,7 +564,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect_per_unit[AIRSPEED_NORMAL_FORCE_COUPLING_INDEX]),
+        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX]),
     )
     tighten_error_bound(
         initial_errors,
@@ -559,7 +573,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_current_error_effect(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(filtered_coupling_effect_per_unit[AIRSPEED_SIDE_FORCE_COUPLING_INDEX]),
+        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX]),
     )
     max_error_change_effect_on_density = (
         2.0
@@ -572,7 +586,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         AIRSPEED_HYPOTHESIS,
         max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
         + max_error_change_effect_on_density,
-        abs(filtered_coupling_effect_per_unit[AIRSPEED_DENSITY_COUPLING_INDEX]),
+        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX]),
     )
 
 
@@ -580,7 +594,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
 def update_initial_error_bounds(redundancy, initial_errors, readings):
     """Update all bounds by the sample whose readings (N_SENSORS,) have just been tested."""
     if max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD:  # the tests of the attitude restart
-        initial_errors.filtered_coupling_effect_per_unit_error[:] = 0.0
+        initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
     update_error_change_bounds(redundancy, initial_errors)
     fill_effects_per_unit_error(redundancy, initial_errors, readings)

@@ -108,7 +108,7 @@ THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
 ALPHA_HYPOTHESIS, BETA_HYPOTHESIS, AIRSPEED_HYPOTHESIS, PHI_HYPOTHESIS, THETA_HYPOTHESIS = range(5)
-N_INITIAL_ERROR_HYPOTHESES, N_INITIAL_ERROR_COUPLINGS = 5, 14
+N_INITIAL_ERROR_HYPOTHESES, N_SIGNED_INITIAL_ERROR_EFFECTS = 5, 14
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
 # sample, the first for each second of it. residual_per_gust_speed: effect on the residual of 1 m/s that a
@@ -160,8 +160,8 @@ INITIAL_ERRORS_RECORD = record(
     max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST),
     filtered_max_effect_per_unit_error=(N_INITIAL_ERROR_HYPOTHESES, RPM_TEST, N_POLES),
     # effects of a unit with their sign
-    coupling_effect_per_unit_error=N_INITIAL_ERROR_COUPLINGS,
-    filtered_coupling_effect_per_unit_error=(N_INITIAL_ERROR_COUPLINGS, N_POLES),
+    signed_effect_per_unit_error=N_SIGNED_INITIAL_ERROR_EFFECTS,
+    filtered_signed_effect_per_unit_error=(N_SIGNED_INITIAL_ERROR_EFFECTS, N_POLES),
     is_refuted_by_test=(int, N_INITIAL_ERROR_HYPOTHESES, N_TESTS),  # since the alarm
 )  # fmt: skip
 

@@ -34,7 +34,8 @@ from beaver_ftc.scenario.schema import Scenario
 def diagnosis_dtype(n_surfaces: int, record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The stages of the diagnosis of an aircraft with n surfaces; record_size: rooms of its record."""
     return record(
-        config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n_surfaces, record_size.n_error_map_boxes),
+        config=state.SHARED_CONFIG_RECORD,
+        bound=bound_dtype(n_surfaces, record_size.n_model_error_bound_boxes),
         bank=filters.BANK_RECORD,
         fdae=filters.FDAE_RECORD,
         verdict=conclusions.conclusion_dtype(n_surfaces), layout=state.layout_dtype(n_surfaces),

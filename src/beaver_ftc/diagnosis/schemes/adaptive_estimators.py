@@ -102,7 +102,7 @@ def update_isolation_estimators(fdi, prediction):
     )
     if is_detected:
         isolation.advance_estimators(
-            isolation_record, bound_record, prediction.x_before, frame_means.acceleration, config.dt
+            isolation_record, bound_record, prediction.x_before, frame_means.predicted_acceleration, config.dt
         )
 
 
@@ -381,7 +381,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity.update_view_directions_and_signatures(
         parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
     )
-    parity.project_innovation(
+    parity.fill_view_innovations_and_noise(
         parity_views,
         test_config.has_regressors,
         statistical_detector.noise,
@@ -445,7 +445,7 @@ def add_instant_to_statistical_tests(fdi, prediction, measured):
         fdi.statistical,
         prediction.frame_share_per_instant * fdi.config.dt,
     )
-    statistical.add_instant_to_tests(
+    statistical.add_instant_to_gust_and_regressors(
         statistical_detector.test_config,
         statistical_detector.noise,
         statistical_detector.block,
@@ -503,7 +503,12 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     conclusion_record, bound_record, dt = fdi.verdict, fdi.bound, fdi.config.dt
     filters.update_bank(
-        fdi.bank, bound_record, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+        fdi.bank,
+        bound_record,
+        measured.x,
+        prediction.x_before,
+        prediction.frame_means.predicted_acceleration,
+        dt,
     )
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)

@@ -203,12 +203,23 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
     filters.update_bank(
-        fdi.bank, bound_record, measured.x, prediction.x_before, prediction.frame_means.acceleration, dt
+        fdi.bank,
+        bound_record,
+        measured.x,
+        prediction.x_before,
+        prediction.frame_means.predicted_acceleration,
+        dt,
     )
     adaptive_estimators.update_isolation_estimators(fdi, prediction)
     train_fdae_network(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(
-        fdi.fdae, bound_record, prediction.x_before, prediction.frame_means.acceleration, False, False, dt
+        fdi.fdae,
+        bound_record,
+        prediction.x_before,
+        prediction.frame_means.predicted_acceleration,
+        False,
+        False,
+        dt,
     )
     if published_record.config.constant_threshold > 0.0:
         set_all_constant_thresholds(fdi, published_record.config.constant_threshold)

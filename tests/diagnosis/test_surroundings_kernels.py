@@ -394,13 +394,13 @@ def test_what_is_known_of_a_fault_is_expected(offsets_count):
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
     mean = prediction["frame_means"]
     mean["G"], mean["Gu"] = rng.normal(size=(2, 3, 4))
-    mean["acceleration"] = rng.normal(size=3)
+    mean["predicted_acceleration"] = rng.normal(size=3)
     effectiveness, offset = np.array([0.4, 1.0, 0.0, 1.0]), np.array([0.1, 0, -0.2, 0])
     model_prediction.predict_acceleration(prediction, 0, effectiveness, offset, offsets_count)
-    assert (prediction["acceleration_with_known_faults"] == mean["acceleration"]).all()
+    assert (prediction["acceleration_with_known_faults"] == mean["predicted_acceleration"]).all()
     model_prediction.predict_acceleration(prediction, 1, effectiveness, offset, offsets_count)
     off = mean["G"] @ offset if offsets_count else 0.0
-    expected = mean["acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
+    expected = mean["predicted_acceleration"] + mean["Gu"] @ (effectiveness - 1.0) + off
     assert prediction["acceleration_with_known_faults"] == pytest.approx(expected)
     prediction["x_before"], x = (0.1, 0.2, 0.3), np.array([0.3, 0.1, 0.3])
     model_prediction.form_innovation_after_known_faults(prediction, x, 0.5)

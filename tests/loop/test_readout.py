@@ -132,7 +132,7 @@ def test_instruments_change_with_the_flight_that_they_read():
 
 def test_each_number_of_a_frame_is_read_from_its_own_field():
     """A record in which no two numbers are alike: each readout is counted off by hand."""
-    means = np.dtype([("G", float, (3, 2)), ("acceleration", float, 3)])
+    means = np.dtype([("G", float, (3, 2)), ("predicted_acceleration", float, 3)])
     actuators = np.dtype([(name, float, 2) for name in ("step", "approach", "high", "low")])
     prediction = np.dtype(
         [("u", float, 2), ("G", float, (3, 2)), ("frame_means", means), ("actuators", actuators)]

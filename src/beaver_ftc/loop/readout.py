@@ -177,7 +177,7 @@ def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[s
     acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
     `diagnosis.readout.recorded_always`."""
     means = frame["prediction"]["frame_means"]
-    own = {"x": frame["measured"]["x"], "model": means["acceleration"]}
+    own = {"x": frame["measured"]["x"], "model": means["predicted_acceleration"]}
     return own | of_diagnosis.certificate_arrays_of_every_frame(frame["fdi"], n, diagnoses_all_types)
 
 

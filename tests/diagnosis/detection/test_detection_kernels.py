@@ -206,7 +206,9 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     assert fdi["bound"]["gyro_error_change_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
     assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
     assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
-    assert mean["acceleration"] == pytest.approx(np.mean([f + G @ u for f, G, u, *_ in seen], axis=0))
+    assert mean["predicted_acceleration"] == pytest.approx(
+        np.mean([f + G @ u for f, G, u, *_ in seen], axis=0)
+    )
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)

@@ -655,7 +655,7 @@ def demand(law, reference, surfaces, main, transfer_share, prediction, measured)
         prediction.frame_means,
     )
     schedule(config, memory, measured.y[QDYN], transfer_share)
-    observe(law, surfaces, main, measured.x, means.acceleration, means.Gu, means.G)
+    observe(law, surfaces, main, measured.x, means.predicted_acceleration, means.Gu, means.G)
     if memory.estimator.active:
         estimate(
             memory.estimator, memory.innovation, memory.L_rate, memory.L_disturbance, config.dt, measured.x,

@@ -123,14 +123,14 @@ def _label_axis(axis: Any, label: str, **grid: Any) -> None:
     axis.grid(color="#dddddd", linewidth=0.5, **grid)
 
 
-def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], label: str) -> None:
+def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
     shown_rows = slice(None, None, max(len(t_s) // _MAX_PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(
             t_s[shown_rows], values[shown_rows, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name
         )
     axis.legend(loc="upper left", fontsize=7, ncols=4, framealpha=0.8)
-    _label_axis(axis, label)
+    _label_axis(axis, y_label)
 
 
 def _draw_effectiveness(axis: Any, rows: DiagnosisRows, surface_index: int, bounds_label: str) -> None:
@@ -325,9 +325,9 @@ def _rates_and_residual_in_liveliest_window(
 
 def _first_row_of_liveliest_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
     """First sample of the window in which the rates known moved most."""
-    squared_rates = np.zeros(len(rates))
-    squared_rates[rows] = (rates[rows] ** 2).sum(axis=1)
-    cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_rates)])
+    squared_rate_norms = np.zeros(len(rates))
+    squared_rate_norms[rows] = (rates[rows] ** 2).sum(axis=1)
+    cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_rate_norms)])
     return (
         int(np.argmax(cumulated_squares[window_samples:] - cumulated_squares[:-window_samples]))
         if len(rates) > window_samples
@@ -345,8 +345,8 @@ def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], mod
     axis = figure.subplots()
     for i, name in enumerate("pqr"):
         axis.loglog(frequency_hz[1:], density[1:, i], color=SERIES[i], linewidth=1.1, label=name)
-        white_density = residual[:, i].var() / (0.5 * model.rate_hz)
-        axis.axhline(white_density, color=SERIES[i], linewidth=0.7, linestyle=":")
+        white_noise_density = residual[:, i].var() / (0.5 * model.rate_hz)
+        axis.axhline(white_noise_density, color=SERIES[i], linewidth=0.7, linestyle=":")
     axis.set_xlabel("frequency, Hz", fontsize=8)
     axis.set_title("residual (dotted: white noise of the same variance)", fontsize=9, loc="left")
     _label_axis(axis, "density, (rad/s)² / Hz", which="both")

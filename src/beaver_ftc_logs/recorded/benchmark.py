@@ -36,7 +36,7 @@ from beaver_ftc_logs.samples import Samples, read_for_vehicle, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]
-SCORE_TITLES = {
+LABEL_SCORE_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
@@ -248,10 +248,11 @@ def summarize_label_scores(part_scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
     part_scores = [one for one in part_scores if one["rows"]]
     if not part_scores:
-        return {**dict.fromkeys(SCORE_TITLES), "rows": 0}
+        return {**dict.fromkeys(LABEL_SCORE_TITLES), "rows": 0}
     row_counts = np.array([one["rows"] for one in part_scores], dtype=float)
     means = {
-        key: float(np.average([one[key] for one in part_scores], weights=row_counts)) for key in SCORE_TITLES
+        key: float(np.average([one[key] for one in part_scores], weights=row_counts))
+        for key in LABEL_SCORE_TITLES
     }
     return means | {"rows": int(row_counts.sum())}
 
@@ -274,7 +275,7 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    header = ["day", *SCORE_TITLES.values(), "classes by sliding least squares"]
+    header = ["day", *LABEL_SCORE_TITLES.values(), "classes by sliding least squares"]
     titled_tables = []
     for data_set in document["sets"]:
         table_rows = [
@@ -292,10 +293,10 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
 
 
 def _score_texts(row: Document) -> list[str]:
-    return [f"{row[key]:.3f}" for key in (*SCORE_TITLES, "beside")]
+    return [f"{row[key]:.3f}" for key in (*LABEL_SCORE_TITLES, "beside")]
 
 
-LABEL_TABLE_HEADER = ["method", *SCORE_TITLES.values()]
+LABEL_TABLE_HEADER = ["method", *LABEL_SCORE_TITLES.values()]
 FAILURE_TABLE_HEADER = [
     "method", "precision", "recall", "accuracy", "mean delay, s: aileron", "rudder", "elevator",
     "ailerons and rudders within 5 s", "false alarms an hour (95 %)", "healthy flights with an alarm",
@@ -304,7 +305,7 @@ FAILURE_TABLE_HEADER = [
 
 
 def _label_score_cells(row: Document) -> list[str]:
-    return [row["method"], *_score_texts_or_empty(row, SCORE_TITLES)]
+    return [row["method"], *_score_texts_or_empty(row, LABEL_SCORE_TITLES)]
 
 
 def _failure_score_cells(row: Document) -> list[str]:
@@ -317,13 +318,13 @@ def _failure_score_cells(row: Document) -> list[str]:
     ]
     if "false_alarms_per_hour" not in row:
         return cells + [""] * (len(FAILURE_TABLE_HEADER) - len(cells))
-    n_within_5_s, n_failures = (
+    n_ailerons_and_rudders_within_5_s, n_aileron_and_rudder_failures = (
         sum(delay_summary[key] for delay_summary in delay_summaries[:2]) for key in ("within_5_s", "failures")
     )
     false_alarm_rate = row["false_alarms_per_hour"]
     return [
         *cells,
-        f"{n_within_5_s} of {n_failures}",
+        f"{n_ailerons_and_rudders_within_5_s} of {n_aileron_and_rudder_failures}",
         f"{false_alarm_rate['value']:.1f} ({false_alarm_rate['low']:.1f} to {false_alarm_rate['high']:.1f})",
         f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
         str(row["wrong_group"]),
@@ -394,23 +395,24 @@ def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
     methods = _method_titles(data_set)
     failure_of_flight = {one["left_out"]: one["failure"] for one in data_set["flights"]}
-    failed_surfaces = [
+    distinct_surface_failures = [
         failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
     ]
-    for i, failed_surface in enumerate(failed_surfaces):
-        shown_flights = [
+    for i, surface_failure in enumerate(distinct_surface_failures):
+        entries_of_failure = [
             one
             for one in data_set["flights"]
-            if one["failure"] == failed_surface and one["method"] in methods
+            if one["failure"] == surface_failure and one["method"] in methods
         ]
         delays_s = [
-            _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"] for one in shown_flights
+            _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"]
+            for one in entries_of_failure
         ]
         mark_heights = [
-            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(failed_surfaces) - 0.5)
-            for one in shown_flights
+            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
+            for one in entries_of_failure
         ]
-        label = failed_surface.replace("_", " ").replace("+", " + ")
+        label = surface_failure.replace("_", " ").replace("+", " + ")
         axis.plot(
             [min(delay, _MAX_SHOWN_DELAY_S + 1.0) for delay in delays_s],
             mark_heights,

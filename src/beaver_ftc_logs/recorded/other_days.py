@@ -252,7 +252,7 @@ def _score_days(
 
 def _summarize_days(kind: str, rows: Sequence[Document]) -> Document:
     """Mean and worst of each figure."""
-    values_of_score = {key: [row[key] for row in rows] for key in (*benchmark.SCORE_TITLES, "beside")}
+    values_of_score = {key: [row[key] for row in rows] for key in (*benchmark.LABEL_SCORE_TITLES, "beside")}
     mean = {key: float(np.mean(score_values)) for key, score_values in values_of_score.items()}
     return {
         "kind": kind,

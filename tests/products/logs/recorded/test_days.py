@@ -136,7 +136,7 @@ def test_commands_that_act_later_were_logged_earlier(length):
     np.testing.assert_allclose(found[:, 1], np.interp(at, np.arange(6), values[:, 1]))
 
 
-ROW = dict(zip((*benchmark.SCORE_TITLES, "beside"), (0.9, 0.8, 0.7, 0.1, 0.6, 0.5), strict=True))
+ROW = dict(zip((*benchmark.LABEL_SCORE_TITLES, "beside"), (0.9, 0.8, 0.7, 0.1, 0.6, 0.5), strict=True))
 
 
 def test_mean_and_worst_of_days():
@@ -171,7 +171,7 @@ def test_a_labelled_flight_on_other_days(changed, monkeypatch, data):
     given = replace(data, recordings=data.flights)
     ours, beside = benchmark._compare_methods(given)["rows"]
     as_it_was = document["rows"][0]
-    for key in benchmark.SCORE_TITLES:
+    for key in benchmark.LABEL_SCORE_TITLES:
         assert as_it_was[key] == pytest.approx(ours[key])
     assert as_it_was["beside"] == pytest.approx(beside["classes"])
 

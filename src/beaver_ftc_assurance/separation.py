@@ -233,7 +233,7 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
-        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.gyro_error_change_bound_rad_s / dt),
+        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,

@@ -129,8 +129,8 @@ def of_stages(fdi, kernel):
         "innovation": fdi["bank"]["output"]["innovation"],
         **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
         "innovation_bound": fdi["bound"]["frame_innovation_bound"],
-        **dict.fromkeys(("noise", "gyro_error_change_bound"), fdi["bound"]["gyro_error_change_bound"]), "dt":
-        fdi["config"]["dt"],
+        **dict.fromkeys(("noise", "changing_gyro_error_bound"), fdi["bound"]["changing_gyro_error_bound"]),
+        "dt": fdi["config"]["dt"],
         **dict.fromkeys(("statistical_alarm", "statistical_alarm_record"), fdi["statistical"]["alarm"]),
         **({"k": types["frame_index"] if later else types["frame_index"] - 1} if whole else {}),
     }  # fmt: skip

@@ -9,7 +9,7 @@ from beaver_ftc.design.model import both_responses, design_record
 from beaver_ftc.diagnosis.bounds import (
     add_declared_error_bound,
     detection_poles_for_noise,
-    fill_acceleration_error_per_rad,
+    fill_acceleration_error_bound_per_rad,
     max_inertia_coefficient_errors,
 )
 from beaver_ftc.diagnosis.detection.filters import advance_gyro_error_bound
@@ -170,11 +170,11 @@ def test_a_surfaces_own_share_of_the_bound_is_its_slope(seed, surface):
     add_declared_error_bound(
         frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, np.zeros(3)
     )
-    fill_acceleration_error_per_rad(
+    fill_acceleration_error_bound_per_rad(
         frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], surface
     )
     rise = bound(x, y, further, **bounds) - bound(x, y, u, **bounds)
-    assert frame["fdi"]["bound"]["declared_errors"]["acceleration_error_per_rad"][
+    assert frame["fdi"]["bound"]["declared_errors"]["acceleration_error_bound_per_rad"][
         :, surface
     ] == pytest.approx(rise, abs=1e-9)
     assert rise.max() > 0.1

@@ -30,17 +30,17 @@ def records(seed=0, gust=0.02, deflection=0.004):
     declared_errors["coefficient_tolerance"][: len(AIRCRAFT.moments)] = rng.uniform(
         0.001, 0.05, len(AIRCRAFT.moments)
     )
-    declared_errors["inertia_tolerance"] = rng.uniform(0.001, 0.1, 12)
-    declared_errors["signal_error_offset"] = rng.uniform(0.001, 0.01, 7) * [1, 1, 1, 1, 1, 100, 2000]
-    declared_errors["signal_error_slope"] = rng.uniform(0.001, 0.02, 7)
+    declared_errors["inertia_coefficient_tolerance"] = rng.uniform(0.001, 0.1, 12)
+    declared_errors["signal_error_bound_at_zero"] = rng.uniform(0.001, 0.01, 7) * [1, 1, 1, 1, 1, 100, 2000]
+    declared_errors["signal_error_bound_per_unit"] = rng.uniform(0.001, 0.02, 7)
     declared_errors["air_rotation_bound"], declared_errors["deflection_error_bound"] = gust, deflection
     return declared_errors, design
 
 
 def furthest(declared_errors, i, reading):
     """The largest truth that reads so: |reading - truth| <= offset + slope |truth|."""
-    return (abs(reading) + declared_errors["signal_error_offset"][i]) / (
-        1.0 - declared_errors["signal_error_slope"][i]
+    return (abs(reading) + declared_errors["signal_error_bound_at_zero"][i]) / (
+        1.0 - declared_errors["signal_error_bound_per_unit"][i]
     )
 
 
@@ -78,7 +78,7 @@ def by_terms(declared_errors, design, u):
 
     def slack(name, near, far):
         value = abs(design[name])
-        return (value + declared_errors["inertia_tolerance"][order[name]]) * far - value * near
+        return (value + declared_errors["inertia_coefficient_tolerance"][order[name]]) * far - value * near
 
     def rates(name, i, j):
         return slack(name, abs(X[i] * X[j]), largest_x[i] * largest_x[j])
@@ -104,14 +104,14 @@ def test_the_bound_is_the_sum_of_what_each_product_can_grow_by(seed):
     bound, slopes = by_terms(declared_errors, design, U)
     assert out == pytest.approx(bound + np.array([0.1, 0.2, 0.3]), rel=1e-9)
     for s in range(4):
-        bounds.fill_acceleration_error_per_rad(declared_errors, design, s)
-    assert declared_errors["acceleration_error_per_rad"] == pytest.approx(slopes, rel=1e-9)
+        bounds.fill_acceleration_error_bound_per_rad(declared_errors, design, s)
+    assert declared_errors["acceleration_error_bound_per_rad"] == pytest.approx(slopes, rel=1e-9)
     assert slopes.max() > 0.01
 
 
 def test_the_airspeed_reckoned_with_is_a_tenth_of_the_reading_at_least():
     declared_errors, _ = records()
-    declared_errors["signal_error_offset"][5] = 43.0
+    declared_errors["signal_error_bound_at_zero"][5] = 43.0
     bounds.fill_signal_magnitudes(declared_errors, X, Y, U)
     assert declared_errors["magnitude_bound_y"][2] == pytest.approx(4.4)
 
@@ -119,8 +119,8 @@ def test_the_airspeed_reckoned_with_is_a_tenth_of_the_reading_at_least():
 def test_an_error_is_what_the_truth_may_be_off_and_of_a_gyro_what_changes():
     declared_errors, _ = records()
     (
-        declared_errors["signal_error_offset"][1],
-        declared_errors["signal_error_slope"][1],
+        declared_errors["signal_error_bound_at_zero"][1],
+        declared_errors["signal_error_bound_per_unit"][1],
         declared_errors["constant_gyro_error_bound"][1],
     ) = (
         0.03,
@@ -141,9 +141,9 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
     y = Y.copy()
     y[4] = dpt
     (
-        declared_errors["has_engine_errors"],
-        declared_errors["engine_power_error_kw"],
-        declared_errors["density_power_error_kw"],
+        declared_errors["has_engine_instrument_errors"],
+        declared_errors["power_error_kw_by_instruments"],
+        declared_errors["power_error_kw_per_density_ratio"],
     ) = (
         engine,
         2.0,
@@ -169,15 +169,21 @@ def test_a_slipstream_worked_out_from_instruments_is_off_at_the_corner_of_their_
 
 def test_errors_as_large_as_the_reading_leave_a_tenth_of_it():
     declared_errors, _ = records()
-    declared_errors["engine_power_error_kw"], declared_errors["density_power_error_kw"] = 2.0, 0.0
-    declared_errors["signal_error_slope"], declared_errors["signal_error_offset"] = (
+    declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
+        2.0,
+        0.0,
+    )
+    declared_errors["signal_error_bound_per_unit"], declared_errors["signal_error_bound_at_zero"] = (
         0.0,
         (0, 0, 0, 0, 0, 2.0 * Y[2], 2.0 * Y[3]),
     )
     stretch = 1.0 / (0.1 * 0.1)
     expected = stretch * KW_TO_DPT * 2.0 / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)
     assert bounds.slipstream_error_bound(declared_errors, Y) == pytest.approx(expected)
-    declared_errors["engine_power_error_kw"], declared_errors["density_power_error_kw"] = 0.0, 1.0
+    declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
+        0.0,
+        1.0,
+    )
     denser = (1.0 + 2.0) / 0.1**2 - 1.0
     ratio = 2.0 * Y[3] / Y[2] ** 2 / SEA_LEVEL_DENSITY_KG_M3
     expected = stretch * KW_TO_DPT * denser * ratio / (Y[3] * Y[2]) + (stretch - 1.0) * (Y[4] - DPT_0)

@@ -51,7 +51,7 @@ def admit(**bounds):
 
 def test_every_declared_bound_stands_in_the_record():
     record = admit(inertia=0.05, deflection_deg=0.5, coefficients={"Cm_alpha": 0.2}, sensors="ideal")
-    assert record["inertia_tolerance"] == pytest.approx(
+    assert record["inertia_coefficient_tolerance"] == pytest.approx(
         bound_kernels.max_inertia_coefficient_errors(0.05, AIRCRAFT.mass)
     )
     assert record["deflection_error_bound"] == pytest.approx(np.radians(0.5))
@@ -59,7 +59,7 @@ def test_every_declared_bound_stands_in_the_record():
     assert record["coefficient_tolerance"][index] == pytest.approx(0.2 * abs(AIRCRAFT.moments[index].value))
     assert np.count_nonzero(record["coefficient_tolerance"]) == 1
     assert record["has_declared_errors"]
-    assert not record["signal_error_offset"].any()
+    assert not record["signal_error_bound_at_zero"].any()
     everything = admit(coefficients=0.1)
     values = np.array([term.value for term in AIRCRAFT.moments])
     assert everything["coefficient_tolerance"][: values.size] == pytest.approx(0.1 * np.abs(values))
@@ -88,11 +88,13 @@ def test_a_reading_is_off_by_four_sigma_its_bias_and_half_a_step():
     record = admit(sensors=sensors)
     names = list(SIGNALS)
     q, V = names.index("q"), names.index("V")
-    assert record["signal_error_offset"][q] == pytest.approx(np.radians(4.0 * 0.02 + 0.1 + 0.02))
+    assert record["signal_error_bound_at_zero"][q] == pytest.approx(np.radians(4.0 * 0.02 + 0.1 + 0.02))
     assert record["constant_gyro_error_bound"] == pytest.approx([0.0, np.radians(0.1), 0.0])
-    assert record["signal_error_slope"][V] == pytest.approx(0.01)
+    assert record["signal_error_bound_per_unit"][V] == pytest.approx(0.01)
     assert (
-        np.count_nonzero(record["signal_error_offset"]) == np.count_nonzero(record["signal_error_slope"]) == 1
+        np.count_nonzero(record["signal_error_bound_at_zero"])
+        == np.count_nonzero(record["signal_error_bound_per_unit"])
+        == 1
     )
 
 

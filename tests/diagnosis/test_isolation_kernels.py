@@ -27,7 +27,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
     rng, fdi = np.random.default_rng(seed), new_fdi()
     fie = estimator(fdi, kind, low=-1.0, high=0.6)
     fdi["isolation"]["config"]["shares_theta_across_axes"], x = shared, rng.normal(size=3)
-    fdi["bound"]["gyro_error_change_bound"] = 0.004, 0.005, 0.006
+    fdi["bound"]["changing_gyro_error_bound"] = 0.004, 0.005, 0.006
     on(isolation.start_estimators, fdi, x)
     fed = {name: [] for name in ("Z", "eta", "eta_bar", "noise_before", "spread")}
     for _ in range(frames):
@@ -44,7 +44,7 @@ def run_estimator(shared, theta, kind=LOSS, frames=25, eta_share=1.0, seed=0):
             offset,
             spread,
         )
-        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta_bar, noise_before
+        fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta_bar, noise_before
         isolation.update_residual_and_thresholds(fie, fdi["isolation"]["config"]["threshold_kind"], x)
         on(isolation.advance_estimators, fdi, x, believed)
         x = x + DT * (believed + offset + theta * Z + eta)
@@ -89,7 +89,7 @@ def test_a_start_knows_nothing_but_the_set_of_theta():
     fdi = new_fdi()
     fie = estimator(fdi, low=-0.4, high=0.8)
     fie["feasible_theta_min"] = fie["feasible_theta_max"] = 0.3
-    fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
+    fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2, 0.3
     on(isolation.start_estimators, fdi, np.array([1.0, 2.0, 3.0]))
     assert fie["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fie["filtered_gyro_error_bound"] == pytest.approx([0.1, 0.2, 0.3])
@@ -355,8 +355,8 @@ def test_errors_of_a_surfaces_own_terms_widen_the_room_of_its_position(kind, err
     fie = estimator(fdi, kind, surface=2, low=-0.5, high=0.5)
     G, Gu = rng.normal(size=(2, 3, 4))
     (
-        fdi["bound"]["has_declared_surface_errors"],
-        fdi["bound"]["surface_effect_error_per_rad"],
+        fdi["bound"]["has_surface_term_errors"],
+        fdi["bound"]["surface_term_error_bound_per_rad"],
         fdi["bound"]["frame_innovation_bound"],
     ) = (
         errors,

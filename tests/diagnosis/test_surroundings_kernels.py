@@ -12,7 +12,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record, fill_table, regressors, response
 from beaver_ftc.diagnosis import bounds, conclusion, gusts, isolation, model_prediction, schemes
-from beaver_ftc.diagnosis.bounds import error_map_dtype
+from beaver_ftc.diagnosis.bounds import error_bound_table_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE
@@ -212,7 +212,7 @@ def test_filters_of_bounds_are_those_of_residuals():
 
 
 def new_map(**fields):
-    record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
+    record = np.zeros(1, error_bound_table_dtype(4)).view(np.recarray)[0]
     record["n_boxes"], record["n_travel_levels"], record["n_time_rows"] = 2, 3, 2
     record["is_outside_all_boxes"] = 7
     record["box_low"], record["box_high"] = -1e6, 1e6
@@ -235,25 +235,24 @@ def new_map(**fields):
     ],
 )  # fmt: skip
 def test_the_level_is_the_first_share_of_the_travel_that_covers_the_surfaces(u, level):
-    assert bounds.map_travel_level_index_for_positions(new_map(), np.array(u)) == level
+    assert bounds.travel_level_index_for_positions(new_map(), np.array(u)) == level
     assert (
-        bounds.map_travel_level_index_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u))
-        == 2
+        bounds.travel_level_index_for_positions(new_map(several_surfaces_may_be_anywhere=1), np.array(u)) == 2
     )
 
 
 def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
     up_only = new_map(travel_low=(-0.4, -0.4, -0.2, 0.0))
-    assert bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
-    assert bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
+    assert bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, -0.01])) == 2
+    assert bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.25])) == 0
     assert (
-        bounds.map_travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
+        bounds.travel_level_index_for_positions(up_only, np.array([0, 0, 0, 0.0])) == 0
     )  # at rest at an end it uses none
 
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.error_map_time_row_index(new_map(time_s=time_s)) == age
+    assert bounds.error_bound_table_time_row_index(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -270,7 +269,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record, out = new_map(time_s=time_s), np.full(3, 0.5)
     y = Y.copy()
     y[2] = airspeed
-    bounds.add_map_error(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.add_tabulated_error_bound(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
     expected = record["error_bound"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert out == pytest.approx(0.5 + expected)
@@ -335,7 +334,10 @@ def test_the_drift_is_of_what_is_bounded_and_of_the_air_not_seen(moving):
         record["gust"]["config"]["rolling_gust_correlation_length"],
         record["gust"]["config"]["wing_span"],
     ) = moving, 20.0, 5.0 * np.pi
-    fdi["bound"]["constant_error_bound"], fdi["bound"]["inertia_coupling"] = (0.02, 0.0, 0.04), 0.1
+    fdi["bound"]["constant_error_bound"], fdi["bound"]["inertia_coupling_error_share"] = (
+        (0.02, 0.0, 0.04),
+        0.1,
+    )
     Statistical.drifts(record, fdi, design, X, Y)
     bounded = np.zeros(3)
     bounds.add_published_bound(X, design, np.full(3, 0.1), np.array([0.02, 0.0, 0.04]), 0.0, bounded)

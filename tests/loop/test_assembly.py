@@ -92,7 +92,8 @@ EXPECTED = {
     "fdi.isolation.config.n_estimators": 8,
     "fdi.fdae.network.config.learning_gain": 45.0, "fdi.fdae.network.config.leak_per_s": 0.8,
     "fdi.fdae.network.config.weight_limit": 15.0,
-    "fdi.bound.inertia_coupling": (0.1, 0.2, 0.3), "fdi.bound.constant_error_bound": (0.01, 0.02, 0.03),
+    "fdi.bound.inertia_coupling_error_share": (0.1, 0.2, 0.3),
+    "fdi.bound.constant_error_bound": (0.01, 0.02, 0.03),
     "fdi.bound.earth_rate_rad_s": 7.292115e-5,  # rad/s [WGS84]
     "fdi.verdict.detected_at_s": -1.0, "fdi.verdict.isolated_at_s": -1.0, "fdi.verdict.fault_type": -1,
     "fdi.verdict.type_decided_at_s": -1.0, "fdi.verdict.accommodated_surface": -1,

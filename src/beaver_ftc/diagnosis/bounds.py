@@ -18,9 +18,9 @@ A derived aircraft declares a map of its model's error. The map has a few boxes 
 other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
 within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
 acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `additional_error_by_travel_level`, belongs to the hypothesis
-that it is off its command (isolation.py). If two surfaces may be off, the bound itself takes the whole
-travel. Outside all boxes nothing has been measured, so nothing is concluded.
+be anywhere: the additional error of its share, `additional_error_bound_by_travel_level`, belongs to the
+hypothesis that it is off its command (isolation.py). If two surfaces may be off, the bound itself takes the
+whole travel. Outside all boxes nothing has been measured, so nothing is concluded.
 
 Variances: for plug-ins, and for the filters and tests of the statistical detector.
 """
@@ -71,7 +71,7 @@ if TYPE_CHECKING:
 _FIRST_AIR_DATA_SIGNAL_INDEX = (
     3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 )
-_MIN_TRUE_AIRSPEED_SHARE = 0.1
+_MIN_TRUE_OVER_MEASURED_AIRSPEED = 0.1
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
@@ -89,9 +89,9 @@ def declared_errors_dtype(n: int) -> np.dtype:
     return record(
         has_declared_errors=int,
         coefficient_tolerance=MAX_TERMS,  # of each moment coefficient, as the design model has them
-        inertia_tolerance=12,  # of each inertia coefficient, in the order of design.model
+        inertia_coefficient_tolerance=12,  # of each inertia coefficient, in the order of design.model
         # error of a signal: offset + slope |signal|
-        signal_error_offset=7, signal_error_slope=7,
+        signal_error_bound_at_zero=7, signal_error_bound_per_unit=7,
         constant_gyro_error_bound=3,  # of the offset of a gyro, what does not change
         air_rotation_bound=3, deflection_error_bound=float,
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
@@ -99,19 +99,20 @@ def declared_errors_dtype(n: int) -> np.dtype:
         air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_offset_m=float,
         altitude_error_slope=float,
         # of dpt: see `slipstream_error_bound`
-        has_engine_errors=int, engine_power_error_kw=float, density_power_error_kw=float,
+        has_engine_instrument_errors=int, power_error_kw_by_instruments=float,
+        power_error_kw_per_density_ratio=float,
         # scratch: magnitudes as measured, and as large as they can be
         magnitude_x=3, magnitude_y=N_Y, magnitude_u=n, max_magnitude_x=3, magnitude_bound_y=N_Y,
         max_magnitude_u=n, max_air_relative_rate=3,
         signal_magnitude=N_SIGNALS,
         monomial_magnitude=MAX_MONOMIALS, max_monomial_magnitude=MAX_MONOMIALS,
-        acceleration_error_per_rad=(3, n), moment_magnitude=3,
+        acceleration_error_bound_per_rad=(3, n), moment_term_magnitude_sum=3,
         moment_error_bound=3,
     )  # fmt: skip
 
 
 @sized
-def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
+def error_bound_table_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
     one_surface_may_be_anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere:
@@ -136,26 +137,26 @@ def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
 @sized
 def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty. eta_bar, eta_bar_now: over the elapsed frame and at this instant, rad/s2.
-    gyro_error_change_bound: on the change of a gyro's error, rad/s. frame_innovation_bound: on the innovation
-    of one frame, rad/s2. surface_effect_error_per_rad, surface_effect_error_at_command: error of each
-    surface's own terms in the acceleration, per rad of deflection (rad/s2 per rad) and at the command
-    (rad/s2), means over the frame.
-    additional_error_by_travel_level: by how much the map's error with a surface at each share of its travel
-    exceeds that in eta_bar."""
+    changing_gyro_error_bound: on the changing part of a gyro's error, rad/s. frame_innovation_bound: on the
+    innovation of one frame, rad/s2. surface_term_error_bound_per_rad, surface_term_error_bound_at_command: on
+    the error of each surface's own terms in the acceleration, per rad of deflection (rad/s2 per rad) and at
+    the command (rad/s2), means over the frame.
+    additional_error_bound_by_travel_level: by how much the map's error with a surface at each share of its
+    travel exceeds that in eta_bar."""
     return record(
-        inertia_coupling=3, constant_error_bound=3, earth_rate_rad_s=float,
+        inertia_coupling_error_share=3, constant_error_bound=3, earth_rate_rad_s=float,
         declared_errors=declared_errors_dtype(n),
-        model_error_map=error_map_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3, gyro_error_change_bound=3,
-        gyro_error_change_bound_before=3,
+        model_error_bound_table=error_bound_table_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3,
+        changing_gyro_error_bound=3, changing_gyro_error_bound_before=3,
         frame_innovation_bound=3,
-        has_declared_surface_errors=int,
-        surface_effect_error_per_rad=(3, n), surface_effect_error_at_command=(3, n),
-        additional_error_by_travel_level=(MAX_LEVELS, 3),
+        has_surface_term_errors=int, surface_term_error_bound_per_rad=(3, n),
+        surface_term_error_bound_at_command=(3, n),
+        additional_error_bound_by_travel_level=(MAX_LEVELS, 3),
     )  # fmt: skip
 
 
-def fill_error_map(
-    model_error_map: np.void,
+def fill_error_bound_table(
+    model_error_bound_table: np.void,
     aircraft: Aircraft,
     one_surface_may_be_anywhere: bool,
     several_surfaces_may_be_anywhere: bool,
@@ -166,39 +167,42 @@ def fill_error_map(
     if declared_error_map is None:
         return
     n_travel_levels, n_time_rows = len(declared_error_map.travel_share), len(declared_error_map.until_s)
-    model_error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
-    model_error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
-    model_error_map["n_boxes"] = len(declared_error_map.boxes)
-    model_error_map["n_travel_levels"], model_error_map["n_time_rows"] = n_travel_levels, n_time_rows
-    model_error_map["until_s"][:n_time_rows] = declared_error_map.until_s
-    model_error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
+    model_error_bound_table["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
+    model_error_bound_table["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
+    model_error_bound_table["n_boxes"] = len(declared_error_map.boxes)
+    model_error_bound_table["n_travel_levels"], model_error_bound_table["n_time_rows"] = (
+        n_travel_levels,
+        n_time_rows,
+    )
+    model_error_bound_table["until_s"][:n_time_rows] = declared_error_map.until_s
+    model_error_bound_table["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
     mapped_travel_share_of_surface = np.array(
         [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
-    model_error_map["travel_low"] = mapped_travel_share_of_surface * [
+    model_error_bound_table["travel_low"] = mapped_travel_share_of_surface * [
         travel.min_rad for travel in aircraft.travel.values()
     ]
-    model_error_map["travel_high"] = mapped_travel_share_of_surface * [
+    model_error_bound_table["travel_high"] = mapped_travel_share_of_surface * [
         travel.max_rad for travel in aircraft.travel.values()
     ]
     for box_index, box in enumerate(declared_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
-        model_error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
-        model_error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
-        errors_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        model_error_map["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
-            errors_by_axis, axis=-1
+        model_error_bound_table["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
+        model_error_bound_table["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
+        error_bound_tables_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
+        model_error_bound_table["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
+            error_bound_tables_by_axis, axis=-1
         )
-        model_error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
+        model_error_bound_table["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
 
 
 @kernel
 def reading_error_bound(declared_errors, signal_index, reading):
     """Bound the error of the reading of a signal, in its unit."""
     return (
-        declared_errors.signal_error_offset[signal_index]
-        + declared_errors.signal_error_slope[signal_index] * abs(reading)
-    ) / (1.0 - declared_errors.signal_error_slope[signal_index])
+        declared_errors.signal_error_bound_at_zero[signal_index]
+        + declared_errors.signal_error_bound_per_unit[signal_index] * abs(reading)
+    ) / (1.0 - declared_errors.signal_error_bound_per_unit[signal_index])
 
 
 @kernel
@@ -206,9 +210,9 @@ def changing_gyro_error_bound(declared_errors, axis, reading):
     """Bound the changing error of the gyro of an axis, rad/s: noise, resolution, slope times the true
     rate."""
     changing_error_bound_at_rest = (
-        declared_errors.signal_error_offset[axis] - declared_errors.constant_gyro_error_bound[axis]
+        declared_errors.signal_error_bound_at_zero[axis] - declared_errors.constant_gyro_error_bound[axis]
     )
-    return changing_error_bound_at_rest + declared_errors.signal_error_slope[axis] * (
+    return changing_error_bound_at_rest + declared_errors.signal_error_bound_per_unit[axis] * (
         abs(reading) + reading_error_bound(declared_errors, axis, reading)
     )
 
@@ -217,8 +221,9 @@ def changing_gyro_error_bound(declared_errors, axis, reading):
 def slipstream_error_bound(declared_errors, y):
     """Bound the error of dpt, which is computed from the engine's instruments and the air data.
 
-    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments engine_power_error_kw and by the
-    density density_power_error_kw for all of it; and the share that dynamic pressure and airspeed are off.
+    dpt = a + b P / (qdyn V) [FDC]: the power's error, by the instruments power_error_kw_by_instruments and by
+    the density power_error_kw_per_density_ratio for all of it; and the share that dynamic pressure and
+    airspeed are off.
     """
     relative_qdyn_error_bound = (
         reading_error_bound(declared_errors, _FIRST_AIR_DATA_SIGNAL_INDEX + QDYN, y[QDYN]) / y[QDYN]
@@ -234,8 +239,8 @@ def slipstream_error_bound(declared_errors, y):
         1.0 - min(relative_airspeed_error_bound, 0.9)
     ) ** 2 - 1.0
     power_error_bound_kw = (
-        declared_errors.engine_power_error_kw
-        + declared_errors.density_power_error_kw * relative_density_error_bound * density_ratio(y)
+        declared_errors.power_error_kw_by_instruments
+        + declared_errors.power_error_kw_per_density_ratio * relative_density_error_bound * density_ratio(y)
     )
     return max_qdyn_airspeed_reading_over_truth * KW_TO_DPT * power_error_bound_kw / (
         y[QDYN] * y[AIRSPEED]
@@ -259,21 +264,21 @@ def fill_signal_magnitudes(declared_errors, x, y, u):
         )
     for i in range(DPT, y.size):
         declared_errors.magnitude_y[i] = declared_errors.magnitude_bound_y[i] = abs(y[i])
-    if declared_errors.has_engine_errors:
+    if declared_errors.has_engine_instrument_errors:
         declared_errors.magnitude_bound_y[DPT] += slipstream_error_bound(declared_errors, y)
     for s in range(u.size):
         declared_errors.magnitude_u[s] = abs(u[s])
         declared_errors.max_magnitude_u[s] = abs(u[s]) + declared_errors.deflection_error_bound
     V = y[AIRSPEED]
     declared_errors.magnitude_bound_y[AIRSPEED] = max(
-        2.0 * V - declared_errors.magnitude_bound_y[AIRSPEED], _MIN_TRUE_AIRSPEED_SHARE * V
+        2.0 * V - declared_errors.magnitude_bound_y[AIRSPEED], _MIN_TRUE_OVER_MEASURED_AIRSPEED * V
     )
 
 
 @kernel
 def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
-    """Fill moment_magnitude (3,), the sum of the magnitudes of a moment's terms, and moment_error_bound (3,),
-    the bound on the error of this sum; N m."""
+    """Fill moment_term_magnitude_sum (3,), the sum of the magnitudes of a moment's terms, and
+    moment_error_bound (3,), the bound on the error of this sum; N m."""
     measured_dynamic_pressure = declared_errors.magnitude_y[QDYN]
     max_dynamic_pressure = declared_errors.magnitude_bound_y[QDYN]
     moment_table = design.moments
@@ -293,7 +298,7 @@ def fill_moment_magnitudes_and_error_bounds(declared_errors, design):
                 term_coefficient_magnitude + declared_errors.coefficient_tolerance[k]
             ) * max_signal_factor_magnitude
         wing_area_times_length = design.S * (design.c if i == 1 else design.b)
-        declared_errors.moment_magnitude[i] = (
+        declared_errors.moment_term_magnitude_sum[i] = (
             wing_area_times_length * measured_dynamic_pressure * term_magnitude_sum
         )
         declared_errors.moment_error_bound[i] = wing_area_times_length * (
@@ -310,9 +315,12 @@ def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_mag
 @kernel
 def inertia_times_moment_error_bound(declared_errors, axis, coefficient, tolerance):
     """Bound the error of an inertia coefficient times the moment about an axis, rad/s2."""
-    moment_magnitude = declared_errors.moment_magnitude[axis]
+    moment_term_magnitude_sum = declared_errors.moment_term_magnitude_sum[axis]
     return product_error_bound(
-        coefficient, tolerance, moment_magnitude, moment_magnitude + declared_errors.moment_error_bound[axis]
+        coefficient,
+        tolerance,
+        moment_term_magnitude_sum,
+        moment_term_magnitude_sum + declared_errors.moment_error_bound[axis],
     )
 
 
@@ -353,14 +361,14 @@ def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
 
 
 @kernel
-def fill_acceleration_error_per_rad(declared_errors, design, s):
-    """Fill acceleration_error_per_rad[:, s], rad/s2 per rad: bound on the error of the effect of surface s.
+def fill_acceleration_error_bound_per_rad(declared_errors, design, s):
+    """Fill acceleration_error_bound_per_rad[:, s], rad/s2 per rad: on the error of the effect of surface s.
 
     The declared bound is affine in |u_s|; this is its slope. Call `add_declared_error_bound` first: it fills
     the scratch fields.
     """
-    inertia_coefficient_tolerance = declared_errors.inertia_tolerance
-    error_bounds_per_rad = declared_errors.acceleration_error_per_rad
+    inertia_coefficient_tolerance = declared_errors.inertia_coefficient_tolerance
+    error_bounds_per_rad = declared_errors.acceleration_error_bound_per_rad
     roll_moment_magnitude_per_rad, max_roll_moment_magnitude_per_rad = surface_moment_magnitudes_per_rad(
         declared_errors, design, 0, s
     )
@@ -421,7 +429,7 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
     )
     monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
     fill_moment_magnitudes_and_error_bounds(declared_errors, design)
-    inertia_coefficient_tolerance = declared_errors.inertia_tolerance
+    inertia_coefficient_tolerance = declared_errors.inertia_coefficient_tolerance
     eta_bar[0] += inertia_times_moment_error_bound(
         declared_errors, 0, design.Pl, inertia_coefficient_tolerance[2]
     ) + inertia_times_moment_error_bound(declared_errors, 2, design.Pn, inertia_coefficient_tolerance[3])
@@ -443,63 +451,73 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
 
 
 @kernel
-def is_inside_box(model_error_map, box_index):
+def is_inside_box(model_error_bound_table, box_index):
     """Whether the state is in this box of the map."""
     is_inside = True
-    for i in range(model_error_map.coordinates.size):
-        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(model_error_map.coordinates[i]))
+    for i in range(model_error_bound_table.coordinates.size):
+        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(model_error_bound_table.coordinates[i]))
         is_inside = (
             is_inside
-            and model_error_map.box_low[box_index, i] - rounding_margin
-            <= model_error_map.coordinates[i]
-            <= model_error_map.box_high[box_index, i] + rounding_margin
+            and model_error_bound_table.box_low[box_index, i] - rounding_margin
+            <= model_error_bound_table.coordinates[i]
+            <= model_error_bound_table.box_high[box_index, i] + rounding_margin
         )
     return is_inside
 
 
 @kernel
-def is_coordinate_outside_all_boxes(model_error_map, state_coordinate_index):
+def is_coordinate_outside_span_of_boxes(model_error_bound_table, state_coordinate_index):
     """Whether this coordinate of the state is outside the range that the boxes span together."""
-    map_low, map_high = np.inf, -np.inf
-    for box_index in range(model_error_map.n_boxes):
-        map_low = min(map_low, model_error_map.box_low[box_index, state_coordinate_index])
-        map_high = max(map_high, model_error_map.box_high[box_index, state_coordinate_index])
+    lowest_box_low, highest_box_high = np.inf, -np.inf
+    for box_index in range(model_error_bound_table.n_boxes):
+        lowest_box_low = min(
+            lowest_box_low, model_error_bound_table.box_low[box_index, state_coordinate_index]
+        )
+        highest_box_high = max(
+            highest_box_high, model_error_bound_table.box_high[box_index, state_coordinate_index]
+        )
     rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (
-        1.0 + abs(model_error_map.coordinates[state_coordinate_index])
+        1.0 + abs(model_error_bound_table.coordinates[state_coordinate_index])
     )
     return (
-        not map_low - rounding_margin
-        <= model_error_map.coordinates[state_coordinate_index]
-        <= map_high + rounding_margin
+        not lowest_box_low - rounding_margin
+        <= model_error_bound_table.coordinates[state_coordinate_index]
+        <= highest_box_high + rounding_margin
     )
 
 
 @kernel
-def map_travel_level_index_for_positions(model_error_map, u):
+def travel_level_index_for_positions(model_error_bound_table, u):
     """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
     travel may be used."""
-    if model_error_map.several_surfaces_may_be_anywhere:
-        return model_error_map.n_travel_levels - 1
+    if model_error_bound_table.several_surfaces_may_be_anywhere:
+        return model_error_bound_table.n_travel_levels - 1
     max_travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
-            travel_limit = model_error_map.travel_high[s] if u[s] > 0.0 else model_error_map.travel_low[s]
+            travel_limit = (
+                model_error_bound_table.travel_high[s]
+                if u[s] > 0.0
+                else model_error_bound_table.travel_low[s]
+            )
             max_travel_share = max(max_travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return map_travel_level_index_for_share(model_error_map, max_travel_share)
+    return travel_level_index_for_share(model_error_bound_table, max_travel_share)
 
 
 @kernel
-def map_travel_level_index_for_share(model_error_map, travel_share):
+def travel_level_index_for_share(model_error_bound_table, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
-    last_level_index = model_error_map.n_travel_levels - 1
+    last_level_index = model_error_bound_table.n_travel_levels - 1
     for j in range(last_level_index):
-        if travel_share <= model_error_map.travel_share_by_level[j]:
+        if travel_share <= model_error_bound_table.travel_share_by_level[j]:
             return j
     return last_level_index
 
 
 @kernel
-def max_travel_share_used(model_error_map, s, mean_position_interval, travel_share_before, n_instants):
+def max_travel_share_used(
+    model_error_bound_table, s, mean_position_interval, travel_share_before, n_instants
+):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
     mean_position_interval: (low, high) rad, of the mean position over the instants; travel_share_before: the
@@ -508,15 +526,15 @@ def max_travel_share_used(model_error_map, s, mean_position_interval, travel_sha
     max_share_used, (mean_position_low, mean_position_high) = 0.0, mean_position_interval
     if mean_position_high > 0.0:
         max_share_used = (
-            mean_position_high / model_error_map.travel_high[s]
-            if model_error_map.travel_high[s] != 0.0
+            mean_position_high / model_error_bound_table.travel_high[s]
+            if model_error_bound_table.travel_high[s] != 0.0
             else 1.0
         )
     if mean_position_low < 0.0:
         max_share_used = max(
             max_share_used,
-            mean_position_low / model_error_map.travel_low[s]
-            if model_error_map.travel_low[s] != 0.0
+            mean_position_low / model_error_bound_table.travel_low[s]
+            if model_error_bound_table.travel_low[s] != 0.0
             else 1.0,
         )
     if n_instants > 1:
@@ -527,62 +545,72 @@ def max_travel_share_used(model_error_map, s, mean_position_interval, travel_sha
 
 
 @kernel
-def error_map_time_row_index(model_error_map):
+def error_bound_table_time_row_index(model_error_bound_table):
     """The row of the map for the present flight time, -1 if the map ends before."""
-    for time_row_index in range(model_error_map.n_time_rows):
-        if model_error_map.time_s <= model_error_map.until_s[time_row_index]:
+    for time_row_index in range(model_error_bound_table.n_time_rows):
+        if model_error_bound_table.time_s <= model_error_bound_table.until_s[time_row_index]:
             return time_row_index
     return -1
 
 
 @kernel
-def look_up_map_error(model_error_map, x, y, u):
+def look_up_tabulated_error_bound(model_error_bound_table, x, y, u):
     """Fill `coordinates` and `error_bound_now`, the mapped error at this state; x (3,) rad/s, y (4 +
     declared,), u (n,) rad."""
-    coordinates = model_error_map.coordinates
+    coordinates = model_error_bound_table.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    travel_level_index = map_travel_level_index_for_positions(model_error_map, u)
-    time_row_index = error_map_time_row_index(model_error_map)
-    for box_index in range(model_error_map.n_boxes if time_row_index >= 0 else 0):
-        if is_inside_box(model_error_map, box_index):
-            model_error_map.is_outside_all_boxes = 0
-            model_error_map.error_bound_now[:] = model_error_map.error_bound[
+    travel_level_index = travel_level_index_for_positions(model_error_bound_table, u)
+    time_row_index = error_bound_table_time_row_index(model_error_bound_table)
+    for box_index in range(model_error_bound_table.n_boxes if time_row_index >= 0 else 0):
+        if is_inside_box(model_error_bound_table, box_index):
+            model_error_bound_table.is_outside_all_boxes = 0
+            model_error_bound_table.error_bound_now[:] = model_error_bound_table.error_bound[
                 time_row_index, box_index, travel_level_index
             ]
-            model_error_map.box_index, model_error_map.time_row_index = box_index, time_row_index
-            model_error_map.engine_asymmetry_bound_now = model_error_map.engine_asymmetry_bound[box_index]
+            model_error_bound_table.box_index, model_error_bound_table.time_row_index = (
+                box_index,
+                time_row_index,
+            )
+            model_error_bound_table.engine_asymmetry_bound_now = (
+                model_error_bound_table.engine_asymmetry_bound[box_index]
+            )
             return
-    model_error_map.is_outside_all_boxes = 1
-    model_error_map.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
-    model_error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
+    model_error_bound_table.is_outside_all_boxes = 1
+    model_error_bound_table.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
+    model_error_bound_table.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
 
 
 @kernel
-def additional_error_at_travel_level(model_error_map, travel_level_index, axis):
+def additional_error_bound_at_travel_level(model_error_bound_table, travel_level_index, axis):
     """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
     travel, rad/s2."""
-    if model_error_map.is_outside_all_boxes:
+    if model_error_bound_table.is_outside_all_boxes:
         return 0.0
     return max(
-        model_error_map.error_bound[
-            model_error_map.time_row_index, model_error_map.box_index, travel_level_index, axis
+        model_error_bound_table.error_bound[
+            model_error_bound_table.time_row_index,
+            model_error_bound_table.box_index,
+            travel_level_index,
+            axis,
         ]
-        - model_error_map.error_bound_now[axis],
+        - model_error_bound_table.error_bound_now[axis],
         0.0,
     )
 
 
 @kernel
-def add_map_error(model_error_map, x, y, u, eta_bar):
+def add_tabulated_error_bound(model_error_bound_table, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
-    look_up_map_error(model_error_map, x, y, u)
+    look_up_tabulated_error_bound(model_error_bound_table, x, y, u)
     for i in range(3):
-        eta_bar[i] += model_error_map.error_bound_now[i]
+        eta_bar[i] += model_error_bound_table.error_bound_now[i]
 
 
 @kernel
-def add_published_bound(x, design, inertia_coupling_share, constant_error_bound, earth_rate_rad_s, eta_bar):
+def add_published_bound(
+    x, design, inertia_coupling_error_share, constant_error_bound, earth_rate_rad_s, eta_bar
+):
     """Add to eta_bar (3,) rad/s2 the published bound, and what the Earth's rotation adds.
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
@@ -593,17 +621,17 @@ def add_published_bound(x, design, inertia_coupling_share, constant_error_bound,
     sum_of_rate_magnitudes = abs(p) + abs(q) + abs(r)
     max_roll_coupling, max_pitch_coupling, max_yaw_coupling = max_rate_coupling_by_axis(design)
     eta_bar[0] += (
-        inertia_coupling_share[0] * abs(design.Pqr * q * r)
+        inertia_coupling_error_share[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_roll_coupling)
     )
     eta_bar[1] += (
-        inertia_coupling_share[1] * abs(design.Qpr * p * r)
+        inertia_coupling_error_share[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_pitch_coupling)
     )
     eta_bar[2] += (
-        inertia_coupling_share[2] * abs(design.Rpq * p * q)
+        inertia_coupling_error_share[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
         + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_yaw_coupling)
     )
@@ -661,11 +689,11 @@ def fill_uncertainty_bound_now(bound_record, design, measured, u):
     if bound_record.declared_errors.has_declared_errors:
         set_air_rotation_bound(bound_record.declared_errors, measured.altitude)
         add_declared_error_bound(bound_record.declared_errors, design, x, y, u, bound_record.eta_bar_now)
-        if bound_record.has_declared_surface_errors:
+        if bound_record.has_surface_term_errors:
             for s in range(u.size):
-                fill_acceleration_error_per_rad(bound_record.declared_errors, design, s)
-    if bound_record.model_error_map.n_boxes > 0:
-        add_map_error(bound_record.model_error_map, x, y, u, bound_record.eta_bar_now)
+                fill_acceleration_error_bound_per_rad(bound_record.declared_errors, design, s)
+    if bound_record.model_error_bound_table.n_boxes > 0:
+        add_tabulated_error_bound(bound_record.model_error_bound_table, x, y, u, bound_record.eta_bar_now)
     rates_for_published_bound = (
         bound_record.declared_errors.max_magnitude_x
         if bound_record.declared_errors.has_declared_errors
@@ -674,7 +702,7 @@ def fill_uncertainty_bound_now(bound_record, design, measured, u):
     add_published_bound(
         rates_for_published_bound,
         design,
-        bound_record.inertia_coupling,
+        bound_record.inertia_coupling_error_share,
         bound_record.constant_error_bound,
         bound_record.earth_rate_rad_s,
         bound_record.eta_bar_now,
@@ -714,20 +742,24 @@ def configure_uncertainty_bound(
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. design: record of the design model."""
     config, aircraft = scenario.fdi, declared.aircraft
-    bound_record["inertia_coupling"], bound_record["earth_rate_rad_s"] = declared.coupling, EARTH_RATE_RAD_S
+    bound_record["inertia_coupling_error_share"], bound_record["earth_rate_rad_s"] = (
+        declared.coupling,
+        EARTH_RATE_RAD_S,
+    )
     bound_record["constant_error_bound"] = declared.constant_rad_s2
     diagnoses_all_types = config.fault_class == "all"
-    fill_error_map(
-        bound_record["model_error_map"], aircraft, diagnoses_all_types, diagnoses_all_types and config.pairs
+    fill_error_bound_table(
+        bound_record["model_error_bound_table"],
+        aircraft,
+        diagnoses_all_types,
+        diagnoses_all_types and config.pairs,
     )
     if aircraft.file.model_error_map is None:
         bound_record["constant_error_bound"] += aircraft.model_error_rad_s2
     declared_errors = bound_record["declared_errors"]
     fill_declared_errors(declared_errors, declared, design, mass_of(scenario.design_model, aircraft))
-    fill_declared_engine_errors(declared_errors, scenario, declared)
-    bound_record["has_declared_surface_errors"] = (
-        declared_errors["has_declared_errors"] and diagnoses_all_types
-    )
+    fill_declared_engine_instrument_errors(declared_errors, scenario, declared)
+    bound_record["has_surface_term_errors"] = declared_errors["has_declared_errors"] and diagnoses_all_types
 
 
 def fill_declared_errors(
@@ -738,7 +770,7 @@ def fill_declared_errors(
         declared.aircraft.moments, design["moments"]["value"]
     )
     declared_errors["coefficient_tolerance"][: coefficient_tolerances.size] = coefficient_tolerances
-    declared_errors["inertia_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
+    declared_errors["inertia_coefficient_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
     declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
     sensor_errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
@@ -746,12 +778,12 @@ def fill_declared_errors(
     declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
     declared_errors["altitude_error_offset_m"] = sensor_errors["altitude"].worst
     declared_errors["altitude_error_slope"] = sensor_errors["altitude"].slope
-    declared_errors["signal_error_offset"] = sensor_errors.each("worst")
-    declared_errors["signal_error_slope"] = sensor_errors.each("slope")
+    declared_errors["signal_error_bound_at_zero"] = sensor_errors.each("worst")
+    declared_errors["signal_error_bound_per_unit"] = sensor_errors.each("slope")
     declared_errors["constant_gyro_error_bound"] = sensor_errors.each("steady", AXES)
     error_bounds = (
         declared_errors["coefficient_tolerance"],
-        declared_errors["inertia_tolerance"],
+        declared_errors["inertia_coefficient_tolerance"],
         declared_errors["deflection_error_bound"],
         declared_errors["air_rotation_bound"],
     )
@@ -760,7 +792,9 @@ def fill_declared_errors(
     )
 
 
-def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", declared: Declared) -> None:
+def fill_declared_engine_instrument_errors(
+    declared_errors: np.void, scenario: "Scenario", declared: Declared
+) -> None:
     """Fill in the errors of dpt if errors are declared of an instrument from which dpt is computed.
 
     The engine may have any setting between the initial one and its highest manifold pressure.
@@ -777,9 +811,9 @@ def fill_declared_engine_errors(declared_errors: np.void, scenario: "Scenario", 
     reading_error_bounds = [
         sensor_errors[instrument].of_reading(max_reading) for instrument, max_reading in max_readings.items()
     ]
-    declared_errors["has_engine_errors"] = 1
-    declared_errors["engine_power_error_kw"], declared_errors["density_power_error_kw"] = power_error_kw(
-        initial_condition.engine_rpm, max_manifold_pressure, *reading_error_bounds
+    declared_errors["has_engine_instrument_errors"] = 1
+    declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
+        power_error_kw(initial_condition.engine_rpm, max_manifold_pressure, *reading_error_bounds)
     )
 
 
@@ -831,7 +865,7 @@ def declared_errors_for_plugin(
     gust_rotation_std_rad_s, gust_correlation_time_s = declared.air.rotation(
         float(y[2]), aircraft.geometry.span_m
     )
-    air_data_std = np.sqrt(reading_noise_std**2 + reading_bias**2 + reading_resolution**2 / 12.0)[
+    air_data_error_std = np.sqrt(reading_noise_std**2 + reading_bias**2 + reading_resolution**2 / 12.0)[
         _FIRST_AIR_DATA_SIGNAL_INDEX:
     ]
     deflection_error_rad = declared.actuators.deflection_rad
@@ -846,7 +880,9 @@ def declared_errors_for_plugin(
         coefficients=coefficient_errors,
         inertia=declared.inertia,
         deflection_rad=deflection_error_rad,
-        model_rad_s2=model_error_std(design, y, u, air_data_std, coefficient_errors, deflection_error_rad),
+        model_rad_s2=model_error_std(
+            design, y, u, air_data_error_std, coefficient_errors, deflection_error_rad
+        ),
         bandwidth_rad_s=np.array([getattr(actuators, s).bandwidth_rad_s for s in aircraft.surfaces]),
         rate_limit_rad_s=np.radians([getattr(actuators, s).rate_limit_deg_s for s in aircraft.surfaces]),
     )
@@ -866,16 +902,18 @@ def model_error_std(
     design: np.ndarray,
     y: np.ndarray,
     u: np.ndarray,
-    air_data_std: np.ndarray,
+    air_data_error_std: np.ndarray,
     coefficient_errors: np.ndarray,
     deflection_error_rad: float,
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
 
-    air_data_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficient_errors: absolute.
+    air_data_error_std (4,): errors of alpha, beta, airspeed, dynamic pressure. coefficient_errors: absolute.
     """
     nominal_acceleration = _design_acceleration_at_zero_rates(design, y, u)
-    air_data_error_vectors = np.pad(np.diag(air_data_std), ((0, 0), (0, y.size - air_data_std.size)))
+    air_data_error_vectors = np.pad(
+        np.diag(air_data_error_std), ((0, 0), (0, y.size - air_data_error_std.size))
+    )
     acceleration_deviations = [
         _design_acceleration_at_zero_rates(design, y + air_data_error_vector, u) - nominal_acceleration
         for air_data_error_vector in air_data_error_vectors
@@ -954,7 +992,7 @@ def moment_term_tolerances(
     relative_term_tolerances += [
         _relative_signal_error_of_term(sensor_errors, term) for term in aircraft.moments
     ]
-    term_tolerances = (
+    tolerances_covering_constant_errors = (
         declared.coefficients.absolute(aircraft.moments, coefficient_magnitudes)
         + relative_term_tolerances * coefficient_magnitudes
     )
@@ -966,11 +1004,11 @@ def moment_term_tolerances(
         normalised_rate_error = sensor_errors[gyro].steady * rate_normalisation_length_m / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
-                term_tolerances[k] += (
+                tolerances_covering_constant_errors[k] += (
                     normalised_rate_error
                     * coefficient_slope_magnitudes[moment_axis_of_term(term), signal_index]
                 )
-    return term_tolerances
+    return tolerances_covering_constant_errors
 
 
 def _relative_signal_error_of_term(sensor_errors: SensorErrors, term: Term) -> float:

@@ -261,7 +261,7 @@ def assess_unknown_acceleration(
         )
     elif conclusion.detected and not accommodates_lag:
         filters.fill_fdae_unmodelled_acceleration(
-            fdae, bound_record.gyro_error_change_bound, unknown_acceleration
+            fdae, bound_record.changing_gyro_error_bound, unknown_acceleration
         )
     fault_is_undecided = (
         diagnoses_all_types and conclusion.detected and conclusion.isolated_estimator == NOT_ISOLATED

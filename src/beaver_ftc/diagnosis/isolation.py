@@ -40,7 +40,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import map_travel_level_index_for_share, max_travel_share_used
+from beaver_ftc.diagnosis.bounds import max_travel_share_used, travel_level_index_for_share
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_gyro_error_bound,
@@ -124,7 +124,7 @@ def axis_of_largest_effect(regressor):
 
 
 @kernel
-def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps):
+def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_substeps):
     """Widen the tolerance of a position by the errors of the surface's own terms at that position.
 
     eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
@@ -138,24 +138,24 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
         fie.max_abs_deflection_in_last_frame,
         max(abs(fie.theta_min), abs(fie.theta_max)),
     )
-    effect_error_bound, model_error_map, mean_position_interval = (
+    effect_error_bound, model_error_bound_table, mean_position_interval = (
         fault_effect.error_bound[axis],
-        bound_record.model_error_map,
+        bound_record.model_error_bound_table,
         (fie.theta_min, fie.theta_max),
     )
-    travel_level_index = map_travel_level_index_at_position(
-        model_error_map, fie, mean_position_interval, n_substeps
+    travel_level_index = travel_level_index_at_position(
+        model_error_bound_table, fie, mean_position_interval, n_substeps
     )
     measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
     first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
         extra_error_bound = max(
-            bound_record.surface_effect_error_per_rad[axis, s]
+            bound_record.surface_term_error_bound_per_rad[axis, s]
             * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_effect_error_at_command[axis, s],
+            - bound_record.surface_term_error_bound_at_command[axis, s],
             0.0,
         )
-        extra_error_bound += bound_record.additional_error_by_travel_level[travel_level_index, axis]
+        extra_error_bound += bound_record.additional_error_bound_by_travel_level[travel_level_index, axis]
         mean_position_low, mean_position_high = consistent_theta_interval(
             measured_effect,
             bound_record.frame_innovation_bound[axis] + effect_error_bound + extra_error_bound,
@@ -169,37 +169,39 @@ def widen_tolerance_by_surface_errors(fie, bound_record, innovation, n_substeps)
             min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high))),
             (mean_position_low, mean_position_high),
         )
-        travel_level_index = map_travel_level_index_at_position(
-            model_error_map, fie, mean_position_interval, n_substeps
+        travel_level_index = travel_level_index_at_position(
+            model_error_bound_table, fie, mean_position_interval, n_substeps
         )
     fie.max_abs_deflection_in_last_frame = max_abs_deflection
-    if model_error_map.one_surface_may_be_anywhere:
+    if model_error_bound_table.one_surface_may_be_anywhere:
         fie.max_travel_share_in_last_frame = max_travel_share_used(
-            model_error_map, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
+            model_error_bound_table, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
         fault_effect.error_bound[i] += max(
-            bound_record.surface_effect_error_per_rad[i, s]
+            bound_record.surface_term_error_bound_per_rad[i, s]
             * (max_abs_deflection + first_substep_allowance_rad)
-            - bound_record.surface_effect_error_at_command[i, s],
+            - bound_record.surface_term_error_bound_at_command[i, s],
             0.0,
         )
-        fault_effect.error_bound[i] += bound_record.additional_error_by_travel_level[travel_level_index, i]
+        fault_effect.error_bound[i] += bound_record.additional_error_bound_by_travel_level[
+            travel_level_index, i
+        ]
 
 
 @kernel
-def map_travel_level_index_at_position(model_error_map, fie, mean_position_interval, n_substeps):
+def travel_level_index_at_position(model_error_bound_table, fie, mean_position_interval, n_substeps):
     """The level of the error map that covers a surface whose mean position is in `mean_position_interval`,
     (low, high) rad.
 
     It is 0 without a map.
     """
-    if not model_error_map.one_surface_may_be_anywhere:
+    if not model_error_bound_table.one_surface_may_be_anywhere:
         return 0
-    return map_travel_level_index_for_share(
-        model_error_map,
+    return travel_level_index_for_share(
+        model_error_bound_table,
         max_travel_share_used(
-            model_error_map,
+            model_error_bound_table,
             fie.surface,
             mean_position_interval,
             fie.max_travel_share_in_last_frame,
@@ -234,10 +236,10 @@ def reset_feasible_theta_sets(fie, projection_disabled):
 def intersect_feasible_theta_sets(fie, axis, theta_interval, shared_by_axes):
     """Intersect the set of theta on axis i, or on every axis if `shared_by_axes`, with `theta_interval`."""
     theta_low, theta_high = theta_interval
-    for set_axis in range(3):
-        if shared_by_axes or set_axis == axis:
-            fie.feasible_theta_min[set_axis] = max(fie.feasible_theta_min[set_axis], theta_low)
-            fie.feasible_theta_max[set_axis] = min(fie.feasible_theta_max[set_axis], theta_high)
+    for axis_of_set in range(3):
+        if shared_by_axes or axis_of_set == axis:
+            fie.feasible_theta_min[axis_of_set] = max(fie.feasible_theta_min[axis_of_set], theta_low)
+            fie.feasible_theta_max[axis_of_set] = min(fie.feasible_theta_max[axis_of_set], theta_high)
 
 
 @kernel
@@ -288,14 +290,14 @@ def clear_mean_effect(mean_effect):
 
 
 @kernel
-def add_to_mean_effect(mean_effect, fault_effect, block_share_of_frame):
-    """Add the effect of a frame, a `block_share_of_frame` of the block, to the mean over the block."""
+def add_to_mean_effect(mean_effect, fault_effect, frame_share_of_block):
+    """Add the effect of a frame, a `frame_share_of_block` of the block, to the mean over the block."""
     for i in range(3):
         mean_effect.acceleration_at_zero_theta[i] += (
-            block_share_of_frame * fault_effect.acceleration_at_zero_theta[i]
+            frame_share_of_block * fault_effect.acceleration_at_zero_theta[i]
         )
-        mean_effect.regressor[i] += block_share_of_frame * fault_effect.regressor[i]
-        mean_effect.error_bound[i] += block_share_of_frame * fault_effect.error_bound[i]
+        mean_effect.regressor[i] += frame_share_of_block * fault_effect.regressor[i]
+        mean_effect.error_bound[i] += frame_share_of_block * fault_effect.error_bound[i]
 
 
 # Acceleration by a fault, rad/s2: acceleration_at_zero_theta + theta regressor, within +/- error_bound.
@@ -454,9 +456,12 @@ def update_fault_effect_and_reach(
     )
     set_effect_error_bound(fault_effect, effect_error_bound, fie.surface)
     if (
-        bound_record.has_declared_surface_errors or bound_record.model_error_map.one_surface_may_be_anywhere
+        bound_record.has_surface_term_errors
+        or bound_record.model_error_bound_table.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
-        widen_tolerance_by_surface_errors(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
+        widen_tolerance_by_surface_term_errors(
+            fie, bound_record, filter_bank.output.innovation, config.n_substeps
+        )
     if isolation.config.uses_reach_test:
         advance_reachable_residuals(filter_bank, fie, config.dt)
 
@@ -474,13 +479,13 @@ def update_all_fault_effects_and_reach(
 
 
 @kernel
-def start_estimators(isolation, gyro_error_change_bound, x):
+def start_estimators(isolation, changing_gyro_error_bound, x):
     """Start every estimator at the measured x (3,) rad/s, without residual and with the prior of theta.
 
-    gyro_error_change_bound (3,) rad/s: on the change of the gyros' errors.
+    changing_gyro_error_bound (3,) rad/s: on the changing part of the gyros' errors.
     """
     for fie in isolation.estimator[: isolation.config.n_estimators]:
-        fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, gyro_error_change_bound
+        fie.xhat[:], fie.filtered_gyro_error_bound[:] = x, changing_gyro_error_bound
         fie.theta_variance[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
         reset_feasible_theta_sets(fie, isolation.config.projection_disabled)
 
@@ -689,12 +694,12 @@ def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, d
             fie.filtered_eta_bar[i], bound_record.eta_bar[i] + fie.frame_mean_effect.error_bound[i], decay, dt
         )
         fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
-            fie.filtered_gyro_error_bound[i], bound_record.gyro_error_change_bound_before[i], decay
+            fie.filtered_gyro_error_bound[i], bound_record.changing_gyro_error_bound_before[i], decay
         )
         fie.filtered_uncertainty_bound[i] = (
             fie.filtered_eta_bar[i]
             + fie.filtered_gyro_error_bound[i]
-            + bound_record.gyro_error_change_bound[i]
+            + bound_record.changing_gyro_error_bound[i]
         )
 
 
@@ -779,5 +784,5 @@ def update_likelihood_exclusion(
     )
     fie.weakly_excluded = max(fie.weakly_excluded, 1)
     if fie.excluded_by_likelihood and gust_can_hide_vane_error:
-        for other_estimator in all_estimators[: isolation.config.n_estimators]:
-            other_estimator.weakly_excluded = max(other_estimator.weakly_excluded, 1)
+        for each_estimator in all_estimators[: isolation.config.n_estimators]:
+            each_estimator.weakly_excluded = max(each_estimator.weakly_excluded, 1)

@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, response
 from beaver_ftc.diagnosis.bounds import (
-    additional_error_at_travel_level,
+    additional_error_bound_at_travel_level,
     changing_gyro_error_bound,
     fill_uncertainty_bound_now,
 )
@@ -28,7 +28,7 @@ def frame_sums_dtype(n: int) -> np.dtype:
     """Sums over the instants of a frame, n surfaces: f, G, G u and bounds; own errors as in bounds.py."""
     return record(
         f=3, G=(3, n), Gu=(3, n), eta_bar=3,
-        surface_effect_error_per_rad=(3, n), surface_effect_error_at_command=(3, n),
+        surface_term_error_bound_per_rad=(3, n), surface_term_error_bound_at_command=(3, n),
         first_instant_Gu=(3, n),  # of the first instant alone
         G_min=n, G_max=n,  # on each surface's dominant axis
         u_min=n, u_max=n,  # rad
@@ -100,19 +100,19 @@ def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
         for s in range(u.size):
             sums.G[i, s] += G[i, s]
             sums.Gu[i, s] += G[i, s] * u[s]
-            if bound_record.has_declared_surface_errors:
-                sums.surface_effect_error_per_rad[i, s] += (
-                    bound_record.declared_errors.acceleration_error_per_rad[i, s]
+            if bound_record.has_surface_term_errors:
+                sums.surface_term_error_bound_per_rad[i, s] += (
+                    bound_record.declared_errors.acceleration_error_bound_per_rad[i, s]
                 )
-                sums.surface_effect_error_at_command[i, s] += (
-                    bound_record.declared_errors.acceleration_error_per_rad[i, s] * abs(u[s])
+                sums.surface_term_error_bound_at_command[i, s] += (
+                    bound_record.declared_errors.acceleration_error_bound_per_rad[i, s] * abs(u[s])
                 )
-    if bound_record.model_error_map.one_surface_may_be_anywhere:
-        for j in range(bound_record.model_error_map.n_travel_levels):
+    if bound_record.model_error_bound_table.one_surface_may_be_anywhere:
+        for j in range(bound_record.model_error_bound_table.n_travel_levels):
             for i in range(3):
-                bound_record.additional_error_by_travel_level[j, i] += (
+                bound_record.additional_error_bound_by_travel_level[j, i] += (
                     prediction.frame_share_per_instant
-                    * additional_error_at_travel_level(bound_record.model_error_map, j, i)
+                    * additional_error_bound_at_travel_level(bound_record.model_error_bound_table, j, i)
                 )
     if diagnoses_all_types:
         for s, axis in enumerate(layout.dominant_axis):
@@ -139,12 +139,12 @@ def fill_frame_means(prediction, bound_record):
         bound_record.eta_bar[i] = frame_share_per_instant * sums.eta_bar[i]
     frame_means.G_min[:], frame_means.G_max[:] = sums.G_min, sums.G_max
     frame_means.u_min[:], frame_means.u_max[:] = sums.u_min, sums.u_max
-    if bound_record.has_declared_surface_errors:
-        bound_record.surface_effect_error_per_rad[:] = (
-            frame_share_per_instant * sums.surface_effect_error_per_rad
+    if bound_record.has_surface_term_errors:
+        bound_record.surface_term_error_bound_per_rad[:] = (
+            frame_share_per_instant * sums.surface_term_error_bound_per_rad
         )
-        bound_record.surface_effect_error_at_command[:] = (
-            frame_share_per_instant * sums.surface_effect_error_at_command
+        bound_record.surface_term_error_bound_at_command[:] = (
+            frame_share_per_instant * sums.surface_term_error_bound_at_command
         )
     if frame_share_per_instant < 1.0:
         fill_effect_tolerance_for_fault_change(prediction)
@@ -187,12 +187,12 @@ def fill_effect_tolerance_for_fault_change(prediction):
 @kernel
 def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_index, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
-    bound_record.model_error_map.time_s = frame_index * dt
+    bound_record.model_error_bound_table.time_s = frame_index * dt
     fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
     bound_record.eta_bar[:] = bound_record.eta_bar_now
     if bound_record.declared_errors.has_declared_errors:
         for i in range(3):
-            bound_record.gyro_error_change_bound[i] = changing_gyro_error_bound(
+            bound_record.changing_gyro_error_bound[i] = changing_gyro_error_bound(
                 bound_record.declared_errors, i, measured.x[i]
             )
     if frame_index > 0:
@@ -203,15 +203,15 @@ def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_ind
 def begin_frame_sums(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
     prediction.x_before[:] = measured.x
-    bound_record.gyro_error_change_bound_before[:] = bound_record.gyro_error_change_bound
+    bound_record.changing_gyro_error_bound_before[:] = bound_record.changing_gyro_error_bound
     sums = prediction.sums
     sums.f[:], sums.eta_bar[:] = 0.0, 0.0
     sums.G[:], sums.Gu[:] = 0.0, 0.0
     sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
     sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
-    if bound_record.has_declared_surface_errors:
-        sums.surface_effect_error_per_rad[:], sums.surface_effect_error_at_command[:] = 0.0, 0.0
-    bound_record.additional_error_by_travel_level[:] = 0.0
+    if bound_record.has_surface_term_errors:
+        sums.surface_term_error_bound_per_rad[:], sums.surface_term_error_bound_at_command[:] = 0.0, 0.0
+    bound_record.additional_error_bound_by_travel_level[:] = 0.0
     add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types)
     sums.first_instant_Gu[:] = sums.Gu
 

@@ -80,20 +80,20 @@ class SurfaceFaultTypes(NamedTuple):
 class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
-    eta_bar_rad_s2: bound on the model's error over the frame; gyro_error_change_bound_rad_s: bound on the
-    change of a rate's reading by errors of its gyro. inertia_coupling_share; constant_error_bound_rad_s2;
-    earth_rate_rad_s. Of gyros: error gyro_error_offset + gyro_error_per_rate |rate|, of the offset what does
-    not change, gyro_constant_error; zero where none is declared.
+    eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
+    changing part of a gyro's error. inertia_coupling_error_share; constant_error_bound_rad_s2;
+    earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest + gyro_error_bound_per_rate |rate|, of
+    the first what does not change, constant_gyro_error_bound; zero where none is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
-    gyro_error_change_bound_rad_s: np.ndarray
-    inertia_coupling_share: np.ndarray
+    changing_gyro_error_bound_rad_s: np.ndarray
+    inertia_coupling_error_share: np.ndarray
     constant_error_bound_rad_s2: np.ndarray
     earth_rate_rad_s: float
-    gyro_error_offset_rad_s: np.ndarray
-    gyro_constant_error_rad_s: np.ndarray
-    gyro_error_per_rate: np.ndarray
+    gyro_error_bound_at_rest_rad_s: np.ndarray
+    constant_gyro_error_bound_rad_s: np.ndarray
+    gyro_error_bound_per_rate: np.ndarray
 
 
 class GustReadout(NamedTuple):
@@ -157,14 +157,14 @@ class SensorTest(NamedTuple):
     """One redundancy test of the sensor monitor, in the unit of its residual.
 
     residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
-    second of the sample. residual_per_gust_speed: effect on it of 1 m/s that a gust changes by.
+    second of the sample. residual_per_gust_speed_change: effect on it of 1 m/s that a gust changes by.
     filtered_residual, filtered_bound (poles,): through the filters.
     """
 
     residual: float
     bound_per_s: float
     bound_per_sample: float
-    residual_per_gust_speed: float
+    residual_per_gust_speed_change: float
     filtered_residual: np.ndarray
     filtered_bound: np.ndarray
 
@@ -274,17 +274,21 @@ class DiagnosisReadout:
         has_declared_errors = bool(declared_errors["has_declared_errors"])
         gyro_error_bound_at_rest, constant_gyro_error_bound, gyro_error_bound_per_rate = (
             declared_errors[name][:3].copy() if has_declared_errors else np.zeros(3)
-            for name in ("signal_error_offset", "constant_gyro_error_bound", "signal_error_slope")
+            for name in (
+                "signal_error_bound_at_zero",
+                "constant_gyro_error_bound",
+                "signal_error_bound_per_unit",
+            )
         )
         return DeclaredBounds(
             eta_bar_rad_s2=bound_record["eta_bar"].copy(),
-            gyro_error_change_bound_rad_s=bound_record["gyro_error_change_bound"].copy(),
-            inertia_coupling_share=bound_record["inertia_coupling"].copy(),
+            changing_gyro_error_bound_rad_s=bound_record["changing_gyro_error_bound"].copy(),
+            inertia_coupling_error_share=bound_record["inertia_coupling_error_share"].copy(),
             constant_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
             earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
-            gyro_error_offset_rad_s=gyro_error_bound_at_rest,
-            gyro_constant_error_rad_s=constant_gyro_error_bound,
-            gyro_error_per_rate=gyro_error_bound_per_rate,
+            gyro_error_bound_at_rest_rad_s=gyro_error_bound_at_rest,
+            constant_gyro_error_bound_rad_s=constant_gyro_error_bound,
+            gyro_error_bound_per_rate=gyro_error_bound_per_rate,
         )  # fmt: skip
 
     @cached_property
@@ -300,9 +304,10 @@ class DiagnosisReadout:
     @cached_property
     def mapped_error(self) -> MappedModelError:
         """The design model's error here, where the aircraft maps it."""
-        model_error_map = self._fdi["bound"]["model_error_map"]
+        model_error_bound_table = self._fdi["bound"]["model_error_bound_table"]
         return MappedModelError(
-            not model_error_map["is_outside_all_boxes"], model_error_map["error_bound_now"].copy()
+            not model_error_bound_table["is_outside_all_boxes"],
+            model_error_bound_table["error_bound_now"].copy(),
         )
 
     @cached_property
@@ -356,7 +361,7 @@ def certificate_arrays_of_every_frame(
     """
     estimators, surface_records = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     array_by_name = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["gyro_error_change_bound"],
+        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["changing_gyro_error_bound"],
         "offset": estimators["frame_mean_effect"]["acceleration_at_zero_theta"],
         "slope": estimators["frame_mean_effect"]["regressor"],
         "spread": estimators["frame_mean_effect"]["error_bound"], "excluded": estimators["excluded"],
@@ -477,13 +482,13 @@ def read_sensor_monitor(monitor: np.void) -> SensorMonitor:
     worst_sensor_test = SensorTest(
         float(worst_test_record["residual"]), float(worst_test_record["bound_per_s"]),
         float(worst_test_record["bound_per_sample"]),
-        float(worst_test_record["residual_per_gust_speed"]), worst_test_record["filtered_residual"].copy(),
-        worst_test_record["filtered_bound"].copy(),
+        float(worst_test_record["residual_per_gust_speed_change"]),
+        worst_test_record["filtered_residual"].copy(), worst_test_record["filtered_bound"].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(monitor["config"]["enabled"]), bool(output["alarmed"]), worst_test_index,
         float(output["worst_residual_bound_ratio"]), worst_sensor_test, int(output["isolated_sensor"]),
-        output["is_replaced"].astype(bool), float(config["sample_time_s"]),
+        output["is_reading_unused"].astype(bool), float(config["sample_time_s"]),
         config["gust_change_bound_mps"].copy(), memory["predicted_reading"].copy(),
         memory["reading_error_bound"].copy(), memory["commanded_engine_readings"].copy(),
     )  # fmt: skip

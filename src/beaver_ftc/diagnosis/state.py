@@ -83,11 +83,11 @@ def configure_layout(
     layout["partner"] = layout["loss_estimator"] = layout["position_estimator"] = -1
     for group_surfaces in aircraft.groups.values():
         if len(group_surfaces) == 2:
-            first_surface_index, second_surface_index = (
+            index_of_first_surface_in_group, index_of_second_surface_in_group = (
                 surface_index_by_name[name] for name in group_surfaces
             )
-            layout["partner"][first_surface_index] = second_surface_index
-            layout["partner"][second_surface_index] = first_surface_index
+            layout["partner"][index_of_first_surface_in_group] = index_of_second_surface_in_group
+            layout["partner"][index_of_second_surface_in_group] = index_of_first_surface_in_group
     for estimator_index, (_, kind, surface_index) in enumerate(estimator_entries):
         layout["loss_estimator" if kind == LOSS else "position_estimator"][surface_index] = estimator_index
 

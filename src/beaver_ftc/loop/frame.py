@@ -30,8 +30,8 @@ from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
 from beaver_ftc.diagnosis.bounds import (
     N_MAP_COORDINATES,
-    error_map_time_row_index,
-    is_coordinate_outside_all_boxes,
+    error_bound_table_time_row_index,
+    is_coordinate_outside_span_of_boxes,
 )
 from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
 from beaver_ftc.diagnosis.detection import filters, statistical
@@ -210,7 +210,7 @@ def note_envelope(envelope, outside, t):
 @kernel
 def note_inconclusive(inconclusive, fdi, t):
     """Count this frame, and why nothing can be concluded in it; t s."""
-    enabled, error_map = fdi.config.enabled, fdi.bound.model_error_map
+    enabled, error_map = fdi.config.enabled, fdi.bound.model_error_bound_table
     inconclusive.watched += 1
     if enabled and (error_map.n_boxes == 0 or not error_map.is_outside_all_boxes):
         return
@@ -219,7 +219,7 @@ def note_inconclusive(inconclusive, fdi, t):
     inconclusive.frames += 1
     if not enabled:
         inconclusive.undiagnosed += 1
-    elif error_map_time_row_index(error_map) < 0:
+    elif error_bound_table_time_row_index(error_map) < 0:
         inconclusive.late += 1
     else:
         note_place(inconclusive, error_map)
@@ -230,7 +230,7 @@ def note_place(inconclusive, error_map):
     """Count the quantities in which this place is outside the map."""
     explained = False
     for i in range(error_map.coordinates.size):
-        if is_coordinate_outside_all_boxes(error_map, i):
+        if is_coordinate_outside_span_of_boxes(error_map, i):
             now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
             inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
             inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
@@ -354,7 +354,7 @@ def monitor_sensors(frame):
     sensor_monitor.monitor_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
-    if monitor.output.alarmed and not (before or monitor.output.keeps_isolated_surface):
+    if monitor.output.alarmed and not (before or monitor.output.keeps_surface_conclusion):
         reset_surface_diagnosis(fdi)
 
 

@@ -203,7 +203,7 @@ def context_of(
         layout["trim"].copy(),
         bound["constant_error_bound"].copy(),
     )
-    if bound["model_error_map"]["n_boxes"]:
+    if bound["model_error_bound_table"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(
         dt_s=float(frame["dt"]),
@@ -214,7 +214,7 @@ def context_of(
         trim_rad=trim_rad,
         travel_rad=np.array([layout["low"], layout["high"]]),
         constant_rad_s2=constant,
-        inertia_coupling=bound["inertia_coupling"].copy(),
+        inertia_coupling=bound["inertia_coupling_error_share"].copy(),
         seed=scenario.seed,
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from beaver_ftc.diagnosis import SensorMonitor
-from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_COMPUTED_TESTS, RPM_TEST
+from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_TESTS_WITH_EQUATION, RPM_TEST
 from beaver_ftc.plant import ENGINE_SPEED, SENSORS
 from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.inequality import Document
@@ -27,7 +27,7 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
     monitor: at the alarm.
     """
     number, failed = monitor.worst_test_index, monitor.worst_residual_bound_ratio > 1.0
-    if failed and number >= N_COMPUTED_TESTS:
+    if failed and number >= N_TESTS_WITH_EQUATION:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
         looks = [look for look in _looks(monitor) if any(look)]
@@ -69,7 +69,7 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s
         + test.bound_per_sample
-        + test.residual_per_gust_speed * monitor.gust_change_bound_mps[pole]
+        + test.residual_per_gust_speed_change * monitor.gust_change_bound_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
     filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]

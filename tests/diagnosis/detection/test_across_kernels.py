@@ -77,7 +77,7 @@ def fdi(rng):
         air["output"]["acceleration_variance_by_axes_turn"]
         @ air["output"]["acceleration_variance_by_axes_turn"].T
     )
-    fdi["bound"]["surface_effect_error_per_rad"], fdi["bound"]["has_declared_surface_errors"] = (
+    fdi["bound"]["surface_term_error_bound_per_rad"], fdi["bound"]["has_surface_term_errors"] = (
         rng.uniform(0.1, 0.4, (3, 4)),
         1,
     )
@@ -197,29 +197,29 @@ def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
     assert not before.any()
 
 
-@pytest.mark.parametrize(("size", "has_declared_surface_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
+@pytest.mark.parametrize(("size", "has_surface_term_errors"), [(2.0, 1), (2.0, 0), (0.3, 1)])
 def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
-    fdi, size, has_declared_surface_errors
+    fdi, size, has_surface_term_errors
 ):
     """The column g + e, |e| up to the tolerance of either axis: the most, by its corners, of e across over
     what is left of g + e along; where little is left, a tenth of the column is."""
     view = fdi["statistical"]["views"][PAST_AILERON]
     G, innovation = np.zeros((3, 4)), np.array([0.7, 5.0, -0.4])
-    G[0, AILERON], G[2, AILERON], fdi["bound"]["has_declared_surface_errors"] = (
+    G[0, AILERON], G[2, AILERON], fdi["bound"]["has_surface_term_errors"] = (
         0.8 * size,
         0.6 * size,
-        has_declared_surface_errors,
+        has_surface_term_errors,
     )
     Across.regress(fdi, view, innovation, Across.turn(fdi, view, G))
     m = view["direction"][[0, 2]]
     along = np.array([m[1], -m[0]])
-    e = fdi["bound"]["surface_effect_error_per_rad"][[0, 2], AILERON]
+    e = fdi["bound"]["surface_term_error_bound_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
     least = max(
         size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS * size
     )
-    shown = has_declared_surface_errors * most / least * (along @ innovation[[0, 2]])
+    shown = has_surface_term_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
 

@@ -17,8 +17,8 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     believed, eta = rng.normal(size=(frames, 3)), rng.uniform(0.1, 1.0, (frames, 3))
     noise = rng.uniform(0.1, 1.0, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta[k], noise[k]
-        fdi["bound"]["gyro_error_change_bound"] = noise[k + 1]
+        fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["changing_gyro_error_bound"] = noise[k + 1]
         on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])

@@ -70,7 +70,7 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
-    fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
+    fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2, 0.3
     on(detection_filters.start_fdae, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["memory"]["threshold_gyro_error_part"] == pytest.approx([0.1, 0.2, 0.3])
@@ -131,8 +131,8 @@ def test_the_detection_estimator_and_its_threshold_are_convolutions(detected):
     x, believed = rng.normal(size=(frames, 3)), rng.normal(size=(frames, 3))
     eta, noise = rng.uniform(0.1, 0.3, (frames, 3)), rng.uniform(0.1, 0.3, (frames + 1, 3))
     for k in range(frames):
-        fdi["bound"]["eta_bar"], fdi["bound"]["gyro_error_change_bound_before"] = eta[k], noise[k]
-        fdi["bound"]["gyro_error_change_bound"], record["output"]["residual"] = noise[k + 1], 99.0
+        fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
+        fdi["bound"]["changing_gyro_error_bound"], record["output"]["residual"] = noise[k + 1], 99.0
         on(detection_filters.advance_fdae, fdi, x[k], believed[k], False)
     w = decay ** np.arange(frames)[::-1, None]
     shares = w * ((1.0 - decay) * x + DT * (believed + output))
@@ -149,7 +149,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record = fdi["fdae"]
     record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
-    record["memory"]["threshold_gyro_error_part"], fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2
+    record["memory"]["threshold_gyro_error_part"], fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2
     on(detection_filters.fill_fdae_unmodelled_acceleration, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
@@ -168,26 +168,27 @@ def instants(count, seed=5):
 
 
 @pytest.mark.parametrize("count", [1, 4])
-@pytest.mark.parametrize("has_declared_surface_errors", [0, 1])
-def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_errors):
+@pytest.mark.parametrize("has_surface_term_errors", [0, 1])
+def test_means_over_a_frame_are_of_its_instants(count, has_surface_term_errors):
     fdi, record = new_fdi(), new_prediction(1.0 / count)
-    fdi["bound"]["has_declared_surface_errors"], fdi["config"]["diagnoses_all_types"] = (
-        has_declared_surface_errors,
+    fdi["bound"]["has_surface_term_errors"], fdi["config"]["diagnoses_all_types"] = (
+        has_surface_term_errors,
         1,
     )
     fdi["layout"]["dominant_axis"] = 0, 1, 2, 1
     record["sums"]["f"] = record["sums"]["G"] = record["sums"]["Gu"] = 99.0  # of an earlier frame
     record["sums"]["eta_bar"] = 99.0
-    record["sums"]["surface_effect_error_at_command"], record["sums"]["surface_effect_error_per_rad"] = (
-        (99.0, 99.0) if has_declared_surface_errors else (0.0, 0.0)
-    )
-    fdi["bound"]["gyro_error_change_bound"] = 0.1, 0.2, 0.3
+    (
+        record["sums"]["surface_term_error_bound_at_command"],
+        record["sums"]["surface_term_error_bound_per_rad"],
+    ) = (99.0, 99.0) if has_surface_term_errors else (0.0, 0.0)
+    fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2, 0.3
     measured = np.zeros(1, [("x", "f8", (3,))]).view(np.recarray)[0]
     measured["x"] = 1.0, 2.0, 3.0
     seen = instants(count)
     for k, (f, G, u, eta_bar, per_rad) in enumerate(seen):
         record["f"], record["G"], record["u"] = f, G, u
-        fdi["bound"]["eta_bar_now"], fdi["bound"]["declared_errors"]["acceleration_error_per_rad"] = (
+        fdi["bound"]["eta_bar_now"], fdi["bound"]["declared_errors"]["acceleration_error_bound_per_rad"] = (
             eta_bar,
             np.abs(per_rad),
         )
@@ -203,7 +204,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     Gu = np.array([G * u for _, G, u, _, _ in seen])
     mean = record["frame_means"]
     assert record["x_before"] == pytest.approx([1.0, 2.0, 3.0])
-    assert fdi["bound"]["gyro_error_change_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
+    assert fdi["bound"]["changing_gyro_error_bound_before"] == pytest.approx([0.1, 0.2, 0.3])
     assert mean["G"] == pytest.approx(np.mean([G for _, G, *_ in seen], axis=0))
     assert mean["Gu"] == pytest.approx(Gu.mean(axis=0))
     assert mean["predicted_acceleration"] == pytest.approx(
@@ -212,11 +213,11 @@ def test_means_over_a_frame_are_of_its_instants(count, has_declared_surface_erro
     assert fdi["bound"]["eta_bar"] == pytest.approx(np.mean([eta for *_, eta, _ in seen], axis=0))
     own = np.mean([np.abs(per_rad) for *_, per_rad in seen], axis=0)
     at_command = np.mean([np.abs(per_rad * u) for _, _, u, _, per_rad in seen], axis=0)
-    assert fdi["bound"]["surface_effect_error_per_rad"] == pytest.approx(
-        own if has_declared_surface_errors else 0.0
+    assert fdi["bound"]["surface_term_error_bound_per_rad"] == pytest.approx(
+        own if has_surface_term_errors else 0.0
     )
-    assert fdi["bound"]["surface_effect_error_at_command"] == pytest.approx(
-        at_command if has_declared_surface_errors else 0.0
+    assert fdi["bound"]["surface_term_error_bound_at_command"] == pytest.approx(
+        at_command if has_surface_term_errors else 0.0
     )
     spread = np.abs(Gu[0] - Gu[1:].mean(axis=0)) / count if count > 1 else 0.0
     assert mean["Gu_tolerance_for_fault_change"] == pytest.approx(spread)

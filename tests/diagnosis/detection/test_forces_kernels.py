@@ -881,7 +881,11 @@ def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):
     the slipstream's own, of pressure and power; and all of it without the vane."""
     sizes = [next(iter(each.values())) for each in NOISY.values()]
     apart(noise=sizes)
-    told = {"has_engine_errors": engine, "engine_power_error_kw": 7.0, "density_power_error_kw": 31.0}
+    told = {
+        "has_engine_instrument_errors": engine,
+        "power_error_kw_by_instruments": 7.0,
+        "power_error_kw_per_density_ratio": 31.0,
+    }
     found = felt(Bounds(sensors=NOISY), **told)["statistical"]["forces"]["component"][f][
         "trim_noise_variance_with_without_vane"
     ]

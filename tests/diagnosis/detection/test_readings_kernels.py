@@ -33,11 +33,11 @@ def rates(design, x, y, u):
     return f + G @ u
 
 
-def moved(design, x, y, u, which, density_power_error_kw):
+def moved(design, x, y, u, which, power_error_kw_per_density_ratio):
     """What the accelerations change by per unit of a reading, by central differences."""
     there = []
     for error in (STEPS[which], -STEPS[which]):
-        told = misread(y, which, error, density_power_error_kw) if which < POWER else y.copy()
+        told = misread(y, which, error, power_error_kw_per_density_ratio) if which < POWER else y.copy()
         told[4] += KW_TO_DPT * error / (y[3] * y[2]) if which == POWER else 0.0
         there.append(rates(design, x, told, u))
     return (there[0] - there[1]) / (2 * STEPS[which])
@@ -56,8 +56,8 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
     alone, design, flown_there = at(state, sensors=BIASES)
     declared_errors = alone.fdi["bound"]["declared_errors"]
     for which in range(N_INPUT_READINGS):
-        found = moved(design, *flown_there, which, float(declared_errors["density_power_error_kw"]))
-        error = STEADY[which] if which < POWER else float(declared_errors["engine_power_error_kw"])
+        found = moved(design, *flown_there, which, float(declared_errors["power_error_kw_per_density_ratio"]))
+        error = STEADY[which] if which < POWER else float(declared_errors["power_error_kw_by_instruments"])
         for block in alone.blocks:
             n, axes = int(block["n_regressors"]) - N_INPUT_READINGS + which, block["axes"][: block["n_axes"]]
             assert block["regressor_tolerance"][n] == pytest.approx(error)
@@ -67,7 +67,10 @@ def test_a_steady_error_is_a_constant_times_what_it_moves_now(state):
 @pytest.mark.parametrize("state", STATES)
 def test_noise_is_jitter_as_large_as_it_is_now(state):
     alone, design, flown_there = at(state, sensors="tactical-grade")
-    thin, detector = float(alone.fdi["bound"]["declared_errors"]["density_power_error_kw"]), alone.detector
+    thin, detector = (
+        float(alone.fdi["bound"]["declared_errors"]["power_error_kw_per_density_ratio"]),
+        alone.detector,
+    )
     expected = detector["noise"]["acceleration_variance_without_air_data"].copy()
     for which in range(N_INPUT_READINGS):
         expected += (

@@ -188,7 +188,7 @@ def test_noise_of_other_sensors_and_of_deflections_is_part_of_the_noise():
     x, y, u = LEVEL_FLIGHT
     sensors = Bounds.model_validate(TACTICAL).sensors
     square, around = np.zeros(3), np.concatenate([x, y[:4]])
-    thin_kw = float(alone.fdi["bound"]["declared_errors"]["density_power_error_kw"])
+    thin_kw = float(alone.fdi["bound"]["declared_errors"]["power_error_kw_per_density_ratio"])
     for i, name in enumerate(SIGNALS):
         moved, error = around.copy(), getattr(sensors, name).noise_bias_quantum[0]
         moved[i] += error if i < 3 else 0.0

@@ -319,9 +319,9 @@ def test_the_axis_of_the_velocity_made_up_is_that_of_the_accelerometer(i, flow):
     ("fields", "used"),
     [
         ({}, 1),
-        ({"is_replaced": AZ}, 0),
+        ({"is_reading_unused": AZ}, 0),
         ({"is_suspect": AX}, 0),
-        ({"is_replaced": ALPHA, "is_suspect": BETA}, 1),
+        ({"is_reading_unused": ALPHA, "is_suspect": BETA}, 1),
     ],
 )
 def test_none_is_used_once_one_may_be_broken(fields, used):
@@ -338,7 +338,7 @@ def test_what_a_reading_may_be_off_covers_two_steps(steady, changing):
     """1.5 a - 0.5 a_then, at its worst: a bias, and noise that changes sides."""
     relations = new_watch()["redundancy"]
     (
-        relations["config"]["constant_error"][AX],
+        relations["config"]["constant_error_bound"][AX],
         relations["memory"]["previous_error_bound"][AX],
         relations["memory"]["error_bound_two_samples_ago"][AX],
     ) = (

@@ -231,13 +231,16 @@ def residuals(looks):
 
 def allowed(relations, signal, sensor, steady, changing):
     """(rate, noise) (RPM,) where these errors of one sensor are declared."""
-    relations["config"]["constant_error"], relations["memory"]["reading_error_change_bound"] = 0.0, 0.0
+    relations["config"]["constant_error_bound"], relations["memory"]["changing_reading_error_bound"] = (
+        0.0,
+        0.0,
+    )
     for name in ("reading_error_bound", "previous_error_bound", "error_bound_two_samples_ago"):
         relations["memory"][name] = 0.0
         relations["memory"][name][sensor] = steady + changing
     (
-        relations["config"]["constant_error"][sensor],
-        relations["memory"]["reading_error_change_bound"][sensor],
+        relations["config"]["constant_error_bound"][sensor],
+        relations["memory"]["changing_reading_error_bound"][sensor],
     ) = (
         steady,
         changing,
@@ -292,14 +295,14 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
     relations, signal = new_step(), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
     (
-        relations["config"]["error_offset"],
-        relations["config"]["error_slope"],
-        relations["config"]["constant_error"],
+        relations["config"]["error_bound_at_zero_reading"],
+        relations["config"]["error_bound_per_unit_reading"],
+        relations["config"]["constant_error_bound"],
     ) = 0.3, 0.1, 0.25
     redundancy.fill_reading_error_bounds(relations, signal)
     truth = (3.0 + 0.3) / 0.9
     assert relations["memory"]["reading_error_bound"] == pytest.approx(truth - 3.0)
-    assert relations["memory"]["reading_error_change_bound"] == pytest.approx(
+    assert relations["memory"]["changing_reading_error_bound"] == pytest.approx(
         truth - 3.0 - 0.25 + 3e-10, rel=1e-9
     )
 
@@ -308,7 +311,10 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, frames = np.random.default_rng(2), 30
     test, relations = np.zeros(1, TEST_RECORD)[0], new_step()
     relations["config"]["filter_decay"] = keep = np.array([0.0, 0.8, 0.97])
-    relations["config"]["gust_change_bound_mps"], test["residual_per_gust_speed"] = [0.1, 0.2, 0.3], 0.5
+    relations["config"]["gust_change_bound_mps"], test["residual_per_gust_speed_change"] = (
+        [0.1, 0.2, 0.3],
+        0.5,
+    )
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["bound_per_s"], test["bound_per_sample"] = residual[k], rate[k], noise[k]
@@ -329,8 +335,8 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
     relations["config"]["filter_decay"] = [0.0, 0.8, 0.97]
     (
         relations["memory"]["commanded_engine_readings"],
-        relations["config"]["error_offset"][ENGINE_SPEED],
-        relations["config"]["error_offset"][MANIFOLD],
+        relations["config"]["error_bound_at_zero_reading"][ENGINE_SPEED],
+        relations["config"]["error_bound_at_zero_reading"][MANIFOLD],
     ) = (
         (1700.0, 20.5),
         10.0,
@@ -422,9 +428,9 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         0.0,
     )
     (
-        relations["config"]["error_offset"],
-        relations["config"]["constant_error"],
-        relations["config"]["error_slope"],
+        relations["config"]["error_bound_at_zero_reading"],
+        relations["config"]["constant_error_bound"],
+        relations["config"]["error_bound_per_unit_reading"],
     ) = (
         np.abs(bias) + noise,
         np.abs(bias),
@@ -503,7 +509,7 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
         (0.0, 0.99, 0.9999),
         0.0,
     )
-    relations["config"]["error_offset"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
+    relations["config"]["error_bound_at_zero_reading"][PHI : PHI + 3] = sizes = np.array([1e-3, 1e-3, 0.06])
     true = signal[PHI : PHI + 3] * (0.0, 1.0, 1.0)
     for k in range(400):
         signal[PHI : PHI + 3] = true + sizes * rng.choice([-1.0, 0.0, 1.0], 3)

@@ -100,12 +100,15 @@ def new_watch(h):
         GRAVITY,
     )
     relations["config"]["max_vertical_wind_mps"], relations["config"]["max_airspeed_mps"] = 1.0, 80.0
-    relations["config"]["error_offset"][:3], relations["config"]["constant_error"][:3] = 2e-4, 1e-4
-    relations["config"]["error_offset"][[ALPHA, BETA, PHI, THETA]] = 5e-4
     (
-        relations["config"]["error_offset"][AIRSPEED],
-        relations["config"]["error_offset"][QDYN],
-        relations["config"]["error_offset"][ALTITUDE],
+        relations["config"]["error_bound_at_zero_reading"][:3],
+        relations["config"]["constant_error_bound"][:3],
+    ) = 2e-4, 1e-4
+    relations["config"]["error_bound_at_zero_reading"][[ALPHA, BETA, PHI, THETA]] = 5e-4
+    (
+        relations["config"]["error_bound_at_zero_reading"][AIRSPEED],
+        relations["config"]["error_bound_at_zero_reading"][QDYN],
+        relations["config"]["error_bound_at_zero_reading"][ALTITUDE],
     ) = (
         0.05,
         2.0,

@@ -22,9 +22,9 @@ def monitor():
 
 
 def test_nothing_is_said_without_an_alarm_or_beside_a_surfaces(monitor):
-    monitor["output"]["keeps_isolated_surface"] = 1
+    monitor["output"]["keeps_surface_conclusion"] = 1
     assert sensor_monitor_finding(monitor, 4.5) is None
-    monitor["output"]["keeps_isolated_surface"] = monitor["output"]["alarmed"] = 0
+    monitor["output"]["keeps_surface_conclusion"] = monitor["output"]["alarmed"] = 0
     assert sensor_monitor_finding(monitor, 4.5) is None
 
 

@@ -296,7 +296,7 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
     assert monitor["output"]["surface_was_isolated_at_alarm"] == (isolated >= 0)
-    assert not monitor["output"]["keeps_isolated_surface"]
+    assert not monitor["output"]["keeps_surface_conclusion"]
     frame.reset_surface_diagnosis(fdi)
     verdict = fdi["verdict"]
     assert [verdict[name] for name in ("detected", "isolated_estimator", "fault_type")] == [
@@ -316,19 +316,19 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
 def test_a_surface_found_long_before_stays_found():
     monitor, fdi = new_watch(), detected_fdi(9.4, 1)
     on(watching.raise_alarm, fdi, monitor, 10.0)
-    assert monitor["output"]["keeps_isolated_surface"]
+    assert monitor["output"]["keeps_surface_conclusion"]
     assert monitor["output"]["alarmed_at_s"] == 10.0
     assert fdi["verdict"]["isolated_estimator"] == 1
     monitor, fdi = new_watch(), detected_fdi(9.5, 1)
     on(watching.raise_alarm, fdi, monitor, 10.0)  # half a second is no long time
-    assert not monitor["output"]["keeps_isolated_surface"]
+    assert not monitor["output"]["keeps_surface_conclusion"]
 
 
 def test_with_nothing_found_before_the_alarm_is_of_now():
     monitor, fdi = new_watch(), detected_fdi()
     on(watching.raise_alarm, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed_at_s"] == 10.0
-    assert not monitor["output"]["keeps_isolated_surface"]
+    assert not monitor["output"]["keeps_surface_conclusion"]
     assert not monitor["output"]["surface_was_isolated_at_alarm"]
 
 
@@ -338,7 +338,7 @@ def test_an_instrument_without_a_reading_is_named_at_once():
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["isolated_sensor"] == BETA
     assert monitor["output"]["isolated_at_s"] == 5.0
-    assert np.flatnonzero(monitor["output"]["is_replaced"]).tolist() == [BETA]
+    assert np.flatnonzero(monitor["output"]["is_reading_unused"]).tolist() == [BETA]
     on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(PSI), 6.0)
     assert monitor["output"]["isolated_sensor"] == BETA
 
@@ -567,7 +567,7 @@ def test_a_watch_begins_with_its_first_look():
     measured["signal"][AIRSPEED], measured["signal"][QDYN], measured["force"] = 45.0, 1000.0, (1.0, 2.0, -9.0)
     (
         monitor["redundancy"]["config"]["gravity_m_s2"],
-        monitor["redundancy"]["config"]["error_offset"][ALTITUDE],
+        monitor["redundancy"]["config"]["error_bound_at_zero_reading"][ALTITUDE],
     ) = 9.8, 0.7
     (
         monitor["redundancy"]["config"]["attitude_drift_rad_s"],
@@ -665,8 +665,10 @@ def looked(monitor, fdi, **signal):
 def test_looks_of_a_frame_follow_one_another():
     monitor, fdi = new_watch(substep=3), new_fdi()
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
-    monitor["redundancy"]["config"]["gravity_m_s2"] = monitor["redundancy"]["config"]["error_offset"] = 0.0
-    monitor["redundancy"]["config"]["error_offset"][:] = 1.0
+    monitor["redundancy"]["config"]["gravity_m_s2"] = monitor["redundancy"]["config"][
+        "error_bound_at_zero_reading"
+    ] = 0.0
+    monitor["redundancy"]["config"]["error_bound_at_zero_reading"][:] = 1.0
     fdi["bank"]["output"]["innovation"] = 0.5, 0.0, 0.0
     looked(monitor, fdi)
     assert (monitor["memory"]["start_stage"], monitor["memory"]["substep"]) == (1, 0)
@@ -740,10 +742,10 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
         if missing:
             measured["missing"][i] = 1
         else:
-            monitor["output"]["is_replaced"][i] = 1
+            monitor["output"]["is_reading_unused"][i] = 1
     before = measured["signal"].copy()
     watching.replace_isolated_readings(monitor, prediction, measured)
-    assert np.flatnonzero(monitor["output"]["is_replaced"]).tolist() == sorted(broken)
+    assert np.flatnonzero(monitor["output"]["is_reading_unused"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
     assert (measured["y"][DPT] != 9.0) == slipstream
@@ -831,16 +833,16 @@ def test_an_alarm_on_roll_counts_as_one():
 def test_what_is_named_is_replaced_and_flags_are_one():
     monitor = new_watch()
     watching.isolate_sensor(monitor, CLIMB_TEST, 3.0)
-    assert monitor["output"]["is_replaced"][CLIMB_TEST] == 1
+    assert monitor["output"]["is_reading_unused"][CLIMB_TEST] == 1
     monitor = new_watch()
     on(watching.raise_alarm, detected_fdi(9.4, 1), monitor, 10.0)
-    assert (monitor["output"]["keeps_isolated_surface"], monitor["output"]["alarmed"]) == (1, 1)
+    assert (monitor["output"]["keeps_surface_conclusion"], monitor["output"]["alarmed"]) == (1, 1)
 
 
 def test_where_the_attitude_is_blurred_a_look_asks_whether_any_gyro_can_be_it():
     for attitude_is_noisy in (0, 1):
         monitor, fdi = new_watch(attitude_is_noisy=attitude_is_noisy, start_stage=1, substep=1), new_fdi()
         monitor["memory"]["gyro_error_estimate"], fdi["bank"]["output"]["threshold"] = (0.5, 0.0, 0.0), 1.0
-        monitor["redundancy"]["config"]["error_offset"][:] = 1.0
+        monitor["redundancy"]["config"]["error_bound_at_zero_reading"][:] = 1.0
         looked(monitor, fdi)
         assert bool(monitor["memory"]["filtered_turn_difference"].any()) == bool(attitude_is_noisy)

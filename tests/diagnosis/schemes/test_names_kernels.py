@@ -69,7 +69,7 @@ def test_which_surfaces_are_named(pair, alarmed, beside, named):
     (
         fdi["sensor_monitor"]["config"]["enabled"],
         fdi["sensor_monitor"]["output"]["alarmed"],
-        fdi["sensor_monitor"]["output"]["keeps_isolated_surface"],
+        fdi["sensor_monitor"]["output"]["keeps_surface_conclusion"],
     ) = (
         1,
         alarmed,

@@ -82,7 +82,7 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
 
 
 @pytest.mark.parametrize(
-    ("constant", "evidence", "has_declared_surface_errors", "kept"),
+    ("constant", "evidence", "has_surface_term_errors", "kept"),
     [
         (BIAS, 30, 0, {VARYING_LOSS, SLOW}), (BIAS, 50, 0, set()), (BIAS, 51, 0, set()),
         (STUCK, 30, 0, {VARYING_LOSS, SLOW}), (STUCK, 50, 0, {SLOW}), (FLOAT, 51, 0, {SLOW}),
@@ -91,7 +91,7 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
     ],
 )  # fmt: skip
 def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for_long(
-    constant, evidence, has_declared_surface_errors, kept
+    constant, evidence, has_surface_term_errors, kept
 ):
     """But where a surface stands still, a slow one may stand until it is excluded."""
     constants = set() if constant is None else {constant}
@@ -100,7 +100,7 @@ def test_what_any_course_explains_counts_only_until_a_constant_has_been_seen_for
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][RUDDER],
         fdi["types"]["surface"]["evidence"]["n_rest_frames"][RUDDER],
     ) = evidence, 10
-    fdi["types"]["config"]["has_declared_surface_errors"] = has_declared_surface_errors
+    fdi["types"]["config"]["has_surface_term_errors"] = has_surface_term_errors
     types = verdict._remaining_type_names(fdi, RUDDER)
     assert set(types) == set(said(*constants, *kept))
     assert len(types) == len(set(types))

@@ -42,7 +42,7 @@ class Mapped(DesignPlant):
 
     def __init__(self, **given):
         super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
-        self.map = self.fdi["bound"]["model_error_map"]
+        self.map = self.fdi["bound"]["model_error_bound_table"]
         self.map["one_surface_may_be_anywhere"], self.map["several_surfaces_may_be_anywhere"] = 1, 0
         self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
         self.amplitude *= 0.3
@@ -105,7 +105,7 @@ def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
 )  # fmt: skip
 def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
-    error_map = new_fdi()["bound"]["model_error_map"]
+    error_map = new_fdi()["bound"]["model_error_bound_table"]
     error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
     assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
 
@@ -114,17 +114,20 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
     fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
-        bound["model_error_map"]["one_surface_may_be_anywhere"],
-        bound["model_error_map"]["n_travel_levels"],
-        bound["model_error_map"]["travel_share_by_level"][:3],
+        bound["model_error_bound_table"]["one_surface_may_be_anywhere"],
+        bound["model_error_bound_table"]["n_travel_levels"],
+        bound["model_error_bound_table"]["travel_share_by_level"][:3],
     ) = (
         1,
         3,
         SHARE,
     )
-    bound["model_error_map"]["travel_low"], bound["model_error_map"]["travel_high"] = -0.5, 0.5
+    bound["model_error_bound_table"]["travel_low"], bound["model_error_bound_table"]["travel_high"] = (
+        -0.5,
+        0.5,
+    )
     (
-        bound["additional_error_by_travel_level"][:3],
+        bound["additional_error_bound_by_travel_level"][:3],
         bound["frame_innovation_bound"],
         fdi["bank"]["output"]["innovation"],
     ) = (
@@ -134,6 +137,6 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     )
     fie["frame_mean_effect"]["regressor"], fdi["config"]["n_substeps"] = (0.0, 20.0, 0.0), 1
     # 1.0 +- 0.1 +- 3.0 over 20: within 0.205 of 0.5 rad, the second level; then 1.4 / 20, the first
-    on(isolation.widen_tolerance_by_surface_errors, fdi, fie)
+    on(isolation.widen_tolerance_by_surface_term_errors, fdi, fie)
     assert fie["frame_mean_effect"]["error_bound"] == pytest.approx(ERROR[0])
     assert fie["max_travel_share_in_last_frame"] == pytest.approx(1.13 / 20 / 0.5)

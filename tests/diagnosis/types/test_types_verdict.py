@@ -140,7 +140,7 @@ def test_questions_about_the_types_left(kinds, constant, explained):
 
 
 @pytest.mark.parametrize(
-    ("kinds", "fixed", "one_type", "sole_remaining_type_if_shown"),
+    ("kinds", "fixed", "one_type", "sole_remaining_type_once_it_shows_itself"),
     [
         ((CONSTANT_LOSS,), 0, CONSTANT_LOSS, CONSTANT_LOSS),
         ((VARYING_LOSS,), 0, -1, CONSTANT_LOSS),
@@ -156,16 +156,16 @@ def test_questions_about_the_types_left(kinds, constant, explained):
         ((SLOW, STUCK), 1, STUCK, -1),
     ],
 )
-def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_remaining_type_if_shown):
+def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_remaining_type_once_it_shows_itself):
     _, surface = one(*kinds)
     same_name = (
-        verdict.FIRST_TYPE_WITH_SAME_NAME[sole_remaining_type_if_shown]
-        if sole_remaining_type_if_shown >= 0
+        verdict.FIRST_TYPE_WITH_SAME_NAME[sole_remaining_type_once_it_shows_itself]
+        if sole_remaining_type_once_it_shows_itself >= 0
         else -1
     )
     assert (verdict.choose_accommodation_mode(surface) == GIVE_UP) == fixed
     assert verdict.sole_remaining_constant_parameter_type(surface) == one_type
-    found = verdict.sole_remaining_type_if_shown(surface)
+    found = verdict.sole_remaining_type_once_it_shows_itself(surface)
     assert (verdict.FIRST_TYPE_WITH_SAME_NAME[found] if found >= 0 else -1) == same_name
 
 
@@ -276,7 +276,7 @@ def test_a_type_is_named_once_it_is_the_only_one(kinds, evidence, half_cycles, f
     fdi, surface = one(*kinds, evidence=evidence, n_anomalous_frames_since_stop_could_hide=evidence)
     surface["oscillatory"]["n_half_cycles"] = half_cycles
     assert on(verdict.fault_type_on_surface, fdi, surface) == found
-    fdi["types"]["config"]["has_declared_surface_errors"] = 1
+    fdi["types"]["config"]["has_surface_term_errors"] = 1
     assert on(verdict.fault_type_on_surface, fdi, surface) == in_coarse_sets
 
 
@@ -318,7 +318,7 @@ def test_the_surface_at_fault():
 
 
 @pytest.mark.parametrize(
-    ("flap", "evidence", "has_declared_surface_errors", "estimator_excluded"),
+    ("flap", "evidence", "has_surface_term_errors", "estimator_excluded"),
     [
         ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
         ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
@@ -328,22 +328,22 @@ def test_the_surface_at_fault():
     ],
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(
-    flap, evidence, has_declared_surface_errors, estimator_excluded
+    flap, evidence, has_surface_term_errors, estimator_excluded
 ):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     (
         fdi["types"]["surface"]["evidence"]["n_anomalous_frames"][ELEVATOR],
-        fdi["types"]["config"]["has_declared_surface_errors"],
+        fdi["types"]["config"]["has_surface_term_errors"],
     ) = (
         evidence,
-        has_declared_surface_errors,
+        has_surface_term_errors,
     )
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
-    assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == estimator_excluded
+    assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == estimator_excluded
     if flap is not None:
         assert on(verdict.find_surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
     fdi["types"]["surface"]["status"]["may_be_sole_fault"][FLAP] = 0
-    assert bool(on(verdict.other_surfaces_refuted, fdi, ELEVATOR)) == (evidence >= PATIENCE)
+    assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
 
 def conclude(fdi, kernel, *given, lead=()):
@@ -680,9 +680,9 @@ def test_a_quiet_surface_given_up_does_not_swing():
     assert n_rest_frames(low=0.0, high=0.14)[1]["evidence"]["n_rest_frames"] == 0
     assert not n_rest_frames(frames=PATIENCE)[1]["feasible_sets"]["excluded"][OSCILLATORY]
     assert n_rest_frames(frames=PATIENCE + 1)[1]["feasible_sets"]["excluded"][OSCILLATORY]
-    assert not n_rest_frames(frames=PATIENCE + 1, has_declared_surface_errors=1)[1]["feasible_sets"][
-        "excluded"
-    ][OSCILLATORY]
+    assert not n_rest_frames(frames=PATIENCE + 1, has_surface_term_errors=1)[1]["feasible_sets"]["excluded"][
+        OSCILLATORY
+    ]
     fdi, surface = n_rest_frames()
     fdi["types"]["surface"]["status"]["may_be_sole_fault"] = 1, 1, 0, 1
     on(registry.count_rest_as_evidence, fdi, RUDDER)
@@ -725,7 +725,7 @@ def test_a_block_is_the_mean_of_its_frames_with_the_noise_of_its_ends():
     Z[:, :, YAW] += 5.0
     for k in range(length):
         fdi["bank"]["output"]["innovation"], fdi["bound"]["eta_bar"] = innovation[k], eta[k]
-        fdi["bound"]["gyro_error_change_bound_before"], fdi["bound"]["gyro_error_change_bound"] = (
+        fdi["bound"]["changing_gyro_error_bound_before"], fdi["bound"]["changing_gyro_error_bound"] = (
             noise[k],
             noise[k + 1],
         )

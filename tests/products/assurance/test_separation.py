@@ -326,16 +326,16 @@ def test_where_the_flight_ends_is_what_its_record_says_of_the_frame_just_flown()
     x, y, actuators = frame["measured"]["x"], frame["measured"]["y"], frame["prediction"]["actuators"]
     apart(
         eta_bar=bound["eta_bar"],
-        noise=bound["gyro_error_change_bound"],
-        inertia=bound["inertia_coupling"],
+        noise=bound["changing_gyro_error_bound"],
+        inertia=bound["inertia_coupling_error_share"],
         G=means["G"],
         x=x,
     )
     at = situation_of(SimpleNamespace(last=FrameReadout(frame)), ambiguous(substeps=2), 0.3)
     coupling = np.array([abs(design[name]) for name in ("Pqr", "Qpr", "Rpq")])
-    turning = bound["inertia_coupling"] * coupling * 0.3**2
+    turning = bound["inertia_coupling_error_share"] * coupling * 0.3**2
     assert at.bound == pytest.approx(
-        1.1 * (bound["eta_bar"] + turning + 2.0 * bound["gyro_error_change_bound"] * 100.0)
+        1.1 * (bound["eta_bar"] + turning + 2.0 * bound["changing_gyro_error_bound"] * 100.0)
     )
     for found, expected in (
         (at.G, means["G"]), (at.u, frame["prediction"]["u"]), (at.x, x), (at.alpha, y[0]),

@@ -52,13 +52,13 @@ def advance_residual_bound(residual_bound, eta_bar, decay_factor, dt):
 
 
 @kernel
-def advance_gyro_error_bound(filtered_gyro_error_bound, gyro_error_change_bound, decay_factor):
+def advance_gyro_error_bound(filtered_gyro_error_bound, changing_gyro_error_bound, decay_factor):
     """Advance the filtered bound on a gyro's changing error, rad/s, by one frame.
 
-    gyro_error_change_bound: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds at
-    most the filtered bound plus the present nbar to a residual.
+    changing_gyro_error_bound: nbar of bounds.py at the start of the frame, rad/s. An error of the gyro adds
+    at most the filtered bound plus the present nbar to a residual.
     """
-    return decay_factor * filtered_gyro_error_bound + (1.0 - decay_factor) * gyro_error_change_bound
+    return decay_factor * filtered_gyro_error_bound + (1.0 - decay_factor) * changing_gyro_error_bound
 
 
 @kernel
@@ -138,9 +138,10 @@ def configure_bank(filter_bank: np.void, config: FdiConfig, declared: Declared, 
 
 
 @kernel
-def start_bank(filter_bank, gyro_error_change_bound):
-    """Start with the full bound on the change of the gyros' errors, gyro_error_change_bound (3,) rad/s."""
-    filter_bank.memory.threshold_gyro_error_part[: filter_bank.config.n_filters] = gyro_error_change_bound
+def start_bank(filter_bank, changing_gyro_error_bound):
+    """Start with the full bound on the changing part of the gyros' errors, changing_gyro_error_bound (3,)
+    rad/s."""
+    filter_bank.memory.threshold_gyro_error_part[: filter_bank.config.n_filters] = changing_gyro_error_bound
 
 
 @kernel
@@ -176,7 +177,8 @@ def update_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, 
         filter_bank.output.innovation[i] = (x[i] - x_before[i]) / dt - predicted_acceleration[i]
         bound_record.frame_innovation_bound[i] = (
             bound_record.eta_bar[i]
-            + (bound_record.gyro_error_change_bound[i] + bound_record.gyro_error_change_bound_before[i]) / dt
+            + (bound_record.changing_gyro_error_bound[i] + bound_record.changing_gyro_error_bound_before[i])
+            / dt
         )
         for m, decay_factor in enumerate(filter_bank.config.decay_factor[: filter_bank.config.n_filters]):
             filter_bank.output.residual[m, i] = (
@@ -187,13 +189,13 @@ def update_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, 
             )
             filter_bank.memory.threshold_gyro_error_part[m, i] = advance_gyro_error_bound(
                 filter_bank.memory.threshold_gyro_error_part[m, i],
-                bound_record.gyro_error_change_bound_before[i],
+                bound_record.changing_gyro_error_bound_before[i],
                 decay_factor,
             )
             filter_bank.output.threshold[m, i] = (
                 filter_bank.memory.threshold_uncertainty_part[m, i]
                 + filter_bank.memory.threshold_gyro_error_part[m, i]
-                + bound_record.gyro_error_change_bound[i]
+                + bound_record.changing_gyro_error_bound[i]
             )
 
 
@@ -446,12 +448,12 @@ def train_network(network, residual, threshold, do_weights_leak, dt):
 
 
 @kernel
-def start_fdae(fdae, gyro_error_change_bound, x):
+def start_fdae(fdae, changing_gyro_error_bound, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
 
-    gyro_error_change_bound (3,) rad/s: by how much the gyros' errors may change.
+    changing_gyro_error_bound (3,) rad/s: on the changing part of the gyros' errors.
     """
-    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, gyro_error_change_bound
+    fdae.memory.xhat[:], fdae.memory.threshold_gyro_error_part[:] = x, changing_gyro_error_bound
 
 
 @kernel
@@ -513,26 +515,26 @@ def advance_fdae(fdae, bound_record, x, predicted_acceleration, is_fault_detecte
         )
         fdae.memory.threshold_gyro_error_part[i] = advance_gyro_error_bound(
             fdae.memory.threshold_gyro_error_part[i],
-            bound_record.gyro_error_change_bound_before[i],
+            bound_record.changing_gyro_error_bound_before[i],
             decay_factor,
         )
         fdae.output.threshold[i] = (
             fdae.memory.threshold_uncertainty_part[i]
             + fdae.memory.threshold_gyro_error_part[i]
-            + bound_record.gyro_error_change_bound[i]
+            + bound_record.changing_gyro_error_bound[i]
         )
 
 
 @kernel
-def fill_fdae_unmodelled_acceleration(fdae, gyro_error_change_bound, out):
+def fill_fdae_unmodelled_acceleration(fdae, changing_gyro_error_bound, out):
     """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
-    weights, at the bandwidth of the estimator. What the gyro's gyro_error_change_bound (3,) rad/s alone
+    weights, at the bandwidth of the estimator. What the gyro's changing_gyro_error_bound (3,) rad/s alone
     explains stays out of it, and off the surfaces.
     """
     for i in range(3):
-        gyro_error_bound = fdae.memory.threshold_gyro_error_part[i] + gyro_error_change_bound[i]
+        gyro_error_bound = fdae.memory.threshold_gyro_error_part[i] + changing_gyro_error_bound[i]
         out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * apply_dead_zone(
             fdae.output.residual[i], gyro_error_bound
         )

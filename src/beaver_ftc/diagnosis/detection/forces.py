@@ -340,12 +340,12 @@ def _slipstream_slope_and_noise_variance(
     y: np.ndarray, declared_errors: np.void, sensor_errors: SensorErrors
 ) -> tuple[float, float]:
     """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
-    if not declared_errors["has_engine_errors"]:
+    if not declared_errors["has_engine_instrument_errors"]:
         return 0.0, 0.0
     slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
-        y, declared_errors["density_power_error_kw"]
+        y, declared_errors["power_error_kw_per_density_ratio"]
     )
-    power_noise_kw = declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
+    power_noise_kw = declared_errors["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
     return slipstream_per_airspeed, float(
         (slipstream_per_pressure * sensor_errors["qdyn"].random) ** 2
         + (slipstream_per_kw * power_noise_kw) ** 2

@@ -451,8 +451,8 @@ def column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index
         column_entry = force_record.previous_scaled_force_per_surface_rad[s]
         return column_entry, force_record.scaled_force_per_surface_rad_error_bound[s]
     error_bound = (
-        bound_record.surface_effect_error_per_rad[component, s]
-        if bound_record.has_declared_surface_errors
+        bound_record.surface_term_error_bound_per_rad[component, s]
+        if bound_record.has_surface_term_errors
         else 0.0
     )
     return G[component, s], error_bound

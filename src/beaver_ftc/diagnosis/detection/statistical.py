@@ -41,7 +41,7 @@ from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import (
     UNMAPPED_ERROR_IN_FILTERS_RAD_S2,
     add_published_bound,
-    additional_error_at_travel_level,
+    additional_error_bound_at_travel_level,
     moment_axis_of_term,
     moment_term_tolerances,
 )
@@ -482,10 +482,10 @@ def configure_reading_regressors(
         steady_error_bounds[reading_index] = sensor_errors[sensor_name].steady
         reading_noise_std[reading_index] = sensor_errors[sensor_name].random
     steady_error_bounds[_ENGINE_POWER_READING_INDEX] = declared_errors[
-        "engine_power_error_kw"
+        "power_error_kw_by_instruments"
     ]  # all of it: so many standard deviations are part of that
     reading_noise_std[_ENGINE_POWER_READING_INDEX] = (
-        declared_errors["engine_power_error_kw"] / NOISE_LIMIT_SIGMA
+        declared_errors["power_error_kw_by_instruments"] / NOISE_LIMIT_SIGMA
     )
     if not (steady_error_bounds.any() or reading_noise_std.any()):
         return
@@ -509,9 +509,9 @@ def fill_signal_change_per_reading(
     if reading_index == AIRSPEED:
         for k in range(PH, RH + 1):
             signal_change_per_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
-    if declared_errors.has_engine_errors and reading_index >= AIRSPEED:
+    if declared_errors.has_engine_instrument_errors and reading_index >= AIRSPEED:
         slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
-            y, declared_errors.density_power_error_kw
+            y, declared_errors.power_error_kw_per_density_ratio
         )
         slipstream_per_other_reading = slipstream_per_pressure if reading_index == QDYN else slipstream_per_kw
         signal_change_per_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
@@ -950,23 +950,26 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
             u,
         )
     fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt)
-    if bound_record.model_error_map.n_boxes > 0:
-        update_uncertainty_change(noise_model, blocks, bound_record.model_error_map, u)
+    if bound_record.model_error_bound_table.n_boxes > 0:
+        update_uncertainty_change(noise_model, blocks, bound_record.model_error_bound_table, u)
     if gust.output.accounts_for_gusts:
         gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
 
 @kernel
-def update_uncertainty_change(noise_model, blocks, model_error_map, u):
+def update_uncertainty_change(noise_model, blocks, model_error_bound_table, u):
     """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
     surfaces."""
     max_travel_share_moved = 0.0
     for s in range(u.size):
-        travel_width_rad = max(model_error_map.travel_high[s] - model_error_map.travel_low[s], MIN_TRAVEL_RAD)
-        max_travel_share_moved = max(
-            max_travel_share_moved, abs(u[s] - model_error_map.surface_positions_before[s]) / travel_width_rad
+        travel_width_rad = max(
+            model_error_bound_table.travel_high[s] - model_error_bound_table.travel_low[s], MIN_TRAVEL_RAD
         )
-        model_error_map.surface_positions_before[s] = u[s]
+        max_travel_share_moved = max(
+            max_travel_share_moved,
+            abs(u[s] - model_error_bound_table.surface_positions_before[s]) / travel_width_rad,
+        )
+        model_error_bound_table.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
             noise_model.base_uncertainty_change_over_bound
@@ -1017,21 +1020,23 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
     add_published_bound(
         measured.x,
         design,
-        bound_record.inertia_coupling,
+        bound_record.inertia_coupling_error_share,
         bound_record.constant_error_bound,
         bound_record.earth_rate_rad_s,
         uncertainty_bound,
     )
-    has_model_error_bound_table = bound_record.model_error_map.n_boxes > 0
+    has_model_error_bound_table = bound_record.model_error_bound_table.n_boxes > 0
     for i in range(3):
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
         if has_model_error_bound_table:
             uncertainty_bound[i] += min(
-                bound_record.model_error_map.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
+                bound_record.model_error_bound_table.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
             )
-        if bound_record.model_error_map.one_surface_may_be_anywhere:
-            noise_model.additional_bound_for_surface_anywhere[i] = additional_error_at_travel_level(
-                bound_record.model_error_map, bound_record.model_error_map.n_travel_levels - 1, i
+        if bound_record.model_error_bound_table.one_surface_may_be_anywhere:
+            noise_model.additional_bound_for_surface_anywhere[i] = additional_error_bound_at_travel_level(
+                bound_record.model_error_bound_table,
+                bound_record.model_error_bound_table.n_travel_levels - 1,
+                i,
             )
     for block_index, block in enumerate(blocks):
         for i, axis in enumerate(block.axes[: block.n_axes]):

@@ -22,7 +22,7 @@ from beaver_ftc.design.model import DPT
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING, N_COMPUTED_TESTS, RPM_TEST
+    from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING, N_TESTS_WITH_EQUATION, RPM_TEST
 else:
     __getattr__, __dir__ = lazily(__name__)
 

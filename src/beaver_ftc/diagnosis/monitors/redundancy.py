@@ -63,9 +63,9 @@ from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sens
     11,
     12,
 )
-N_COMPUTED_TESTS = 13  # tests with an equation; then those of sensors that should equal another reading
+N_TESTS_WITH_EQUATION = 13  # tests with an equation; then those of sensors that should equal another reading
 DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
-N_TESTS = N_COMPUTED_TESTS + len(DUPLICATE_SENSORS)
+N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_SENSORS)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
 TEST_INDEX_BY_NAME = {
     "roll": FIRST_TURN_TEST, "pitch": FIRST_TURN_TEST + 1, "yaw": FIRST_TURN_TEST + 2,
@@ -111,13 +111,13 @@ ALPHA_HYPOTHESIS, BETA_HYPOTHESIS, AIRSPEED_HYPOTHESIS, PHI_HYPOTHESIS, THETA_HY
 N_INITIAL_ERROR_HYPOTHESES, N_SIGNED_INITIAL_ERROR_EFFECTS = 5, 14
 
 # One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
-# sample, the first for each second of it. residual_per_gust_speed: effect on the residual of 1 m/s that a
-# gust changes by. filtered_bound: on filtered_residual; filtered_bound_per_s_part,
+# sample, the first for each second of it. residual_per_gust_speed_change: effect on the residual of 1 m/s
+# that a gust changes by. filtered_bound: on filtered_residual; filtered_bound_per_s_part,
 # filtered_bound_per_sample_part: its parts. residual_bound_ratio: largest |filtered_residual| /
 # filtered_bound over the poles.
 TEST_RECORD = record(
     residual=float, bound_per_s=float, bound_per_sample=float, previous_bound_per_sample=float,
-    residual_per_gust_speed=float, filtered_bound=N_POLES,
+    residual_per_gust_speed_change=float, filtered_bound=N_POLES,
     filtered_residual=N_POLES, filtered_bound_per_s_part=N_POLES, filtered_bound_per_sample_part=N_POLES,
     residual_bound_ratio=float,
 )  # fmt: skip
@@ -129,13 +129,14 @@ REDUNDANCY_RECORD = record(
         # up to max_airspeed_mps, and above low_altitude_limit_m: below it a gust changes faster
         max_gust_speed_mps=float, gust_change_bound_mps=N_POLES, max_airspeed_mps=float,
         low_altitude_limit_m=float, max_vertical_wind_mps=float,
-        # Declared errors of a reading z, SI: |error| <= error_offset + error_slope |z|, of which
-        # constant_error does not change
-        error_offset=N_SENSORS, error_slope=N_SENSORS, constant_error=N_SENSORS, attitude_drift_rad_s=float,
+        # Declared errors of a reading z, SI: |error| <= error_bound_at_zero_reading +
+        # error_bound_per_unit_reading |z|, of which constant_error_bound does not change
+        error_bound_at_zero_reading=N_SENSORS, error_bound_per_unit_reading=N_SENSORS,
+        constant_error_bound=N_SENSORS, attitude_drift_rad_s=float,
     ),
     memory=record(
         # bounds on the error of each reading in this sample, and on the part of it that changes
-        reading_error_bound=N_SENSORS, reading_error_change_bound=N_SENSORS,
+        reading_error_bound=N_SENSORS, changing_reading_error_bound=N_SENSORS,
         attitude_drift_bound_rad=float, previous_error_bound=N_SENSORS, error_bound_two_samples_ago=N_SENSORS,
         # the sample before: readings; attitude; velocity m/s and acceleration m/s2, gravity included, in body
         # axes; and the acceleration of the sample before that. predict_readings advances the last two vectors
@@ -201,12 +202,12 @@ MONITOR_MEMORY_RECORD = record(
 
 MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
-    keeps_isolated_surface=int,  # a surface was found long before, with sound sensors: it stays found
+    keeps_surface_conclusion=int,  # a surface was found long before, with sound sensors: it stays found
     surface_was_isolated_at_alarm=int,  # a surface had been isolated just before the alarm
     alarm_test_index=int,  # index of the test that has raised the alarm
     # test with the largest residual_bound_ratio of this frame, and that ratio
     worst_test_index=int, worst_residual_bound_ratio=float,
-    is_suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_replaced=(int, N_SENSORS),
+    is_suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
 )  # fmt: skip
 
 SENSOR_MONITOR_RECORD = record(
@@ -274,9 +275,9 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
     for i, name in enumerate(SENSORS):
         sensor_error = sensor_errors[name]
         (
-            redundancy_config["error_offset"][i],
-            redundancy_config["error_slope"][i],
-            redundancy_config["constant_error"][i],
+            redundancy_config["error_bound_at_zero_reading"][i],
+            redundancy_config["error_bound_per_unit_reading"][i],
+            redundancy_config["constant_error_bound"][i],
         ) = (
             sensor_error.worst,
             sensor_error.slope,
@@ -291,8 +292,8 @@ def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_
         )
     attitude_indices = slice(PHI, PHI + 3)
     monitor_config["attitude_is_noisy"] = np.any(
-        redundancy_config["error_offset"][attitude_indices]
-        > redundancy_config["constant_error"][attitude_indices]
+        redundancy_config["error_bound_at_zero_reading"][attitude_indices]
+        > redundancy_config["constant_error_bound"][attitude_indices]
     )
     monitor_config["replaced_rate_correction_share"] = (
         min(1.0, sample_time_s * REPLACED_RATE_CORRECTION_PER_S)
@@ -331,7 +332,7 @@ def gust_speed_and_change_bounds(
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
     output = monitor["output"]
-    if not output["alarmed"] or output["keeps_isolated_surface"]:
+    if not output["alarmed"] or output["keeps_surface_conclusion"]:
         return None
     finding: dict[str, Any] = {
         "isolated": None, "isolation_type": None, "estimate": None, "candidates": (),
@@ -361,7 +362,7 @@ MIN_DYNAMIC_PRESSURE_PA = 1.0  # the same of the dynamic pressure
 MIN_QDYN_PER_AIRSPEED_SQUARED = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
 MIN_PREDICTED_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
 # of a reading that its constant error leaves, at least, under a logarithm
-MIN_READING_SHARE_IN_LOGARITHM = 0.01
+MIN_READING_SHARE_LEFT_BY_ERROR = 0.01
 READING_ROUNDING_SHARE = 1e-10  # of a reading: the part of each bound that covers rounding
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
@@ -454,12 +455,12 @@ def fill_reading_error_bounds(redundancy, readings):
     config, memory = redundancy.config, redundancy.memory
     for i in range(N_SENSORS):
         reading_magnitude = abs(wrapped(readings[i])) if i == PSI else abs(readings[i])
-        total_error_bound = (config.error_offset[i] + config.error_slope[i] * reading_magnitude) / (
-            1.0 - config.error_slope[i]
-        )
+        total_error_bound = (
+            config.error_bound_at_zero_reading[i] + config.error_bound_per_unit_reading[i] * reading_magnitude
+        ) / (1.0 - config.error_bound_per_unit_reading[i])
         memory.reading_error_bound[i] = total_error_bound
-        memory.reading_error_change_bound[i] = (
-            total_error_bound - config.constant_error[i] + READING_ROUNDING_SHARE * abs(readings[i])
+        memory.changing_reading_error_bound[i] = (
+            total_error_bound - config.constant_error_bound[i] + READING_ROUNDING_SHARE * abs(readings[i])
         )
     for i in range(PHI, PHI + 3):
         memory.reading_error_bound[i] += memory.attitude_drift_bound_rad
@@ -583,7 +584,7 @@ def extrapolated_error_bound(redundancy, sensor):
     return (
         INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[sensor]
         + PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
-        - redundancy.config.constant_error[sensor]
+        - redundancy.config.constant_error_bound[sensor]
     )
 
 
@@ -599,10 +600,12 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
     tilt_error_bound = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
     gravity = config.gravity_m_s2
     squared_force_error_bound_sum = 0.0
-    constant_acceleration_error_bound = gravity * (config.constant_error[PHI] + config.constant_error[THETA])
+    constant_acceleration_error_bound = gravity * (
+        config.constant_error_bound[PHI] + config.constant_error_bound[THETA]
+    )
     for i in range(AX, AX + 3):
         squared_force_error_bound_sum += extrapolated_error_bound(redundancy, i) ** 2
-        constant_acceleration_error_bound += config.constant_error[i]
+        constant_acceleration_error_bound += config.constant_error_bound[i]
     axis_turning_error_bound = config.sample_time_s * (
         max_turn_rate * constant_acceleration_error_bound
         + PREVIOUS_INTEGRATION_WEIGHT * gyro_error_bound_sum * memory.previous_acceleration_magnitude
@@ -624,7 +627,10 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
     tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
-    previous_error_bound, error_change_bound = memory.previous_error_bound, memory.reading_error_change_bound
+    previous_error_bound, changing_error_bound = (
+        memory.previous_error_bound,
+        memory.changing_reading_error_bound,
+    )
     max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, readings), MAX_PITCH_RAD))
     attitude_error_bound_sum = (
         previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
@@ -633,18 +639,18 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
     tilt_reading_change = abs(readings[PHI] - memory.previous_reading[PHI]) + abs(
         readings[THETA] - memory.previous_reading[THETA]
     )
-    momentary_error_bound = (
+    momentary_theta_and_psi_error_bound = (
         previous_error_bound[THETA]
-        - config.constant_error[THETA]
+        - config.constant_error_bound[THETA]
         + previous_error_bound[PSI]
-        - config.constant_error[PSI]
-        + error_change_bound[THETA]
-        + error_change_bound[PSI]
+        - config.constant_error_bound[PSI]
+        + changing_error_bound[THETA]
+        + changing_error_bound[PSI]
     )
     for i in range(3):
         rate_error_bound_by_attitude = (
             max_turn_rate * (attitude_error_bound_sum + max_pitch_secant * previous_error_bound[THETA])
-            + tilt_reading_change * momentary_error_bound / config.sample_time_s
+            + tilt_reading_change * momentary_theta_and_psi_error_bound / config.sample_time_s
         )
         tests[FIRST_TURN_TEST + i].bound_per_s = (
             EARTH_RATE_BOUND_RAD_S
@@ -663,18 +669,18 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
         )
         tests[FIRST_ANGLE_TEST + i].bound_per_s, tests[FIRST_ANGLE_TEST + i].bound_per_sample = (
             max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
-            error_change_bound[PHI + i],
+            changing_error_bound[PHI + i],
         )
-    max_sin_theta = abs(np.sin(readings[THETA])) + error_change_bound[THETA]
-    max_sin_phi = abs(np.sin(readings[PHI])) + error_change_bound[PHI]
+    max_sin_theta = abs(np.sin(readings[THETA])) + changing_error_bound[THETA]
+    max_sin_phi = abs(np.sin(readings[PHI])) + changing_error_bound[PHI]
     tests[FIRST_TURN_TEST].bound_per_sample = (
-        error_change_bound[PHI] + max_sin_theta * error_change_bound[PSI]
+        changing_error_bound[PHI] + max_sin_theta * changing_error_bound[PSI]
     )
     tests[FIRST_TURN_TEST + 1].bound_per_sample = (
-        error_change_bound[THETA] + max_sin_phi * error_change_bound[PSI]
+        changing_error_bound[THETA] + max_sin_phi * changing_error_bound[PSI]
     )
     tests[FIRST_TURN_TEST + 2].bound_per_sample = (
-        error_change_bound[PSI] + max_sin_phi * error_change_bound[THETA]
+        changing_error_bound[PSI] + max_sin_phi * changing_error_bound[THETA]
     )
 
 
@@ -695,7 +701,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     kinematics with respect to each reading, times the bound on the reading's error."""
     tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
     reading_error_bound, previous_error_bound = memory.reading_error_bound, memory.previous_error_bound
-    error_change_bound, previous_reading = memory.reading_error_change_bound, memory.previous_reading
+    changing_error_bound, previous_reading = memory.changing_reading_error_bound, memory.previous_reading
     min_airspeed = max(
         min(
             readings[AIRSPEED] - reading_error_bound[AIRSPEED],
@@ -718,7 +724,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         max(readings[AIRSPEED] / config.max_airspeed_mps, 1.0)
         * max(config.low_altitude_limit_m / min_height_of_two_samples(redundancy, readings), 1.0)
     )
-    flow_rate_error_bound = (
+    flow_angle_rate_error_bound = (
         max_sideslip_secant**2
         * (
             (
@@ -731,9 +737,9 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         )
         + max_sideslip_secant * gyro_error_bound_sum
     )
-    tests[SPEED_TEST].residual_per_gust_speed, tests[SPEED_TEST].bound_per_sample = (
+    tests[SPEED_TEST].residual_per_gust_speed_change, tests[SPEED_TEST].bound_per_sample = (
         gust_change_factor,
-        error_change_bound[AIRSPEED],
+        changing_error_bound[AIRSPEED],
     )
     tests[SPEED_TEST].bound_per_s = (
         max_acceleration_error
@@ -742,13 +748,13 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     )
     for test_index, vane_index in ((ALPHA_FLOW_TEST, ALPHA), (BETA_FLOW_TEST, BETA)):
         (
-            tests[test_index].residual_per_gust_speed,
+            tests[test_index].residual_per_gust_speed_change,
             tests[test_index].bound_per_sample,
             tests[test_index].bound_per_s,
         ) = (
             gust_change_factor * max_sideslip_secant / min_airspeed,
-            error_change_bound[vane_index],
-            second_order_factor * flow_rate_error_bound,
+            changing_error_bound[vane_index],
+            second_order_factor * flow_angle_rate_error_bound,
         )
     previous_tilt_error_bound_sum, max_recent_acceleration = (
         previous_error_bound[PHI] + previous_error_bound[THETA],
@@ -767,7 +773,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         + climb_rate_error_bound
         + POSITION_INTEGRATION_ERROR_FACTOR * config.sample_time_s * max_recent_acceleration
     )
-    tests[CLIMB_TEST].bound_per_sample = error_change_bound[ALTITUDE]
+    tests[CLIMB_TEST].bound_per_sample = changing_error_bound[ALTITUDE]
 
 
 @kernel
@@ -775,7 +781,7 @@ def log_change_error_bound(redundancy, readings, sensor):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
     constant_error_bound, previous_reading = (
-        redundancy.config.constant_error[sensor],
+        redundancy.config.constant_error_bound[sensor],
         redundancy.memory.previous_reading[sensor],
     )
     smaller_reading = max(min(readings[sensor], previous_reading), 1.0)
@@ -783,15 +789,18 @@ def log_change_error_bound(redundancy, readings, sensor):
         1.0 / max(readings[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
     )
     return first_order_bound / max(
-        1.0 - constant_error_bound / smaller_reading, MIN_READING_SHARE_IN_LOGARITHM
+        1.0 - constant_error_bound / smaller_reading, MIN_READING_SHARE_LEFT_BY_ERROR
     )
 
 
 @kernel
-def bound_density_test(redundancy, readings):
+def bound_density_change_test(redundancy, readings):
     """Fill the bounds of `bound_residuals` for the logarithm of the density."""
     test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
-    reading_error_bound, error_change_bound = memory.reading_error_bound, memory.reading_error_change_bound
+    reading_error_bound, changing_error_bound = (
+        memory.reading_error_bound,
+        memory.changing_reading_error_bound,
+    )
     max_climb_rate = (
         memory.previous_reading[AIRSPEED]
         + memory.previous_error_bound[AIRSPEED]
@@ -804,12 +813,12 @@ def bound_density_test(redundancy, readings):
     test.bound_per_s = (
         max_climb_rate / DENSITY_SCALE_HEIGHT_M + apparent_log_change_bound / config.sample_time_s
     )
-    test.bound_per_sample = error_change_bound[QDYN] / max(
+    test.bound_per_sample = changing_error_bound[QDYN] / max(
         readings[QDYN] - reading_error_bound[QDYN], MIN_DYNAMIC_PRESSURE_PA
     )
     test.bound_per_sample += (
         2.0
-        * error_change_bound[AIRSPEED]
+        * changing_error_bound[AIRSPEED]
         / max(readings[AIRSPEED] - reading_error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
     )
 
@@ -833,7 +842,7 @@ def bound_residuals(redundancy, readings):
     )
     bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum)
     bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum)
-    bound_density_test(redundancy, readings)
+    bound_density_change_test(redundancy, readings)
 
 
 @kernel
@@ -853,7 +862,7 @@ def filter_residual(redundancy, test):
         test.filtered_bound[m] = (
             test.filtered_bound_per_s_part[m]
             + per_sample_part
-            + test.residual_per_gust_speed * config.gust_change_bound_mps[m]
+            + test.residual_per_gust_speed_change * config.gust_change_bound_mps[m]
         )
         test.residual_bound_ratio = max(
             test.residual_bound_ratio, abs(test.filtered_residual[m]) / test.filtered_bound[m]
@@ -894,7 +903,7 @@ def compare_duplicate_sensors(redundancy, readings, is_fresh):
             DUPLICATE_SENSOR_INDEX[duplicate_index],
             DUPLICATED_READING_INDEX[duplicate_index],
         )
-        test = redundancy.test[N_COMPUTED_TESTS + duplicate_index]
+        test = redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index]
         test.residual_bound_ratio = 0.0
         if is_fresh[duplicate_sensor_index - N_IN_EQUATIONS]:
             test.residual = readings[duplicate_sensor_index] - readings[duplicated_reading_index]

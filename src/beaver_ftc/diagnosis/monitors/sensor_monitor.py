@@ -84,9 +84,9 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     MANIFOLD_PRESSURE_TEST,
     MIN_AIRSPEED_MPS,
     MIN_FAULTY_FORCE_JUMP_M_S2,
-    N_COMPUTED_TESTS,
     N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
+    N_TESTS_WITH_EQUATION,
     NO_SENSOR,
     PHI_HYPOTHESIS,
     QDYN,
@@ -116,7 +116,7 @@ from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 # Accelerometers or flow sensor
 FLOW_JUMP_WINDOW_AFTER_ALARM_S = 1.0  # after the alarm: later, a jump by chance is too likely
-ACCELEROMETER_JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+ACCELEROMETER_JUMP_FADE_TIME_S = 2.0  # time constant with which the largest jump of an accelerometer fades
 MIN_READING_JUMP_PER_RESIDUAL = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
 MIN_RESIDUAL_SUM_PER_READING_RANGE = 30.0  # ratio; a scale error within 3 % of -1 gives so much
 # An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
@@ -151,10 +151,11 @@ def is_flow_test(test_index):
 @kernel
 def count_identical_samples_and_find_jump(monitor, readings):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
-    of an accelerometer from one sample to the next, m/s2, which fades within ACCELEROMETER_JUMP_MEMORY_S."""
+    of an accelerometer from one sample to the next, m/s2, which fades within
+    ACCELEROMETER_JUMP_FADE_TIME_S."""
     memory, previous_reading = monitor.memory, monitor.redundancy.memory.previous_reading
     memory.fading_max_accelerometer_jump *= (
-        1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_MEMORY_S
+        1.0 - monitor.redundancy.config.sample_time_s / ACCELEROMETER_JUMP_FADE_TIME_S
     )
     for i in range(N_SENSORS):
         memory.n_identical_samples[i] = (
@@ -216,20 +217,22 @@ def flow_reading_jumped(monitor, readings):
         redundancy.test[alarm_test_index],
     )
     # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
-    residual_per_m_s = (
+    residual_per_velocity_error = (
         1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     )
-    residual_per_m_s2 = redundancy.config.sample_time_s * residual_per_m_s
+    residual_per_acceleration_error = redundancy.config.sample_time_s * residual_per_velocity_error
     reading_second_difference = (
         readings[flow_sensor]
         - 2.0 * previous_reading[flow_sensor]
         + memory.reading_two_samples_ago[flow_sensor]
     )
     min_reading_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
-    max_accelerometer_effect = INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_m_s2
+    max_accelerometer_effect = (
+        INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_acceleration_error
+    )
     return (
         abs(alarm_test.residual)
-        > alarm_test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_m_s2
+        > alarm_test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_acceleration_error
         and abs(reading_second_difference) >= min_reading_jump > max_accelerometer_effect
     )
 
@@ -245,7 +248,7 @@ def sum_flow_residuals(monitor, readings):
         if memory.n_samples_since_alarm == 0:
             memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = flow_reading
             memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample
-                2.0 * test.bound_per_sample + test.residual_per_gust_speed * config.max_gust_speed_mps
+                2.0 * test.bound_per_sample + test.residual_per_gust_speed_change * config.max_gust_speed_mps
             )
             continue
         memory.flow_residual_sum_since_alarm[j] += test.residual
@@ -284,14 +287,14 @@ def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     memory, j = monitor.memory, monitor.output.alarm_test_index - SPEED_TEST
     reading_range = memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
-    explained_residual_sum = (
+    max_explained_residual_sum = (
         memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
     )
     return (
         reading_range > 0.0
         and abs(memory.flow_residual_sum_since_alarm[j])
         > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range
-        + MIN_EFFECT_OVER_BOUND_TO_CLEAR * explained_residual_sum
+        + MIN_EFFECT_OVER_BOUND_TO_CLEAR * max_explained_residual_sum
     )
 
 
@@ -379,7 +382,7 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
 def mark_accelerometers_unusable(monitor, measured):
     """Mark the accelerometers as unusable once one of them may be broken."""
     for i in range(AX, N_IN_EQUATIONS):
-        if monitor.output.is_replaced[i] or (monitor.output.alarmed and monitor.output.is_suspect[i]):
+        if monitor.output.is_reading_unused[i] or (monitor.output.alarmed and monitor.output.is_suspect[i]):
             set_inertial(measured, 0)
 
 
@@ -392,7 +395,7 @@ MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier w
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
-FAST_POLE_INDEX = 1
+FIRST_REPLACED_RATE_POLE_INDEX = 1
 
 # Gyro or attitude (judge_gyro_errors)
 RATE_DAMPING_RELATIVE_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
@@ -428,7 +431,7 @@ def monitor_sensors(monitor, prediction, measured, surface_conclusion, filter_ba
     if memory.substep == 0:
         update_gyro_error_estimate(monitor, filter_bank.output.innovation, bound_record.eta_bar, dt)
     run_redundancy_tests(redundancy, readings, monitor.config.has_engine_sensors)
-    if N_TESTS > N_COMPUTED_TESTS:
+    if N_TESTS > N_TESTS_WITH_EQUATION:
         compare_duplicate_sensors(redundancy, readings, measured.fresh)
         latch_agreeing_duplicates(monitor, measured.fresh)
     update_initial_error_bounds(redundancy, initial_errors, readings)
@@ -593,7 +596,7 @@ def raise_alarm(monitor, surface_conclusion, t):
         return
     output.alarmed, output.alarmed_at_s = 1, t
     if surface_conclusion.detected and surface_conclusion.detected_at_s < t - MIN_SURFACE_ALARM_LEAD_S:
-        output.keeps_isolated_surface = 1
+        output.keeps_surface_conclusion = 1
         return
     if surface_conclusion.detected:
         # the same fault, which the rates have shown first
@@ -605,7 +608,7 @@ def raise_alarm(monitor, surface_conclusion, t):
 def isolate_sensor(monitor, sensor, t):
     """Isolate a sensor at t s."""
     monitor.output.isolated_sensor, monitor.output.isolated_at_s = sensor, t
-    monitor.output.is_replaced[sensor] = 1
+    monitor.output.is_reading_unused[sensor] = 1
 
 
 @kernel
@@ -713,8 +716,8 @@ def find_suspects(monitor):
     is_suspect, alarm_test_index = monitor.output.is_suspect, monitor.output.alarm_test_index
     tests_exceeded_since_alarm = monitor.memory.tests_exceeded_since_alarm
     is_suspect[:] = 0
-    if alarm_test_index >= N_COMPUTED_TESTS:
-        suspect_disagreeing_sensors(monitor, alarm_test_index - N_COMPUTED_TESTS)
+    if alarm_test_index >= N_TESTS_WITH_EQUATION:
+        suspect_disagreeing_sensors(monitor, alarm_test_index - N_TESTS_WITH_EQUATION)
         return
     if alarm_test_index < SPEED_TEST:
         suspect_gyros_and_attitude(monitor)
@@ -749,7 +752,7 @@ def latch_agreeing_duplicates(monitor, is_fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
         agrees_with_duplicate = (
-            monitor.redundancy.test[N_COMPUTED_TESTS + duplicate_index].residual_bound_ratio <= 1.0
+            monitor.redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index].residual_bound_ratio <= 1.0
         )
         if (
             is_fresh[DUPLICATE_SENSOR_INDEX[duplicate_index] - N_IN_EQUATIONS]
@@ -775,7 +778,7 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
     )
     reading_test_record, duplicate_test_record = (
         redundancy.test[duplicated_reading_test_index],
-        redundancy.test[N_COMPUTED_TESTS + duplicate_index],
+        redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index],
     )
     # of the reading, if it is the broken one
     min_reading_error = abs(duplicate_test_record.residual) - duplicate_test_record.filtered_bound[0]
@@ -852,7 +855,7 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
     redundancy, previous_reading = monitor.redundancy, monitor.redundancy.memory.previous_reading
     alpha = previous_reading[ALPHA]
     stability_roll_share = np.cos(alpha) if gyro_index == 0 else np.sin(alpha)
-    acting_share = (
+    share_of_gyro_error_acting_on_flow = (
         abs(np.tan(previous_reading[BETA]) * stability_roll_share)
         if flow_test_index == ALPHA_FLOW_TEST
         else abs(np.sin(alpha))
@@ -869,7 +872,7 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
         )
         max_hidden_turn = (
             MAX_HIDDEN_ERROR_PER_TEST_BOUND
-            * (1.0 if acts_fully_on_flow else acting_share)
+            * (1.0 if acts_fully_on_flow else share_of_gyro_error_acting_on_flow)
             * turn_test.filtered_bound[m]
         )
         if abs(flow_test_record.filtered_residual[m]) > max_hidden_turn + flow_residual_bound:
@@ -1035,8 +1038,8 @@ def replace_isolated_readings(monitor, prediction, measured):
     readings, any_reading_replaced, slipstream_input_replaced = measured.signal, False, False
     for i in range(N_SENSORS):
         if measured.missing[i]:
-            monitor.output.is_replaced[i] = 1
-        if monitor.output.is_replaced[i] and i < AX:
+            monitor.output.is_reading_unused[i] = 1
+        if monitor.output.is_reading_unused[i] and i < AX:
             readings[i] = estimate_reading(monitor, prediction, readings, i)
             any_reading_replaced = True
             slipstream_input_replaced = slipstream_input_replaced or i in (
@@ -1093,8 +1096,8 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
         angle_correction = (
             config.sample_time_s
-            * FILTER_POLES_PER_S[FAST_POLE_INDEX]
-            * test.filtered_residual[FAST_POLE_INDEX]
+            * FILTER_POLES_PER_S[FIRST_REPLACED_RATE_POLE_INDEX]
+            * test.filtered_residual[FIRST_REPLACED_RATE_POLE_INDEX]
         )
     monitor.memory.is_rate_replaced[axis] = 1
     corrected_previous_rate = memory.previous_reading[axis] + angle_correction / config.sample_time_s

@@ -46,7 +46,7 @@ class EffectivenessFilter:
     def reset(self, context: Context) -> None:
         """Start healthy, with theta known to a tenth."""
         self.context, self.options = context, rival_options(self.name, self.defaults, context)
-        self.leading_surfaces = list(context.leading)
+        self.leading_surface_indices = list(context.leading)
         self.gust_states = GustStates(context)
         self.n_states = N_STATES_WITHOUT_GUSTS + self.gust_states.n_states
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
@@ -106,14 +106,14 @@ class EffectivenessFilter:
         if not self.detected:
             return Verdict(statistic=statistic)
         effectiveness = np.ones(len(self.context.surfaces))
-        effectiveness[self.leading_surfaces] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
+        effectiveness[self.leading_surface_indices] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
         most_significant_axis = int(np.argmax(self.wald_statistics()))
         if (
             self.mean_innovation_square > 3.0 * self.options["misfit"]
             or self.z[3 + most_significant_axis] > 0.0
         ):
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
-        surface_index = self.leading_surfaces[most_significant_axis]
+        surface_index = self.leading_surface_indices[most_significant_axis]
         theta, surface_name = float(effectiveness[surface_index] - 1.0), self.context.surfaces[surface_index]
         return Verdict(
             True,
@@ -139,7 +139,7 @@ class AugmentedEkf(EffectivenessFilter):
         dt = self.context.dt_s
         self.z[:3] += dt * (
             measured.acceleration
-            + measured.contribution[:, self.leading_surfaces] @ self.z[3:N_STATES_WITHOUT_GUSTS]
+            + measured.contribution[:, self.leading_surface_indices] @ self.z[3:N_STATES_WITHOUT_GUSTS]
         )
         if self.gust_states.n_states:
             self.z[:3] += self.gust_states.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
@@ -154,7 +154,7 @@ class AugmentedEkf(EffectivenessFilter):
         rate_steps = _DIFFERENCE_STEP_RAD_S * np.eye(3)
         f_at_steps = f(np.concatenate((measured.x + rate_steps, measured.x - rate_steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
-        F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surfaces]
+        F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surface_indices]
         F[:3, N_STATES_WITHOUT_GUSTS:] = self.gust_states.rate_effect
         F[range(N_STATES_WITHOUT_GUSTS, self.n_states), range(N_STATES_WITHOUT_GUSTS, self.n_states)] = (
             self.gust_states.decay_factor
@@ -199,7 +199,7 @@ class AugmentedUkf(EffectivenessFilter):
         f_change_from_measured = f(state_points[:, :3], measured.y) - f(measured.x, measured.y)
         loss_accelerations = np.array(
             [
-                measured.contribution[:, self.leading_surfaces] @ point[3:N_STATES_WITHOUT_GUSTS]
+                measured.contribution[:, self.leading_surface_indices] @ point[3:N_STATES_WITHOUT_GUSTS]
                 for point in state_points
             ]
         )

@@ -88,7 +88,7 @@ class ConstantThresholdObserver:
     def reset(self, context: Context) -> None:
         """No residual."""
         self.options = rival_options(self.name, self.defaults, context)
-        self.leading_surfaces, self.leaders = list(context.leading), context.leaders
+        self.leading_surface_indices, self.leaders = list(context.leading), context.leaders
         pole_per_s = self.options["pole_per_s"]
         self.dt_s, self.decay_factor = context.dt_s, exp(-pole_per_s * context.dt_s)
         # a declared bound of zero would make any rounding an alarm
@@ -113,7 +113,7 @@ class ConstantThresholdObserver:
             self.residual_since_alarm = self.decay_factor * self.residual_since_alarm + innovation
             self.filtered_effects = (
                 self.decay_factor * self.filtered_effects
-                + self.dt_s * measured.contribution[:, self.leading_surfaces]
+                + self.dt_s * measured.contribution[:, self.leading_surface_indices]
             )
         self.previous_rates = measured.x
         residual_threshold_ratio = np.abs(self.eps) / self.threshold

@@ -90,7 +90,7 @@ class RlsMonitor:
             InputOutputPredictionTest(forgetting_factor, averaging_decay, float(min_error_std[i]))
             for i in range(3)
         ]
-        self.leading_surfaces, self.leaders = context.leading, context.leaders
+        self.leading_surface_indices, self.leaders = context.leading, context.leaders
         self.verdict = Verdict()
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
@@ -98,7 +98,7 @@ class RlsMonitor:
         scores = [
             prediction_test.step(float(command[surface_index]), float(measured_rate))
             for prediction_test, surface_index, measured_rate in zip(
-                self.prediction_tests, self.leading_surfaces, measured.x, strict=True
+                self.prediction_tests, self.leading_surface_indices, measured.x, strict=True
             )
         ]
         if measured.t_s < self.options["warm_up_s"]:

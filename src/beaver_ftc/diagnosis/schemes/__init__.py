@@ -65,7 +65,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     if config.is_published:
         published.configure_published(fdi, scenario, travel)
     registry.configure_fault_types(fdi["types"], fdi["layout"], prediction["actuators"], scenario, travel)
-    fdi["types"]["config"]["has_declared_surface_errors"] = fdi["bound"]["has_declared_surface_errors"]
+    fdi["types"]["config"]["has_surface_term_errors"] = fdi["bound"]["has_surface_term_errors"]
     conclusions.reset_conclusion(fdi["verdict"])
 
 
@@ -100,7 +100,7 @@ def record_isolated_surfaces(fdi, t):
     found broken."""
     conclusion, monitor = fdi.verdict, fdi.sensor_monitor
     surface_conclusion_is_void = (
-        sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_isolated_surface
+        sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface_conclusion
     )
     sole_isolated_surface_index = conclusions.isolated_surface(conclusion, fdi.isolation.estimator)
     for s in range(fdi.types.surface.size):

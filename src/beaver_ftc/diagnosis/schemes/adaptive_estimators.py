@@ -76,8 +76,8 @@ def skip_accumulate_substep(fdi, prediction, measured):
 @kernel
 def start_detection_filters(fdi, x):
     """Begin the detection filters at the first measurement x (3,) rad/s."""
-    filters.start_fdae(fdi.fdae, fdi.bound.gyro_error_change_bound, x)
-    filters.start_bank(fdi.bank, fdi.bound.gyro_error_change_bound)
+    filters.start_fdae(fdi.fdae, fdi.bound.changing_gyro_error_bound, x)
+    filters.start_bank(fdi.bank, fdi.bound.changing_gyro_error_bound)
 
 
 @kernel
@@ -141,7 +141,7 @@ def isolate_fault(fdi, measured, t, was_detected_before):
     """
     variant_index, monitor = fdi.config.isolation_variant, fdi.sensor_monitor
     if not was_detected_before:
-        isolation.start_estimators(fdi.isolation, fdi.bound.gyro_error_change_bound, measured.x)
+        isolation.start_estimators(fdi.isolation, fdi.bound.changing_gyro_error_bound, measured.x)
         begin_isolation_variant(variant_index, fdi)
     alarm_is_not_initial_error = not sensor_monitor.surface_alarm_may_be_initial_error(
         monitor, fdi.verdict.detected_at_s
@@ -196,7 +196,7 @@ def parity_excludes(fdi, fie):
         fdi.statistical,
         fdi.layout.position_estimator[fie.surface],
     )
-    parity_views, surface_effectiveness_column = (
+    parity_views, surface_G_column = (
         statistical_detector.views[: statistical_detector.n_views],
         fdi.isolation.estimator[position_estimator_index].frame_mean_effect.regressor,
     )
@@ -206,7 +206,7 @@ def parity_excludes(fdi, fie):
         statistical_detector.forces,
         statistical_detector.gust,
         fie.surface,
-        surface_effectiveness_column,
+        surface_G_column,
     )
 
 
@@ -395,7 +395,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity.update_view_tests(
         parity_views, test_config, statistical_detector.tone_config, y, dt, k, is_alarm_latched
     )
-    is_model_error_known = fdi.bound.model_error_map.is_outside_all_boxes == 0
+    is_model_error_known = fdi.bound.model_error_bound_table.is_outside_all_boxes == 0
     statistical.update_alarm(
         statistical_detector.alarm,
         test_config,
@@ -546,7 +546,7 @@ def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
     engine_asymmetry_bound, conclusion_record = (
-        fdi.bound.model_error_map.engine_asymmetry_bound_now,
+        fdi.bound.model_error_bound_table.engine_asymmetry_bound_now,
         fdi.verdict,
     )
     if not conclusion_record.detected and monitors.detect_engine_failure(

@@ -130,15 +130,16 @@ def fill_input_basis(network, i, input_index, n_centres, input_value):
 
 
 @kernel
-def evaluate_state_network(network, main_surfaces, x, y, u):
+def evaluate_state_network(network, main_surface_indices, x, y, u):
     """Fill basis, of unit length on each axis, and network.output (3,) rad/s2 at (x, u).
 
-    x (3,) rad/s; y: measured signals; u (n,) rad; main_surfaces (3,): the surface that leads each axis.
+    x (3,) rad/s; y: measured signals; u (n,) rad; main_surface_indices (3,): the surface that leads each
+    axis.
     """
     for i in range(3):
         fill_input_basis(network, i, 0, N_CENTRES_PER_INPUT[0], y[ALPHA] if i == PITCH else y[BETA])
         fill_input_basis(network, i, 1, N_CENTRES_PER_INPUT[1], x[i])
-        fill_input_basis(network, i, 2, N_CENTRES_PER_INPUT[2], u[main_surfaces[i]])
+        fill_input_basis(network, i, 2, N_CENTRES_PER_INPUT[2], u[main_surface_indices[i]])
         node_index, weighted_sum = 0, 0.0
         for angle_centre_index in range(N_CENTRES_PER_INPUT[0]):
             for rate_centre_index in range(N_CENTRES_PER_INPUT[1]):
@@ -183,9 +184,9 @@ def train_fdae_network(published_record, fdae, is_detected, dt):
 
 
 @kernel
-def update_fdae_network_output(published_record, fdae, main_surfaces, x, y, u):
+def update_fdae_network_output(published_record, fdae, main_surface_indices, x, y, u):
     """Evaluate fhat for this frame, for the FDAE and the log; arguments as of `evaluate_state_network`."""
-    evaluate_state_network(published_record.network, main_surfaces, x, y, u)
+    evaluate_state_network(published_record.network, main_surface_indices, x, y, u)
     replace_network_output(fdae.network, published_record.network.output)
 
 

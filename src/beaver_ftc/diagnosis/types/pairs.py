@@ -67,7 +67,12 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         estimators[layout.position_estimator[aileron_index]].frame_mean_effect,
         estimators[layout.position_estimator[rudder_index]].frame_mean_effect,
     )
-    aileron_roll_per_rad, aileron_yaw_per_rad, rudder_roll_per_rad, rudder_yaw_per_rad = (
+    (
+        aileron_roll_acceleration_per_rad,
+        aileron_yaw_acceleration_per_rad,
+        rudder_roll_acceleration_per_rad,
+        rudder_yaw_acceleration_per_rad,
+    ) = (
         aileron_effect.regressor[ROLL],
         aileron_effect.regressor[YAW],
         rudder_effect.regressor[ROLL],
@@ -80,13 +85,20 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
     yaw_innovation_tolerance = (
         innovation_bound[YAW] + aileron_effect.error_bound[YAW] + rudder_effect.error_bound[YAW]
     )
-    determinant = aileron_roll_per_rad * rudder_yaw_per_rad - aileron_yaw_per_rad * rudder_roll_per_rad
+    determinant = (
+        aileron_roll_acceleration_per_rad * rudder_yaw_acceleration_per_rad
+        - aileron_yaw_acceleration_per_rad * rudder_roll_acceleration_per_rad
+    )
     abs_determinant = abs(determinant)
     aileron_deflection_error, aileron_deflection_error_tolerance = (
-        (roll_innovation * rudder_yaw_per_rad - yaw_innovation * rudder_roll_per_rad) / determinant,
         (
-            roll_innovation_tolerance * abs(rudder_yaw_per_rad)
-            + yaw_innovation_tolerance * abs(rudder_roll_per_rad)
+            roll_innovation * rudder_yaw_acceleration_per_rad
+            - yaw_innovation * rudder_roll_acceleration_per_rad
+        )
+        / determinant,
+        (
+            roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
+            + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
         )
         / abs_determinant,
     )
@@ -94,10 +106,14 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
     rudder_deflection_error, rudder_deflection_error_tolerance = (
-        (yaw_innovation * aileron_roll_per_rad - roll_innovation * aileron_yaw_per_rad) / determinant,
         (
-            yaw_innovation_tolerance * abs(aileron_roll_per_rad)
-            + roll_innovation_tolerance * abs(aileron_yaw_per_rad)
+            yaw_innovation * aileron_roll_acceleration_per_rad
+            - roll_innovation * aileron_yaw_acceleration_per_rad
+        )
+        / determinant,
+        (
+            yaw_innovation_tolerance * abs(aileron_roll_acceleration_per_rad)
+            + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
         )
         / abs_determinant,
     )

@@ -292,7 +292,7 @@ TYPES_CONFIG_RECORD = record(
     frame_shows_single_instant=int, n_substeps=int, released_surface_returns_via_actuator=int,
     slowest_half_cycle_frames=int,
     abrupt=int,
-    has_declared_surface_errors=int, frames_per_block=int, block_duration_s=float,
+    has_surface_term_errors=int, frames_per_block=int, block_duration_s=float,
     dt=float,
 )  # fmt: skip
 
@@ -309,7 +309,7 @@ FAULT_PAIR_RECORD = record(
 
 # Blocks of frames.
 FRAME_BLOCK_RECORD = record(
-    n_frames_so_far=int, mean_innovation=3, mean_innovation_bound=3, gyro_error_change_bound_at_start=3
+    n_frames_so_far=int, mean_innovation=3, mean_innovation_bound=3, changing_gyro_error_bound_at_start=3
 )
 
 
@@ -536,11 +536,11 @@ def observe_and_judge_frame(types, layout, estimators, innovation, bound_record)
 
 
 @kernel
-def begin_frame_block(types, layout, estimators, gyro_error_change_bound_before):
-    """Begin a block with the elapsed frame; gyro_error_change_bound_before (3,) rad/s: as it began."""
+def begin_frame_block(types, layout, estimators, changing_gyro_error_bound_before):
+    """Begin a block with the elapsed frame; changing_gyro_error_bound_before (3,) rad/s: as it began."""
     block = types.block
     block.mean_innovation[:], block.mean_innovation_bound[:] = 0.0, 0.0
-    block.gyro_error_change_bound_at_start[:] = gyro_error_change_bound_before
+    block.changing_gyro_error_bound_at_start[:] = changing_gyro_error_bound_before
     for estimator_index in layout.position_estimator:
         isolation.clear_mean_effect(estimators[estimator_index].block_mean_effect)
 
@@ -548,15 +548,15 @@ def begin_frame_block(types, layout, estimators, gyro_error_change_bound_before)
 @kernel
 def add_frame_to_block(types, layout, estimators, innovation, eta_bar):
     """Add the elapsed frame to the means over the block."""
-    block, block_share_of_frame = types.block, 1.0 / types.config.frames_per_block
+    block, frame_share_of_block = types.block, 1.0 / types.config.frames_per_block
     for i in range(3):
-        block.mean_innovation[i] += block_share_of_frame * innovation[i]
-        block.mean_innovation_bound[i] += block_share_of_frame * eta_bar[i]
+        block.mean_innovation[i] += frame_share_of_block * innovation[i]
+        block.mean_innovation_bound[i] += frame_share_of_block * eta_bar[i]
     for estimator_index in layout.position_estimator:
         isolation.add_to_mean_effect(
             estimators[estimator_index].block_mean_effect,
             estimators[estimator_index].frame_mean_effect,
-            block_share_of_frame,
+            frame_share_of_block,
         )
 
 
@@ -565,7 +565,7 @@ def observe_and_judge_block(types, layout, estimators, innovation, bound_record)
     """Add the elapsed frame to its block; with the last frame, observe the block and judge the one before."""
     config, block = types.config, types.block
     if block.n_frames_so_far == 0:
-        begin_frame_block(types, layout, estimators, bound_record.gyro_error_change_bound_before)
+        begin_frame_block(types, layout, estimators, bound_record.changing_gyro_error_bound_before)
     add_frame_to_block(types, layout, estimators, innovation, bound_record.eta_bar)
     block.n_frames_so_far += 1
     if block.n_frames_so_far < config.frames_per_block:
@@ -573,7 +573,7 @@ def observe_and_judge_block(types, layout, estimators, innovation, bound_record)
     block.n_frames_so_far = 0
     for i in range(3):
         block.mean_innovation_bound[i] += (
-            block.gyro_error_change_bound_at_start[i] + bound_record.gyro_error_change_bound[i]
+            block.changing_gyro_error_bound_at_start[i] + bound_record.changing_gyro_error_bound[i]
         ) / config.block_duration_s
     infer_surface_positions(types, layout, estimators, block.mean_innovation, block.mean_innovation_bound)
     judge_previous_frame(types)
@@ -597,7 +597,7 @@ def count_rest_as_evidence(types, surface_index):
     surface.evidence.n_rest_frames += 1
     if (
         surface.evidence.n_rest_frames > types.config.slowest_half_cycle_frames
-        and not types.config.has_declared_surface_errors
+        and not types.config.has_surface_term_errors
     ):
         for type_index in range(N_TYPES):
             if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:

@@ -131,7 +131,7 @@ def sole_remaining_constant_parameter_type(surface):
 
 
 @kernel
-def sole_remaining_type_if_shown(surface):
+def sole_remaining_type_once_it_shows_itself(surface):
     """The one type left, constant or varying, or TYPE_UNDECIDED: in coarse sets a constant proves nothing."""
     remaining_type = sole_remaining_type(surface, N_TYPES)
     return remaining_type if remaining_type >= 0 and has_shown(surface, remaining_type) else TYPE_UNDECIDED
@@ -158,12 +158,14 @@ def can_be_confused_with(surface, type_index, apparent_type):
     """Whether a fault of type `type_index` may look like one of `apparent_type`, or of another type left of
     that name and of constant parameter."""
     for other_type in range(N_CONSTANT_PARAMETER_TYPES):
-        can_look_alike = (
+        type_can_look_like_other = (
             FIRST_TYPE_WITH_SAME_NAME[other_type] == FIRST_TYPE_WITH_SAME_NAME[apparent_type]
             and CAN_LOOK_LIKE[type_index, other_type]
             and type_remains(surface, other_type)
         )
-        if can_look_alike and not motion_rules_out(surface, STOP_DIRECTION_BY_TYPE[other_type], type_index):
+        if type_can_look_like_other and not motion_rules_out(
+            surface, STOP_DIRECTION_BY_TYPE[other_type], type_index
+        ):
             return True
     return False
 
@@ -217,12 +219,14 @@ def find_surface_at_fault(types, layout):
         )
     surface_index = sole_possible_surface(types.surface, True)
     return (
-        surface_index if surface_index >= 0 and other_surfaces_refuted(types, surface_index) else NOT_ISOLATED
+        surface_index
+        if surface_index >= 0 and other_surfaces_can_be_dismissed(types, surface_index)
+        else NOT_ISOLATED
     )
 
 
 @kernel
-def other_surfaces_refuted(types, candidate_surface_index):
+def other_surfaces_can_be_dismissed(types, candidate_surface_index):
     """Whether every other surface can only have a fault that depends on the command of the chosen one.
 
     A type that must show itself is given the time to. Where errors are declared that a course can hide in,
@@ -231,7 +235,7 @@ def other_surfaces_refuted(types, candidate_surface_index):
     config, required_half_cycles = types.config, 1
     for s, surface in enumerate(types.surface):
         if s != candidate_surface_index and surface.status.may_be_sole_fault and can_be_at_fault(surface):
-            if config.has_declared_surface_errors and any_type_remains(surface):
+            if config.has_surface_term_errors and any_type_remains(surface):
                 return False
             if not types_would_have_shown(config, surface):
                 return False
@@ -257,8 +261,8 @@ def fault_type_on_surface(config, surface):
         or remaining_type_can_hide_at_rest(config, surface)
     ):
         return TYPE_UNDECIDED
-    if config.has_declared_surface_errors:
-        return sole_remaining_type_if_shown(surface)
+    if config.has_surface_term_errors:
+        return sole_remaining_type_once_it_shows_itself(surface)
     types_have_had_time = types_would_have_shown(config, surface)
     if any_constant_parameter_type_remains(surface):
         remaining_type = sole_remaining_constant_parameter_type(surface)
@@ -504,17 +508,17 @@ def fault_findings(fdi: np.void, surface_names: Sequence[str]) -> Findings:
 
 def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findings:
     """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    surface_status = fdi["types"]["surface"]["status"]
-    isolated_surfaces = sorted(
-        np.flatnonzero(surface_status["is_isolated"]).tolist(),
-        key=lambda s: surface_status["isolated_at_s"][s],
+    status_by_surface = fdi["types"]["surface"]["status"]
+    isolated_surface_indices = sorted(
+        np.flatnonzero(status_by_surface["is_isolated"]).tolist(),
+        key=lambda s: status_by_surface["isolated_at_s"][s],
     )
     faults = [
-        _finding_on_surface(fdi, s, int(surface_status["fault_type"][s]), surface_names)
-        for s in isolated_surfaces
+        _finding_on_surface(fdi, s, int(status_by_surface["fault_type"][s]), surface_names)
+        for s in isolated_surface_indices
     ]
     group_has_alarm = fdi["types"]["pair"]["group_has_alarm"]
-    surfaces_by_group = [
+    surface_indices_by_group = [
         np.flatnonzero(fdi["layout"]["group"] == group_index).tolist()
         for group_index in range(len(group_has_alarm))
     ]
@@ -523,9 +527,12 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
             group_has_alarm
         )  # a statistical alarm by itself says of no plane that it is there
     undecided_group_findings = [
-        {**_NO_FINDINGS, "candidates": tuple(_remaining_candidates(fdi, group_surfaces, surface_names))}
-        for group_alarm, group_surfaces in zip(group_has_alarm, surfaces_by_group, strict=True)
-        if group_alarm and not set(group_surfaces) & set(isolated_surfaces)
+        {
+            **_NO_FINDINGS,
+            "candidates": tuple(_remaining_candidates(fdi, group_surface_indices, surface_names)),
+        }
+        for group_alarm, group_surface_indices in zip(group_has_alarm, surface_indices_by_group, strict=True)
+        if group_alarm and not set(group_surface_indices) & set(isolated_surface_indices)
     ]
     if faults:
         return {**faults[0], "faults": (*faults, *undecided_group_findings)}
@@ -620,7 +627,7 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
     constant_parameter_type_indices = [
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
-    if constant_parameter_type_indices and not fdi["types"]["config"]["has_declared_surface_errors"]:
+    if constant_parameter_type_indices and not fdi["types"]["config"]["has_surface_term_errors"]:
         evidence, slowest_half_cycle_frames = (
             surface["evidence"],
             fdi["types"]["config"]["slowest_half_cycle_frames"],

@@ -653,7 +653,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
             config["sample_time_s"],
             test["bound_per_s"],
             test["bound_per_sample"],
-            test["residual_per_gust_speed"],
+            test["residual_per_gust_speed_change"],
             *config["gust_change_bound_mps"],
         ]
     )
@@ -666,7 +666,7 @@ def test_an_alarm_of_instruments_adds_up_to_its_test_whatever_is_declared(turned
     assert most == pytest.approx(
         config["sample_time_s"] * test["bound_per_s"]
         + test["bound_per_sample"]
-        + test["residual_per_gust_speed"] * config["gust_change_bound_mps"][1]
+        + test["residual_per_gust_speed_change"] * config["gust_change_bound_mps"][1]
     )
     assert before - nothing == pytest.approx(8.0 - 0.9)
     assert most_before == pytest.approx(4.7 - most)

@@ -58,7 +58,7 @@ BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
 
 def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponentially: bool) -> DiagnosisRows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
-    regressors, residual = _whitened_loss_regression(samples, model)
+    regressors, residual = _whitened_effectiveness_change_regression(samples, model)
     information = _fading_or_sliding_sums(
         np.einsum("nai,naj->nij", regressors, regressors), samples.dt_s, forgets_exponentially
     )
@@ -78,7 +78,7 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
     )
 
 
-def _whitened_loss_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
+def _whitened_effectiveness_change_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
     is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
     residual_covariance = model.intercept_past_response_noise()[3]
@@ -127,10 +127,10 @@ def _diagnosis_rows_from_least_squares(
     )
     if model.settings.likely_effectiveness_levels_by_group:
         for group_index, group in enumerate(model.groups):
-            labelled_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
+            likely_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
             levels = (
-                np.array([*labelled_levels, 1.0])
-                if labelled_levels
+                np.array([*likely_levels, 1.0])
+                if likely_levels
                 else np.unique(bank.effectiveness[:, group_index])
             )
             estimated_effectiveness[:, group_index] = levels[
@@ -182,16 +182,16 @@ def diagnose_by_freeze_rule(
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surface_names = list(model.vehicle.surfaces)
     servo_outputs = model.vehicle.outputs
-    logged_servo_output_columns = {
+    servo_output_column_by_surface = {
         name: servo_output.column
         for name, servo_output in servo_outputs.items()
         if servo_output.column in recording.columns
     }
-    if not logged_servo_output_columns:
+    if not servo_output_column_by_surface:
         return None
     is_frozen = np.zeros((len(samples.t_s), len(surface_names)), dtype=bool)
-    for name in logged_servo_output_columns:
-        column = recording.columns[logged_servo_output_columns[name]]
+    for name in servo_output_column_by_surface:
+        column = recording.columns[servo_output_column_by_surface[name]]
         last_output_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         differs_from_previous_row = np.concatenate([[True], np.diff(column.values) != 0.0])
         unchanged_since_s = column.t_s[

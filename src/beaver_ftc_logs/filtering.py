@@ -52,13 +52,13 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_flight_noise, delays_s = (
+    model_with_flight_noise, command_delay_candidates_s = (
         model.with_noise_model(samples.noise_ma_coefficients),
         model.settings.command_delay_candidates_s,
     )
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_flight_noise, bank)
-        for delay_s in delays_s
+        for delay_s in command_delay_candidates_s
     ]
     return _average_bank_runs(
         list(_model_probabilities_with_forgetting([run[3] for run in bank_runs], model.rate_hz)), bank_runs

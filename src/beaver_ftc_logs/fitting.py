@@ -432,41 +432,45 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
         / 3600.0
     )
-    n_changes, n_repairs, levels_by_group = 0, 0, {}
+    n_effectiveness_changes, n_repairs, effectiveness_levels_by_group = 0, 0, {}
     surface_names = list(model.vehicle.surfaces)
     for group in model.groups:
         surface_index = surface_names.index(group[0])
-        level_sequences = (
+        level_sequences_by_flight = (
             [_labelled_levels_in_order(usable_flight, surface_index) for usable_flight in usable_flights]
             if len(group) == 1
             else []
         )
-        levels_by_group["+".join(group)] = sorted(
-            {level for level_sequence in level_sequences for level in level_sequence if level < 1.0}
+        effectiveness_levels_by_group["+".join(group)] = sorted(
+            {level for level_sequence in level_sequences_by_flight for level in level_sequence if level < 1.0}
         )
-        n_changes += sum(max(len(level_sequence) - 1, 0) for level_sequence in level_sequences)
+        n_effectiveness_changes += sum(
+            max(len(level_sequence) - 1, 0) for level_sequence in level_sequences_by_flight
+        )
         n_repairs += sum(
-            int(level == 1.0) for level_sequence in level_sequences for level in level_sequence[1:]
+            int(level == 1.0) for level_sequence in level_sequences_by_flight for level in level_sequence[1:]
         )
-    levels_by_group = {group_name: levels for group_name, levels in levels_by_group.items() if levels}
+    effectiveness_levels_by_group = {
+        group_name: levels for group_name, levels in effectiveness_levels_by_group.items() if levels
+    }
     may_air_move = model.vehicle.moving_air
-    delays_s = [
+    command_delay_candidates_s = [
         delay_samples / model.rate_hz
         for delay_samples in ((0.0,) if may_air_move else _COMMAND_DELAY_CANDIDATES_SAMPLES)
     ]
-    law_settings = (
+    other_laws_settings = (
         _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if may_air_move else {})
         if model.vehicle.other_laws
         else {}
     )
-    if not levels_by_group:
+    if not effectiveness_levels_by_group:
         trim_random_walk_sd = _estimate_trim_random_walk_sd(usable_flights, model)
         model_with_trim_drift = model.model_copy(
-            update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **law_settings)}
+            update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **other_laws_settings)}
         )
         max_effective_sample_share = (
             (1.0 if may_air_move else _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
-            if law_settings
+            if other_laws_settings
             else _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED
         )
         effective_sample_share = min(
@@ -475,20 +479,22 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         alarm_settings = {"alarm": _FAULT_PROBABILITY_FOR_ALARM, "hold_s": _ALARM_CONFIRMATION_TIME_S}
         return FilterSettings(
             **alarm_settings,
-            **law_settings,
+            **other_laws_settings,
             power=effective_sample_share,
             trim_walk=trim_random_walk_sd,
-            delays_s=delays_s,
+            delays_s=command_delay_candidates_s,
         )
     return FilterSettings(
-        levels=levels_by_group,
+        levels=effectiveness_levels_by_group,
         changes_per_hour=float(
-            np.sqrt((n_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour)
+            np.sqrt(
+                (n_effectiveness_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour
+            )
         ),
-        **(_FILTER_SETTINGS_FOR_OTHER_DAYS | law_settings),
-        delays_s=delays_s,
+        **(_FILTER_SETTINGS_FOR_OTHER_DAYS | other_laws_settings),
+        delays_s=command_delay_candidates_s,
         repair_share=(n_repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
-        / (n_changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
+        / (n_effectiveness_changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
         power=_EFFECTIVE_SAMPLE_SHARE_LABELLED,
     )
 

@@ -242,11 +242,11 @@ def _is_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
 
 def _is_rate_clipped(rate_columns: list[Column], t_s: Floats) -> NDArray[np.bool_]:
     """Whether a rate is clipped at each sample."""
-    clipped_by_axis = [
+    is_clipped_by_axis = [
         _latest_values(t_s, rate_column.t_s, signals.is_clipped(rate_column.values).astype(float))
         for rate_column in rate_columns
     ]
-    return np.asarray(np.nan_to_num(clipped_by_axis).any(axis=0))
+    return np.asarray(np.nan_to_num(is_clipped_by_axis).any(axis=0))
 
 
 def _sampled_airspeed(
@@ -514,10 +514,10 @@ def _reader_arguments(
 def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
     """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
     that cannot be used."""
-    short_flights = [
+    short_flights_or_none = [
         one if one.n_log_parts == 1 else None for one in load_flights_for_fit(paths, vehicle, reader)
     ]
-    for path, samples in zip(paths, short_flights, strict=True):
+    for path, samples in zip(paths, short_flights_or_none, strict=True):
         if samples is not None:
             yield samples
             continue

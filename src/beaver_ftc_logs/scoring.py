@@ -25,12 +25,12 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
     if not is_surface_labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
     sample_index_of_row = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
-    labelled_fields = {
+    fields_of_labelled_surfaces = {
         name: getattr(rows, name).compress(is_surface_labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(rows, **labelled_fields),
+        replace(rows, **fields_of_labelled_surfaces),
         samples.labels[sample_index_of_row].compress(is_surface_labelled, axis=1),
     )
 

@@ -360,9 +360,9 @@ def _latch_until_healthy(
     is_raised: NDArray[np.bool_], is_health_likelier: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
-    row_index = np.arange(len(is_raised))
-    last_raised_row = np.maximum.accumulate(np.where(is_raised, row_index, -1))
-    last_healthy_row = np.maximum.accumulate(np.where(is_health_likelier & ~is_raised, row_index, -1))
+    row_indices = np.arange(len(is_raised))
+    last_raised_row = np.maximum.accumulate(np.where(is_raised, row_indices, -1))
+    last_healthy_row = np.maximum.accumulate(np.where(is_health_likelier & ~is_raised, row_indices, -1))
     return np.asarray((last_raised_row >= 0) & (last_raised_row > last_healthy_row))
 
 
@@ -374,8 +374,8 @@ def _group_level_distribution(
         bank.effectiveness[: bank.no_response_index, group_index], return_inverse=True
     )
     level_probability = np.zeros((len(probability_given_response), len(levels)))
-    for hypothesis, level_index in enumerate(level_index_of_hypothesis):
-        level_probability[:, level_index] += probability_given_response[:, hypothesis]
+    for hypothesis_index, level_index in enumerate(level_index_of_hypothesis):
+        level_probability[:, level_index] += probability_given_response[:, hypothesis_index]
     return levels, level_probability
 
 

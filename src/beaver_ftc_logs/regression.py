@@ -201,7 +201,7 @@ def least_squares(
     residuals = rates - scaled_regressors @ scaled_coefficients
     degrees_of_freedom = max(len(rates) - regressors.shape[1], 1)
     residual_covariance = residuals.T @ residuals / degrees_of_freedom
-    scaled_white_standard_errors = np.sqrt(
+    scaled_standard_errors_if_white = np.sqrt(
         np.maximum(np.outer(np.diag(scaled_inverse_gram), np.diag(residual_covariance)), 0.0)
     )
     scaled_newey_west_standard_errors = np.column_stack(
@@ -214,9 +214,9 @@ def least_squares(
     )
     standard_error_inflation = np.divide(
         scaled_newey_west_standard_errors,
-        scaled_white_standard_errors,
+        scaled_standard_errors_if_white,
         out=np.ones_like(scaled_newey_west_standard_errors),
-        where=scaled_white_standard_errors > 0,
+        where=scaled_standard_errors_if_white > 0,
     )
     root_of_inverse_gram_diagonal = np.sqrt(np.maximum(np.diag(scaled_inverse_gram), MIN_DIVISOR))
     return RateRegression(

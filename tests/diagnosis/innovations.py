@@ -148,7 +148,7 @@ def filter_all(block, innovations, dt, out):
 
 
 @kernel
-def weigh_all(block, innovations, signatures, regressors, first, keep, has_regressors, dt):
+def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regressors, dt):
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
@@ -164,7 +164,7 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, has_regre
             )
         for h in range(block.n_hypotheses):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate_evidence(block, has_regressors, dt, keep)
+        likelihood.accumulate_evidence(block, uses_regressors, dt, keep)
         likelihood.evaluate_hypotheses(block)
 
 
@@ -254,4 +254,4 @@ def surfaces_at_work(frames, rate_hz, rng, size=0.3):
 def gust_jitter(sensors, design, span_m):
     """What the noise of vanes and airspeed adds to the gust they see, in level flight."""
     flow = bounds.flow_angle_in_level_axes_noise_std(SensorErrors(sensors), LEVEL_FLIGHT[1][2])
-    return bounds.gust_acceleration_noise_std(flow, design, *LEVEL_FLIGHT[1:], span_m)
+    return bounds.angular_acceleration_by_gust_noise_std(flow, design, *LEVEL_FLIGHT[1:], span_m)

@@ -130,7 +130,7 @@ class Across:
         views, tests = views_of(record), record["test_config"]
         parity.update_view_directions_and_signatures(views, record["forces"], record["gust"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.fill_view_innovations_and_noise(views, int(tests["has_regressors"]), *parts, innovation, y[2])
+        parity.fill_view_innovations_and_noise(views, int(tests["uses_regressors"]), *parts, innovation, y[2])
         parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod

@@ -144,7 +144,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
             gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
-        gusts.fill_frame_mean_gust_acceleration(record, 1.0)
+        gusts.fill_frame_mean_acceleration_by_gust(record, 1.0)
         assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
@@ -362,7 +362,7 @@ def test_where_nothing_is_bounded_a_little_is_reckoned_with():
 
 def test_regressors_are_what_each_coefficient_multiplies():
     """Coefficients times regressors give f + G u without its inertia coupling, here at no rates."""
-    fdi, record, design = new_detector(frame_share_per_instant=1.0, has_regressors=1)
+    fdi, record, design = new_detector(frame_share_per_instant=1.0, uses_regressors=1)
     record["block"]["regressor"] = 9.0
     x = np.zeros(3)
     Statistical.prepare(record, fdi, design, x, Y, U)
@@ -380,7 +380,7 @@ def test_regressors_are_what_each_coefficient_multiplies():
 
 
 def test_instants_inside_a_frame_add_to_the_mean():
-    fdi, record, design = new_detector(has_regressors=1)
+    fdi, record, design = new_detector(uses_regressors=1)
     Statistical.prepare(record, fdi, design, X, Y, U)
     once = record["block"]["regressor"].copy()
     for _ in range(3):
@@ -518,7 +518,7 @@ def test_the_estimate_is_that_of_whoever_counts():
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(angular_acceleration_by_gust_sum=(0.4, -0.8, 1.2))
-    gusts.fill_frame_mean_gust_acceleration(record, share)
+    gusts.fill_frame_mean_acceleration_by_gust(record, share)
     assert record["output"]["mean_angular_acceleration_by_gust"] == pytest.approx(
         share * np.array([0.4, -0.8, 1.2])
     )

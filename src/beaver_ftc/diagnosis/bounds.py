@@ -951,7 +951,7 @@ def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps
     )
 
 
-def gust_acceleration_noise_std(
+def angular_acceleration_by_gust_noise_std(
     flow_angle_noise_std: np.ndarray, design: np.void, y: np.ndarray, u: np.ndarray, span_m: float
 ) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise (2,) rad of the flow's

@@ -49,8 +49,8 @@ from beaver_ftc.design.model import (
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import (
+    angular_acceleration_by_gust_noise_std,
     flow_angle_in_level_axes_noise_std,
-    gust_acceleration_noise_std,
     min_true_height_m,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_ACCELERATION_BOUND_M_S2
@@ -633,7 +633,7 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
 
 
 @kernel
-def fill_frame_mean_gust_acceleration(gust, frame_share_per_instant):
+def fill_frame_mean_acceleration_by_gust(gust, frame_share_per_instant):
     """Fill `mean_angular_acceleration_by_gust` and `acceleration_variance_by_axes_turn` for the elapsed
     frame.
 
@@ -780,12 +780,12 @@ def add_gust_estimate_noise(
         flow_angle_noise_std_by_forces = np.sqrt(
             force_records_normal_first["accelerometer_innovation_variance"]
         ) / np.abs(force_records_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
-        statistical["forces"]["gust_acceleration_noise_std"] = gust_acceleration_noise_std(
-            flow_angle_noise_std_by_forces, design, y, u, span_m
+        statistical["forces"]["angular_acceleration_by_gust_noise_std"] = (
+            angular_acceleration_by_gust_noise_std(flow_angle_noise_std_by_forces, design, y, u, span_m)
         )
     for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
         statistical["noise"][field_name] += (
-            gust_acceleration_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
+            angular_acceleration_by_gust_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )
 
 

@@ -118,12 +118,12 @@ def context_with_measured_gust(context: Context, gust_estimate_noise_rad_s2: np.
     declared = context.declared
     if not declared.air:
         return context
-    errors_with_measured_gust = replace(
+    declared_with_measured_gust = replace(
         declared,
         gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_GUST_INTENSITY_SHARES),
         model_rad_s2=np.hypot(declared.model_rad_s2, gust_estimate_noise_rad_s2),
     )
-    return replace(context, declared=errors_with_measured_gust)
+    return replace(context, declared=declared_with_measured_gust)
 
 
 def detection_probability(

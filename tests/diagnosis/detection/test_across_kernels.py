@@ -257,7 +257,7 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
 def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi, surface, blind):
     G = np.array([[-9.0, 0.0, 1.2, 0.0], [0.0, -8.0, 0.0, -1.5], [-0.4, 0.0, -3.0, 0.0]])
     statistical, course = fdi["statistical"], np.cumsum(np.random.default_rng(surface).normal(size=20))
-    statistical["n_views"], statistical["test_config"]["has_regressors"] = 5, 0
+    statistical["n_views"], statistical["test_config"]["uses_regressors"] = 5, 0
     for k in range(20):
         Across.observe(fdi, course[k] * G[:, surface], G, 0.05 * G, FLOW, k, False)
     for v, view in enumerate(statistical["views"][:5]):
@@ -266,11 +266,13 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi
         assert (np.abs(view["block"]["onset_tests"]["correlation"]).max() > 1e-6) == felt
 
 
-@pytest.mark.parametrize(("latched", "has_regressors", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)])
-def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors, frame):
+@pytest.mark.parametrize(
+    ("latched", "uses_regressors", "frame"), [(False, 1, 6), (True, 1, 6), (False, 0, 7)]
+)
+def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, uses_regressors, frame):
     """Each view as a block of its own that is given what matrices say of the frame."""
     statistical = fdi["statistical"]
-    statistical["test_config"]["has_regressors"], G, Gu = has_regressors, *rng.normal(0.0, 3.0, (2, 3, 4))
+    statistical["test_config"]["uses_regressors"], G, Gu = uses_regressors, *rng.normal(0.0, 3.0, (2, 3, 4))
     innovation = rng.normal(size=3)
     alone, statistical["n_views"] = [], 2  # enough: the first, and one across a column
     statistical["views"][1] = statistical["views"][PAST_AILERON].copy()
@@ -285,13 +287,13 @@ def test_a_frame_is_seen_along_every_direction(fdi, rng, latched, has_regressors
         share = Across.turn(fdi, own, G) if own["orthogonal_to_surface"] >= 0 else 0.0
         block = own["block"]
         Across.blur(own, statistical, V)
-        if has_regressors:
+        if uses_regressors:
             Across.regress(fdi, own, innovation, share)
         Across.sign(fdi, own, Gu)
         block["frame_innovation"][0] = own["direction"][:3] @ innovation
         if not latched:
             likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(frame))
-        likelihood.update_block(block, own["uncertainty_bound"], has_regressors, DT, 0.9 if latched else 1.0)
+        likelihood.update_block(block, own["uncertainty_bound"], uses_regressors, DT, 0.9 if latched else 1.0)
         for name in NAMES:
             assert view["block"][name] == pytest.approx(block[name], rel=1e-12), name
         for name in (

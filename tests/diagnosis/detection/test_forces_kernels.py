@@ -340,8 +340,8 @@ def test_a_gust_that_nobody_tells_moves_rate_and_force_in_full(viewed):
 
 def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
     statistical = viewed["statistical"]
-    statistical["forces"]["gust_acceleration_noise_std"] = 0.1, 0.2, 0.3
-    for v, gust_acceleration_noise_std in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
+    statistical["forces"]["angular_acceleration_by_gust_noise_std"] = 0.1, 0.2, 0.3
+    for v, angular_acceleration_by_gust_noise_std in ((ALPHA_VIEW, True), (ELEVATOR_VIEW, False)):
         view = statistical["views"][v]
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
@@ -349,7 +349,7 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
             statistical["forces"]["component"][NORMAL_COMPONENT]["noise_variance_with_without_vane"][0]
         )
         assert view["block"]["model_noise_variance"][0] == pytest.approx(
-            (own + 0.6 * 0.2 * gust_acceleration_noise_std) ** 2
+            (own + 0.6 * 0.2 * angular_acceleration_by_gust_noise_std) ** 2
         )
 
 

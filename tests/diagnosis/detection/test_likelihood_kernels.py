@@ -392,7 +392,7 @@ def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_all
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 
-def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
+def judged(kind=LOSS, uses_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_most=0.0):
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind, tolerance=(0.1, 0.2))
     block["alarm_level"], block["noise_share_of_alarm_level"] = 1.0, 0.5
     onsets, onset_tests, overlap = [1, 5], block["onset_tests"][0], block["regressor_correlation"][0]
@@ -405,7 +405,7 @@ def judged(kind=LOSS, has_regressors=False, memory=0.0, rooms=(0.0, 0.0), at_mos
     )
     hypothesis = block["hypothesis"][0]
     hypothesis["score"], hypothesis["llr_lower_bound"], hypothesis["llr_upper_bound"] = 99.0, 99.0, at_most
-    if has_regressors:
+    if uses_regressors:
         likelihood.accumulate_regressor_correlation(block, onset_tests, overlap, N_ONSET_SLOTS, 1.0)
     likelihood.evaluate_hypotheses(block, memory)
     return hypothesis
@@ -420,7 +420,7 @@ def test_a_hypothesis_is_worth_its_best_onset():
 
 
 def test_what_errors_of_coefficients_explain_is_taken_off_and_may_be_added():
-    hypothesis = judged(has_regressors=True)  # slack 0.5 and 1.1
+    hypothesis = judged(uses_regressors=True)  # slack 0.5 and 1.1
     assert hypothesis["score"] == pytest.approx(max(2.5 / 2.0, 3.9 / 4.0))
     assert hypothesis["llr_lower_bound"] == pytest.approx(max(2.5**2 / 8.0, 3.9**2 / 32.0))
     assert hypothesis["llr_upper_bound"] == pytest.approx(max(3.5**2 / 8.0, 6.1**2 / 32.0))

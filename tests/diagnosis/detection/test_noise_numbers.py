@@ -266,12 +266,12 @@ def test_inertia_scales_every_term_by_the_worst_of_its_own_axes():
 
 def test_blocks_get_the_tolerances_of_their_axes():
     alone = Detector(50.0, bounds={"coefficients": 0.1})
-    assert alone.detector["test_config"]["has_regressors"] == 1
+    assert alone.detector["test_config"]["uses_regressors"] == 1
     for block, axes in zip(alone.blocks, ((1,), (0, 2), (0, 2)), strict=True):
         of_it = SIZE[np.isin(AXIS, axes)]
         assert block["n_regressors"] == of_it.size
         assert block["regressor_tolerance"][: of_it.size] == pytest.approx(0.1 * of_it)
-    assert Detector(50.0).detector["test_config"]["has_regressors"] == 0
+    assert Detector(50.0).detector["test_config"]["uses_regressors"] == 0
 
 
 def test_the_noise_of_vanes_and_airspeed_turns_the_gust_they_see():
@@ -399,13 +399,15 @@ def test_where_forces_are_weighed_their_noise_is_in_the_gust_that_follows_from_t
     gusts.add_gust_estimate_noise(statistical, SensorErrors(sensors.sensors), design, *LEVEL_FLIGHT[1:], dt)
     airspeed = LEVEL_FLIGHT[1][2]
     walked = known * np.sqrt(1.5**2 + 0.5**2) * np.array([0.2, 0.3]) * dt / airspeed
-    added = bound_kernels.gust_acceleration_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
+    added = bound_kernels.angular_acceleration_by_gust_noise_std(walked, design, *LEVEL_FLIGHT[1:], SPAN_M)
     assert np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"]) == pytest.approx(
         added, rel=0.02
     )
     by_force = known * np.array([0.2 / 50.0, 0.3 / 6.0])
-    expected = bound_kernels.gust_acceleration_noise_std(by_force, design, *LEVEL_FLIGHT[1:], SPAN_M)
-    assert forces["gust_acceleration_noise_std"] == pytest.approx(expected)
+    expected = bound_kernels.angular_acceleration_by_gust_noise_std(
+        by_force, design, *LEVEL_FLIGHT[1:], SPAN_M
+    )
+    assert forces["angular_acceleration_by_gust_noise_std"] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("error", "pace"), [((0.0, 0.0, 0.0), 15.0 * 0.02), ((0.1, 0.0, 0.0), 2.0)])
@@ -437,7 +439,7 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_bound_table_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
-    record.noise.base_uncertainty_change_over_bound = 0.02
+    record.noise.base_frame_uncertainty_change_over_bound = 0.02
     rng = np.random.default_rng(1)
     steps = rng.dirichlet(np.ones(20)) * 0.25
     for step, way in zip(steps, rng.permutation(3)[[0] * 20], strict=True):
@@ -460,7 +462,7 @@ def test_a_surface_that_stands_still_again_moves_no_error():
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
     error_map = np.zeros(1, error_bound_table_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
-    record.noise.base_uncertainty_change_over_bound, paces = 0.02, []
+    record.noise.base_frame_uncertainty_change_over_bound, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):
         statistical.update_uncertainty_change(record.noise, record.block, error_map, np.array(u))
         paces.append(float(record.block[1].uncertainty_change_over_bound_per_frame))

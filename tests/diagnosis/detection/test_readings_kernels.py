@@ -85,7 +85,7 @@ def test_noise_is_jitter_as_large_as_it_is_now(state):
 def test_without_errors_of_the_air_data_nothing_is_read():
     alone = Detector(100.0, bounds={"coefficients": 0.05})
     assert alone.detector["noise"]["has_reading_errors"] == 0
-    assert Detector(100.0).detector["test_config"]["has_regressors"] == 0
+    assert Detector(100.0).detector["test_config"]["uses_regressors"] == 0
     gyros = Bounds.model_validate({"sensors": {"p": {"noise_std_deg_s": 0.1}}}).sensors
     record = alone.detector
     declared_errors = alone.fdi["bound"]["declared_errors"]

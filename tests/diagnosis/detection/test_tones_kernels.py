@@ -52,12 +52,12 @@ def tone_config():
     return tone_config
 
 
-def listen(view, tone_config, samples, regressors=None, heard=True, has_regressors=False, alarm_level=6.0):
+def listen(view, tone_config, samples, regressors=None, heard=True, uses_regressors=False, alarm_level=6.0):
     for k, sample in enumerate(samples):
         view["block"]["unscaled_white_innovation_rad_s"][0] = sample
         if regressors is not None:
             view["block"]["regressor_response"][:3, 0] = regressors[k]
-        parity.update_tone_tests(view, tone_config, alarm_level, heard, has_regressors, DT)
+        parity.update_tone_tests(view, tone_config, alarm_level, heard, uses_regressors, DT)
 
 
 def resonance(samples):
@@ -73,7 +73,7 @@ def as_complex(pair):
 
 def test_what_is_heard_is_a_sum_that_fades_over_the_whitened_frames(view, tone_config, rng):
     samples, regressors = rng.normal(size=60), rng.normal(size=(60, 3))
-    listen(view, tone_config, samples, regressors, has_regressors=True)
+    listen(view, tone_config, samples, regressors, uses_regressors=True)
     found = view["tone_tests"]
     assert as_complex(found["correlation"]) == pytest.approx(resonance(2.0 * samples))
     for j in range(3):

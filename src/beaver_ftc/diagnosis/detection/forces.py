@@ -74,7 +74,7 @@ MEASURED_FORCES_RECORD = record(
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     sideslip_rate_coefficient=float, flow_angle_rate=2,
     n_updates_capped_at_minimum=int,  # updates so far, up to MIN_FORCE_UPDATES
-    gust_acceleration_noise_std=3,  # noise of the gust estimate from forces, rad/s2
+    angular_acceleration_by_gust_noise_std=3,  # noise of the gust estimate from forces, rad/s2
     y_without_vanes=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
 

@@ -620,7 +620,7 @@ def accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_
 
 
 @kernel
-def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
+def accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by
     `evidence_decay_factor`."""
     for h in range(block.n_hypotheses):
@@ -634,7 +634,7 @@ def accumulate_evidence(block, has_regressors, dt, evidence_decay_factor):
         accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence_decay_factor)
         if block.has_coarse_gust_estimate:
             accumulate_correlation_by_coarse_gust(block, onset_tests, n_tests, evidence_decay_factor)
-        if has_regressors:
+        if uses_regressors:
             accumulate_regressor_correlation(
                 block, onset_tests, block.regressor_correlation[group_index], n_tests, evidence_decay_factor
             )
@@ -788,7 +788,7 @@ def evaluate_hypotheses(block, upper_bound_decay_factor_per_frame=0.0, has_model
 def update_block(
     block,
     uncertainty_bound,
-    has_regressors,
+    uses_regressors,
     dt,
     evidence_decay_factor,
     upper_bound_decay_factor_per_frame=0.0,
@@ -796,7 +796,7 @@ def update_block(
 ):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
-    The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `has_regressors`,
+    The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `uses_regressors`,
     regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response_bounds`;
     evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor_per_frame,
     has_model_error_bound_table: `evaluate_hypotheses`.
@@ -811,9 +811,9 @@ def update_block(
         whiten(
             block, block.coarse_gust_filter_state, block.coarse_gust_response, dt, block.coarse_gust_response
         )
-    if has_regressors:
+    if uses_regressors:
         whiten_regressors(block, dt)
-    accumulate_evidence(block, has_regressors, dt, evidence_decay_factor)
+    accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor)
     evaluate_hypotheses(block, upper_bound_decay_factor_per_frame, has_model_error_bound_table)
 
 
@@ -827,7 +827,7 @@ def estimate_theta(kind, N, D):
 
 
 @kernel
-def set_coarse_gust_acceleration_of_block(block, acceleration):
+def set_coarse_gust_effect_of_block(block, acceleration):
     """Store the effect of the coarsely estimated gust, acceleration (3,) rad/s2, in `coarse_gust_response`.
 
     `update_block` whitens it in place.

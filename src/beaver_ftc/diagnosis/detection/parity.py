@@ -97,7 +97,7 @@ TONE_UPDATE_INTERVAL_S = 0.04
 # noise too, because `tone_whitening_gain` assumes constant gains, and the gains vary with a varying bound.
 TONE_NOISE_SHARE_OF_ALARM_LEVEL = 0.5
 # The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
-MAX_AIRSPEED_OVER_TRIM, MAX_VANE_ANGLE_RAD = 2.0, 0.5
+MAX_AIRSPEED_FACTOR_FROM_TRIM, MAX_VANE_ANGLE_RAD = 2.0, 0.5
 
 # Configuration that all views share.
 TONE_CONFIG_RECORD = record(
@@ -145,14 +145,14 @@ def is_within_envelope(tone_config, y):
 
 
 @kernel
-def update_tone_tests(view, tone_config, detector_alarm_level, inside_envelope, has_regressors, dt):
+def update_tone_tests(view, tone_config, detector_alarm_level, inside_envelope, uses_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
-    has_regressors: whether the regressors of the block count. Without `inside_envelope` the frame counts as
+    uses_regressors: whether the regressors of the block count. Without `inside_envelope` the frame counts as
     zero, so the sums decay.
     """
     tone_tests, block = view.tone_tests, view.block
-    n_regressors = block.n_regressors if has_regressors else 0
+    n_regressors = block.n_regressors if uses_regressors else 0
     inverse_innovation_std = np.sqrt(block.S_inverse[0, 0]) if inside_envelope else 0.0
     tone_tests.normalised_innovation_sum += inverse_innovation_std * block.unscaled_white_innovation_rad_s[0]
     for j in range(n_regressors):
@@ -339,8 +339,8 @@ def configure_tone_tests(
     tone_config["max_tone_mean_of_unit_uncertainty"] = derive_max_tone_mean_of_uncertainty(
         TONE_FREQUENCIES_RAD_S, uncertainty_change_rate_per_s
     )
-    tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_OVER_TRIM
-    tone_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_OVER_TRIM
+    tone_config["min_airspeed"] = airspeed_mps / MAX_AIRSPEED_FACTOR_FROM_TRIM
+    tone_config["max_airspeed"] = airspeed_mps * MAX_AIRSPEED_FACTOR_FROM_TRIM
     frames_per_update = max(round(TONE_UPDATE_INTERVAL_S / dt_s), 1)
     phase_per_frame_rad = TONE_FREQUENCIES_RAD_S * dt_s
     sum_decay_factor_per_update = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
@@ -405,7 +405,7 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
         direction=5, unit_column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
         plane_axes=(int, 2),  # the two components that the column has
         is_orthogonal_to_rolling_gust=int,  # whether m is orthogonal to the rolling gust as well
-        always_has_regressors=int,  # whether regressors count in this view even if they do in no other block
+        always_uses_regressors=int,  # whether regressors count in this view even if they do in no other block
         uses_inertial_flow_angle=int,  # whether the force is that at the flow angle from inertial motion
         is_immune_to_vane_error=int,  # whether an error of a vane does not appear in this view
         confirming_force_component=int,  # force of the views that confirm this one; 0 if no vane is used
@@ -590,7 +590,7 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         )
         model_noise_std += abs(m[i]) * np.sqrt(noise_model.acceleration_variance_by_input_noise[i])
         if view.is_immune_to_vane_error:
-            model_noise_std += abs(m[i]) * forces.gust_acceleration_noise_std[i]
+            model_noise_std += abs(m[i]) * forces.angular_acceleration_by_gust_noise_std[i]
         uncertainty_bound += abs(m[i]) * (
             noise_model.uncertainty_bound[i] + noise_model.additional_bound_for_surface_anywhere[i]
         )
@@ -692,11 +692,11 @@ def update_view_directions_and_signatures(views, forces, gust, bound_record, G, 
 
 @kernel
 def fill_view_innovations_and_noise(
-    views, has_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
+    views, uses_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
 ):
     """Project the innovation (3,) rad/s2 on the direction of each view, into `frame_innovation` of its block.
 
-    Fill the noise too, and with `has_regressors` the regressors of constant errors; V m/s.
+    Fill the noise too, and with `uses_regressors` the regressors of constant errors; V m/s.
     """
     for view in views:
         if not view.is_used:
@@ -709,7 +709,7 @@ def fill_view_innovations_and_noise(
                 projected_innovation[0] += m[i] * innovation_component_for_view(
                     view, forces, gust, inertial_gust, innovation, i
                 )
-        if has_regressors or view.always_has_regressors:
+        if uses_regressors or view.always_uses_regressors:
             fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation)
 
 
@@ -725,12 +725,16 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_al
             continue
         if not is_alarm_latched:
             likelihood.reset_onset_slot(view.block, onset_slot)
-        has_regressors = test_config.has_regressors or view.always_has_regressors
-        likelihood.update_block(view.block, view.uncertainty_bound, has_regressors, dt, evidence_decay_factor)
+        uses_regressors = test_config.uses_regressors or view.always_uses_regressors
+        likelihood.update_block(
+            view.block, view.uncertainty_bound, uses_regressors, dt, evidence_decay_factor
+        )
         if (
             not view.uses_inertial_flow_angle
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
-            update_tone_tests(view, tone_config, test_config.alarm_level, inside_envelope, has_regressors, dt)
+            update_tone_tests(
+                view, tone_config, test_config.alarm_level, inside_envelope, uses_regressors, dt
+            )
         view.decaying_peak_score = max(
             (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
             * view.decaying_peak_score,
@@ -999,7 +1003,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         if any(direction[SIDE_FORCE:]):
             force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
             view["confirming_force_component"] = plane_axes[1]
-            view["always_has_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
+            view["always_uses_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
             block["regressor_tolerance"][n_regressors : n_regressors + n_force_regressors] = force_record[
                 "regressor_tolerance"
             ][:n_force_regressors]

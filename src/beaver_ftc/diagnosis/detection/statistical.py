@@ -209,7 +209,7 @@ def configure_statistical_detector(
     sensor_errors, dt_s = declared.sensors, 1.0 / rate_hz
     n_instants_per_frame = int(fdi["config"]["n_substeps"])
     airspeed_mps = float(trim[1][AIRSPEED])
-    uncertainty_change_over_bound = uncertainty_change_over_bound_per_frame(
+    frame_uncertainty_change_over_bound = uncertainty_change_over_bound_per_frame(
         statistical_settings, aircraft, dt_s
     )
     test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
@@ -230,8 +230,10 @@ def configure_statistical_detector(
     )
     test_config["evidence_decay_factor"] = exp(-1.0 / (rate_hz * config.forgetting_time_s))
     _configure_blocks(statistical, sensor_errors, aircraft)
-    _configure_bounded_uncertainty(statistical, config, declared, uncertainty_change_over_bound, dt_s)
-    statistical["noise"]["base_uncertainty_change_over_bound"] = statistical_settings.uncertainty_rad_s * dt_s
+    _configure_bounded_uncertainty(statistical, config, declared, frame_uncertainty_change_over_bound, dt_s)
+    statistical["noise"]["base_frame_uncertainty_change_over_bound"] = (
+        statistical_settings.uncertainty_rad_s * dt_s
+    )
     _configure_drift_and_model_noise(
         statistical,
         drift_uncertainty_frequency_rad_s(statistical_settings, aircraft),
@@ -251,7 +253,7 @@ def configure_statistical_detector(
             statistical["tone_config"],
             false_alarm_probability_per_test,
             airspeed_mps,
-            uncertainty_change_over_bound * rate_hz,
+            frame_uncertainty_change_over_bound * rate_hz,
             dt_s,
         )
         if uses_forces:
@@ -359,7 +361,7 @@ def _configure_bounded_uncertainty(
     statistical: np.void,
     config: FdiConfig,
     declared: Declared,
-    uncertainty_change_over_bound: float,
+    frame_uncertainty_change_over_bound: float,
     dt_s: float,
 ) -> None:
     """Fill level, noise share and rate of change of the bounded uncertainty. A loss declared constant does
@@ -368,7 +370,7 @@ def _configure_bounded_uncertainty(
     for block in statistical["block"]:
         block["alarm_level"] = statistical["test_config"]["alarm_level"]
         block["noise_share_of_alarm_level"] = 0.0 if is_noise_free else NOISE_SHARE_OF_ALARM_LEVEL
-        block["uncertainty_change_over_bound_per_frame"] = uncertainty_change_over_bound
+        block["uncertainty_change_over_bound_per_frame"] = frame_uncertainty_change_over_bound
         hypothesis_kinds = block["hypothesis"]["kind"][: block["n_hypotheses"]]
         if config.fault_profile == "abrupt":
             block["n_hypotheses"] = np.sum(
@@ -469,7 +471,7 @@ def _configure_regressor_tolerances(
     for block, axes in zip(statistical["block"], (PITCH_AXES, LATERAL_AXES, LATERAL_AXES), strict=True):
         block_term_tolerances = term_tolerances[np.isin(axis_of_term, axes)]
         block["regressor_tolerance"][: block_term_tolerances.size] = block_term_tolerances
-    statistical["test_config"]["has_regressors"] = bool(np.any(term_tolerances))
+    statistical["test_config"]["uses_regressors"] = bool(np.any(term_tolerances))
 
 
 def configure_reading_regressors(
@@ -489,7 +491,7 @@ def configure_reading_regressors(
     )
     if not (steady_error_bounds.any() or reading_noise_std.any()):
         return
-    statistical["noise"]["has_reading_errors"] = statistical["test_config"]["has_regressors"] = 1
+    statistical["noise"]["has_reading_errors"] = statistical["test_config"]["uses_regressors"] = 1
     for block in statistical["block"]:
         first_reading_regressor_index = int(block["n_regressors"])
         block["n_regressors"] = first_reading_regressor_index + N_INPUT_READINGS
@@ -597,7 +599,7 @@ TEST_CONFIG_RECORD = record(
     alarm_level=float, isolation_llr_margin=float,  # standard deviations; difference of log-likelihood ratios
     evidence_decay_factor=float,  # factor by which evidence decays per frame after the alarm
     n_score_columns=int,
-    has_regressors=int,  # whether unknown constants have tolerances
+    uses_regressors=int,  # whether unknown constants have tolerances
     frame_share_per_instant=float,  # one over the number of instants in a frame
     has_model_error_bound_table=int,  # whether the model's error is mapped
 )  # fmt: skip
@@ -607,7 +609,7 @@ NOISE_RECORD = record(
     # of the drift that represents a bounded uncertainty, over bound squared, 1/s
     drift_intensity_over_squared_bound=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
-    base_uncertainty_change_over_bound=float,
+    base_frame_uncertainty_change_over_bound=float,
     uncertainty_bound=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
     additional_bound_for_surface_anywhere=3,  # what one surface anywhere in its travel adds to it, rad/s2
     deflection_error_effect_bound=3,  # share of the bound by errors of the deflections, rad/s2
@@ -664,9 +666,7 @@ def update_blocks(
             block.frame_innovation[i] = innovation[axis] - gust.output.mean_angular_acceleration_by_gust[axis]
         block.has_coarse_gust_estimate = gust.config.has_only_coarse_estimate
         if gust.config.has_only_coarse_estimate:
-            likelihood.set_coarse_gust_acceleration_of_block(
-                block, gust.output.angular_acceleration_by_coarse_gust
-            )
+            likelihood.set_coarse_gust_effect_of_block(block, gust.output.angular_acceleration_by_coarse_gust)
         if gust.output.accounts_for_gusts:
             add_gust_axes_turn_to_drift_covariance(gust, block)
             if block_index < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
@@ -679,7 +679,7 @@ def update_blocks(
         likelihood.update_block(
             block,
             uncertainty_bound,
-            test_config.has_regressors,
+            test_config.uses_regressors,
             dt,
             evidence_decay_factor,
             upper_bound_decay_factor_per_frame,
@@ -937,7 +937,7 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
     x, y = measured.x, measured.y
     if gust.output.accounts_for_gusts:
         gusts.fill_gust_effect(gust, design, x, y, u)
-    if test_config.has_regressors:
+    if test_config.uses_regressors:
         for block in blocks:
             block.regressor[:] = 0.0
         add_regressors(
@@ -972,7 +972,7 @@ def update_uncertainty_change(noise_model, blocks, model_error_bound_table, u):
         model_error_bound_table.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
-            noise_model.base_uncertainty_change_over_bound
+            noise_model.base_frame_uncertainty_change_over_bound
             + UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * max_travel_share_moved,
             UNCERTAINTY_BOUNDS_CHANGED_PER_TRAVEL * TRAVEL_SHARE_REVERSING_ERROR,
         )
@@ -985,7 +985,7 @@ def add_instant_to_gust_and_regressors(
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if gust.output.accounts_for_gusts:
         gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
-    if test_config.has_regressors:
+    if test_config.uses_regressors:
         add_regressors(
             test_config.frame_share_per_instant,
             noise_model,

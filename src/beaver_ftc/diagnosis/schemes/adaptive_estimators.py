@@ -367,9 +367,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
         prediction.frame_means,
     )
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
-    gusts.fill_frame_mean_gust_acceleration(gust, prediction.frame_share_per_instant)
+    gusts.fill_frame_mean_acceleration_by_gust(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
-        gusts.fill_frame_mean_gust_acceleration(inertial_gust, prediction.frame_share_per_instant)
+        gusts.fill_frame_mean_acceleration_by_gust(inertial_gust, prediction.frame_share_per_instant)
     fill_surface_effects_with_previous_G(frame_means)
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
@@ -383,7 +383,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     )
     parity.fill_view_innovations_and_noise(
         parity_views,
-        test_config.has_regressors,
+        test_config.uses_regressors,
         statistical_detector.noise,
         blocks,
         forces_record,

@@ -352,11 +352,11 @@ def surface_moment_magnitudes_per_rad(declared_errors, design, axis, s):
                 term_coefficient_magnitude + declared_errors.coefficient_tolerance[k]
             ) * declared_errors.max_monomial_magnitude[moment_table.monomial[k]]
     wing_area_times_length = design.S * (design.c if axis == 1 else design.b)
-    force_times_length = wing_area_times_length * declared_errors.magnitude_y[QDYN]
-    max_force_times_length = wing_area_times_length * declared_errors.magnitude_bound_y[QDYN]
+    moment_per_unit_coefficient = wing_area_times_length * declared_errors.magnitude_y[QDYN]
+    max_moment_per_unit_coefficient = wing_area_times_length * declared_errors.magnitude_bound_y[QDYN]
     return (
-        force_times_length * term_magnitude_sum_per_rad,
-        max_force_times_length * max_term_magnitude_sum_per_rad,
+        moment_per_unit_coefficient * term_magnitude_sum_per_rad,
+        max_moment_per_unit_coefficient * max_term_magnitude_sum_per_rad,
     )
 
 
@@ -940,13 +940,13 @@ def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps
     """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
     airspeed and attitude. An error of pitch attitude or heading turns the flow as much as an error of a
     vane."""
-    cross_axis_share = 0.3  # attitudes and incidences of up to 17 deg
+    max_share_of_speed_and_bank_noise = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
     vane_and_attitude_noise_std = [
         hypot(sensor_errors[vane].random, sensor_errors[attitude_angle].random)
         for vane, attitude_angle in vane_attitude_pairs
     ]
-    return np.array(vane_and_attitude_noise_std) + cross_axis_share * (
+    return np.array(vane_and_attitude_noise_std) + max_share_of_speed_and_bank_noise * (
         sensor_errors["V"].random / airspeed_mps + sensor_errors["phi"].random
     )
 

@@ -318,7 +318,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["bound_per_s"], test["bound_per_sample"] = residual[k], rate[k], noise[k]
-        redundancy.filter_residual(relations, test)
+        redundancy.filter_residual_and_its_bound(relations, test)
     weight = keep[:, None] ** np.arange(frames)[::-1]
     filtered = weight @ residual
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]

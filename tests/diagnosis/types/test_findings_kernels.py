@@ -29,13 +29,16 @@ def new(left=None, detected=1, pairs=0, verdict=NOT_ISOLATED, **fields):
     fdi["layout"]["position_estimator"], fdi["isolation"]["estimator"]["surface"][4:8] = POSITION_OF, range(4)
     fdi["layout"]["group"] = 1 - PITCH_GROUP
     fdi["layout"]["group"][[ELEVATOR, FLAP]] = PITCH_GROUP
-    fdi["types"]["surface"]["estimator_excluded"], fdi["types"]["surface"]["feasible_sets"]["excluded"] = 1, 1
+    (
+        fdi["types"]["surface"]["position_estimator_excluded"],
+        fdi["types"]["surface"]["feasible_sets"]["excluded"],
+    ) = 1, 1
     (
         fdi["types"]["surface"]["status"]["fault_type"],
         fdi["types"]["surface"]["status"]["type_decided_at_s"],
     ) = -1, -1.0
     for s, kinds in (left or {}).items():
-        fdi["types"]["surface"]["estimator_excluded"][s] = 0
+        fdi["types"]["surface"]["position_estimator_excluded"][s] = 0
         fdi["types"]["surface"]["feasible_sets"]["excluded"][s][list(kinds)] = 0
     put(fdi, **fields)
     return fdi
@@ -77,7 +80,7 @@ def test_a_surface_is_possible_until_it_is_excluded_or_ruled_out(named, standing
         fdi["types"]["surface"]["status"]["is_isolated"][RUDDER],
         fdi["types"]["surface"]["status"]["can_be_at_fault_basis"][RUDDER],
     ) = named, standing
-    fdi["types"]["surface"]["estimator_excluded"][RUDDER] = excluded
+    fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = excluded
     assert (f"rudder:{TYPE_NAMES[STUCK]}" in verdict.fault_findings(fdi, SURFACES)["candidates"]) == possible
 
 

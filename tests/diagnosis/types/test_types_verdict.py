@@ -89,7 +89,7 @@ def new_case(**left):
     for s, name in enumerate(("aileron", "elevator", "rudder", "flap")):
         kinds = left.get(name, ALL)
         if kinds is None:
-            fdi["types"]["surface"]["estimator_excluded"][s] = 1
+            fdi["types"]["surface"]["position_estimator_excluded"][s] = 1
         else:
             leave(fdi["types"]["surface"][s], *kinds)
     return fdi
@@ -318,7 +318,7 @@ def test_the_surface_at_fault():
 
 
 @pytest.mark.parametrize(
-    ("flap", "evidence", "has_surface_term_errors", "estimator_excluded"),
+    ("flap", "evidence", "has_surface_term_errors", "position_estimator_excluded"),
     [
         ((), PATIENCE, 0, True), ((), PATIENCE - 1, 0, False), ((SLOW,), PATIENCE, 0, True),
         ((OSCILLATORY,), 2 * PATIENCE - 1, 0, False), ((OSCILLATORY,), 2 * PATIENCE, 0, True),
@@ -328,7 +328,7 @@ def test_the_surface_at_fault():
     ],
 )  # fmt: skip
 def test_of_elevator_and_flap_the_one_a_constant_explains(
-    flap, evidence, has_surface_term_errors, estimator_excluded
+    flap, evidence, has_surface_term_errors, position_estimator_excluded
 ):
     fdi = new_case(elevator=(STUCK,), aileron=None, rudder=None, flap=flap)
     (
@@ -339,9 +339,11 @@ def test_of_elevator_and_flap_the_one_a_constant_explains(
         has_surface_term_errors,
     )
     fdi["types"]["surface"]["evidence"]["n_anomalous_frames_since_stop_could_hide"][FLAP] = evidence
-    assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == estimator_excluded
+    assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == position_estimator_excluded
     if flap is not None:
-        assert on(verdict.find_surface_at_fault, fdi) == (ELEVATOR if estimator_excluded else NOT_ISOLATED)
+        assert on(verdict.find_surface_at_fault, fdi) == (
+            ELEVATOR if position_estimator_excluded else NOT_ISOLATED
+        )
     fdi["types"]["surface"]["status"]["may_be_sole_fault"][FLAP] = 0
     assert bool(on(verdict.other_surfaces_can_be_dismissed, fdi, ELEVATOR)) == (evidence >= PATIENCE)
 
@@ -369,7 +371,7 @@ def test_a_decision_notes_when_surface_and_type_became_certain():
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
     conclude(fdi, verdict.decide_surface_and_type, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
-    fdi["types"]["surface"]["estimator_excluded"][RUDDER] = 1
+    fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = 1
     conclude(fdi, verdict.decide_surface_and_type, 6.0)
     assert fdi["verdict"]["isolated_estimator"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (6.0, 6.0)
@@ -1248,7 +1250,7 @@ def test_a_second_pitch_fault_is_named_once_it_shows():
 
 def test_the_first_named_is_the_one_the_verdict_is_about():
     fdi = decided(alarmed=(0, 1), aileron=(BIAS,), rudder=(BIAS,), elevator=None, flap=None)
-    fdi["types"]["surface"]["estimator_excluded"][[AILERON, RUDDER]] = 1
+    fdi["types"]["surface"]["position_estimator_excluded"][[AILERON, RUDDER]] = 1
     fdi["types"]["surface"]["status"]["is_isolated"], fdi["types"]["surface"]["status"]["isolated_at_s"] = (
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),

@@ -846,7 +846,7 @@ def bound_residuals(redundancy, readings):
 
 
 @kernel
-def filter_residual(redundancy, test):
+def filter_residual_and_its_bound(redundancy, test):
     """Pass one test's residual through its filters, and find its largest ratio to the bound."""
     config = redundancy.config
     test.residual_bound_ratio = 0.0
@@ -953,7 +953,7 @@ def run_redundancy_tests(redundancy, readings, has_engine_sensors):
         if is_too_steep and test_index < SPEED_TEST:
             restart_test(redundancy.test[test_index])
         else:
-            filter_residual(redundancy, redundancy.test[test_index])
+            filter_residual_and_its_bound(redundancy, redundancy.test[test_index])
     if has_engine_sensors:
         compare_engine_sensors(redundancy, readings)
 

@@ -275,7 +275,7 @@ def decide_fault_type(fdi, t, isolation_started_earlier):
     """Decide which fault of every type, alone or two at a time, is there."""
     types, conclusion_record, layout, filter_bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     estimators, bound_record = fdi.isolation.estimator, fdi.bound
-    verdict.record_excluded_estimators(types.surface, layout, estimators)
+    verdict.record_position_estimator_exclusions(types.surface, layout, estimators)
     if types.pair.enabled:
         pairs.observe_and_judge_frame_for_pairs(
             types, layout, estimators, filter_bank, bound_record.frame_innovation_bound

@@ -316,14 +316,14 @@ FRAME_BLOCK_RECORD = record(
 @lru_cache
 def surface_types_dtype() -> np.dtype:
     """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
-    what is concluded. estimator_excluded: as verdict.py keeps it."""
+    what is concluded. position_estimator_excluded: as verdict.py keeps it."""
     memory_dtypes = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_RECORD, commands=COMMANDS_RECORD, last_observation=OBSERVATION_RECORD,
         judged_observation=OBSERVATION_RECORD, earlier_observation=OBSERVATION_RECORD,
         evidence=ANOMALY_COUNTS_RECORD, feasible_sets=FEASIBLE_SETS_RECORD, release=RELEASE_RECORD,
         **memory_dtypes,
-        estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
+        position_estimator_excluded=int, status=SURFACE_FINDING_RECORD, accommodation=ACCOMMODATION_RECORD,
         first_pitch_fault_sets=FIRST_PITCH_FAULT_SETS_RECORD,
     )  # fmt: skip
 

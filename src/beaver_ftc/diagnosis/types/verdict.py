@@ -54,10 +54,10 @@ _TIME_TOLERANCE_S = 1e-9
 
 
 @kernel
-def record_excluded_estimators(surfaces, layout, estimators):
+def record_position_estimator_exclusions(surfaces, layout, estimators):
     """Keep for every surface whether its estimator is excluded."""
     for s, surface in enumerate(surfaces):
-        surface.estimator_excluded = estimators[layout.position_estimator[s]].excluded
+        surface.position_estimator_excluded = estimators[layout.position_estimator[s]].excluded
 
 
 @kernel
@@ -65,7 +65,7 @@ def can_be_at_fault(surface):
     """Whether anything on a surface can be the fault."""
     if surface.status.can_be_at_fault_basis != DECIDED_BY_ESTIMATOR:
         return surface.status.can_be_at_fault_basis == DEDUCED_FAULTY
-    return not surface.estimator_excluded
+    return not surface.position_estimator_excluded
 
 
 @kernel
@@ -608,7 +608,8 @@ def _can_be_at_fault(fdi: np.void, s: int) -> bool:
     if surface["status"]["is_isolated"] or surface["status"]["can_be_at_fault_basis"] == DEDUCED_FAULTY:
         return True
     return not (
-        surface["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY or surface["estimator_excluded"]
+        surface["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY
+        or surface["position_estimator_excluded"]
     )
 
 

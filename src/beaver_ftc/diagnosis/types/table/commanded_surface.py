@@ -245,7 +245,7 @@ def forget_bias_offset_interval(config, surface, type_index, k):
 
 
 @kernel
-def detect_run_to_stop_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high):
+def detect_runaway_speed_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high):
     """Hold an offset between judged_offset_low and judged_offset_high (rad) against what a slower one can be.
 
     A mean over several instants may be that of the last of them."""
@@ -268,7 +268,7 @@ def consistent_growing_bias_interval(config, surface, type_index, k):
     """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     judged_offset_low, judged_offset_high = offset_interval_of_judged_frame(surface)
     if judged_offset_low <= judged_offset_high:
-        detect_run_to_stop_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high)
+        detect_runaway_speed_and_narrow_offset(config, surface, judged_offset_low, judged_offset_high)
     if np.isinf(judged_offset_low) or np.isinf(judged_offset_high):
         return UNLIMITED_SET
     memory = surface.growing_bias

@@ -120,7 +120,10 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     record["config"]["gust_rotation_intensity_per_airspeed_at_1_m"] = Dryden(turbulence).rotation_walk_at_1_m(
         SPAN_M
     )
-    record["config"]["altitude_error_offset_m"], record["config"]["altitude_error_slope"] = 0.7, 0.02
+    record["config"]["altitude_error_bound_at_zero_m"], record["config"]["altitude_error_bound_per_m"] = (
+        0.7,
+        0.02,
+    )
     reading = height_ft * FT / (1.0 - 0.02 / 0.98) + 0.7 / 0.98 / (1.0 - 0.02 / 0.98)
     gusts.set_gust_rotation_intensity(record, reading)
     L = h * FT
@@ -136,7 +139,10 @@ def test_turbulence_is_as_strong_as_the_standard_has_it_at_a_height_and_no_less_
     declared_errors["air_rotation_bound_at_1_m"] = admitting.GUST_LIMIT_SIGMA * Dryden(
         turbulence
     ).low_rotation_limit_rad_s(SPAN_M)
-    declared_errors["altitude_error_offset_m"], declared_errors["altitude_error_slope"] = 0.7, 0.02
+    declared_errors["altitude_error_bound_at_zero_m"], declared_errors["altitude_error_bound_per_m"] = (
+        0.7,
+        0.02,
+    )
     bounds.set_air_rotation_bound(declared_errors, reading)
     sigma = max(1.9 * LOW[turbulence] / np.sqrt(h * b), 1.9 * HIGH[turbulence] / np.sqrt(1750.0 * b))
     assert declared_errors["air_rotation_bound"] == pytest.approx(6.0 * sigma)

@@ -96,8 +96,8 @@ def declared_errors_dtype(n: int) -> np.dtype:
         air_rotation_bound=3, deflection_error_bound=float,
         # of the air's rotation, rad/s: above 2000 ft; below 1000 ft, times the root of the height in m; how
         # far the reading of the altitude can be off: offset, m, and slope
-        air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_offset_m=float,
-        altitude_error_slope=float,
+        air_rotation_bound_aloft=float, air_rotation_bound_at_1_m=float, altitude_error_bound_at_zero_m=float,
+        altitude_error_bound_per_m=float,
         # of dpt: see `slipstream_error_bound`
         has_engine_instrument_errors=int, power_error_kw_by_instruments=float,
         power_error_kw_per_density_ratio=float,
@@ -658,12 +658,13 @@ def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, 
 
 
 @kernel
-def min_true_height_m(measured_altitude_m, error_offset_m, error_slope):
-    """The least true height, m. The error of `measured_altitude_m` is up to error_offset_m +
-    error_slope |truth|. The ground is at sea level; the model of turbulence has no height below
+def min_true_height_m(measured_altitude_m, error_bound_at_zero_m, error_bound_per_m):
+    """The least true height, m. The error of `measured_altitude_m` is up to error_bound_at_zero_m +
+    error_bound_per_m |truth|. The ground is at sea level; the model of turbulence has no height below
     LEAST_HEIGHT_M."""
     return max(
-        measured_altitude_m - (error_offset_m + error_slope * abs(measured_altitude_m)) / (1.0 - error_slope),
+        measured_altitude_m
+        - (error_bound_at_zero_m + error_bound_per_m * abs(measured_altitude_m)) / (1.0 - error_bound_per_m),
         LEAST_HEIGHT_M,
     )
 
@@ -673,7 +674,9 @@ def set_air_rotation_bound(declared_errors, measured_altitude_m):
     """Set the bound on the air's rotation, rad/s, for this altitude."""
     if declared_errors.air_rotation_bound_at_1_m > 0.0:
         min_height_m = min_true_height_m(
-            measured_altitude_m, declared_errors.altitude_error_offset_m, declared_errors.altitude_error_slope
+            measured_altitude_m,
+            declared_errors.altitude_error_bound_at_zero_m,
+            declared_errors.altitude_error_bound_per_m,
         )
         declared_errors.air_rotation_bound[:] = max(
             declared_errors.air_rotation_bound_aloft,
@@ -776,8 +779,8 @@ def fill_declared_errors(
     declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
     declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
-    declared_errors["altitude_error_offset_m"] = sensor_errors["altitude"].worst
-    declared_errors["altitude_error_slope"] = sensor_errors["altitude"].slope
+    declared_errors["altitude_error_bound_at_zero_m"] = sensor_errors["altitude"].worst
+    declared_errors["altitude_error_bound_per_m"] = sensor_errors["altitude"].slope
     declared_errors["signal_error_bound_at_zero"] = sensor_errors.each("worst")
     declared_errors["signal_error_bound_per_unit"] = sensor_errors.each("slope")
     declared_errors["constant_gyro_error_bound"] = sensor_errors.each("steady", AXES)

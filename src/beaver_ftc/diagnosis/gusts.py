@@ -75,8 +75,8 @@ GUST_CONFIG_RECORD = record(
     wing_area_per_mass=float, gravity=float, wing_span=float,  # m2/kg, m/s2, m
     # Intensity over airspeed of the drift of the rotation: above 2000 ft; at a height of 1 m.
     gust_rotation_intensity_per_airspeed_aloft=3, gust_rotation_intensity_per_airspeed_at_1_m=3,
-    altitude_error_offset_m=float,
-    altitude_error_slope=float,  # bound on the altimeter's error: offset, m; slope
+    altitude_error_bound_at_zero_m=float,
+    altitude_error_bound_per_m=float,  # bound on the altimeter's error: offset, m; slope
     # limit of a gust component, m/s; decay of `gust_velocity_change_since_start`, 1/s
     max_gust_velocity=float, gust_velocity_decay_rate=float,
     # Error variance of the speed, (m/s)2; variance of the gust, (m/s)2; share of a gust's intensity that a
@@ -409,7 +409,9 @@ def update_gust_velocity_and_speed(
 def set_gust_rotation_intensity(gust, measured_altitude_m):
     """Fill the intensity of turbulence at this altitude."""
     min_height_m = min_true_height_m(
-        measured_altitude_m, gust.config.altitude_error_offset_m, gust.config.altitude_error_slope
+        measured_altitude_m,
+        gust.config.altitude_error_bound_at_zero_m,
+        gust.config.altitude_error_bound_per_m,
     )
     gust.memory.gust_rotation_intensity_per_airspeed[0] = max(
         gust.config.gust_rotation_intensity_per_airspeed_aloft[0],
@@ -748,8 +750,8 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
         gust["config"]["gust_rotation_intensity_per_airspeed_aloft"],
         MIN_UNMEASURED_GUST_INTENSITY_SHARES if gust["output"]["is_gust_measured"] else 1.0,
     )
-    gust["config"]["altitude_error_offset_m"] = sensor_errors["altitude"].worst
-    gust["config"]["altitude_error_slope"] = sensor_errors["altitude"].slope
+    gust["config"]["altitude_error_bound_at_zero_m"] = sensor_errors["altitude"].worst
+    gust["config"]["altitude_error_bound_per_m"] = sensor_errors["altitude"].slope
     gust["config"]["turbulence_scale_length"] = SCALE_M
     gust["config"]["rolling_gust_correlation_length"] = rotation_lengths(span_m)[0]
 

@@ -334,12 +334,12 @@ def test_with_nothing_found_before_the_alarm_is_of_now():
 
 def test_an_instrument_without_a_reading_is_named_at_once():
     monitor = new_watch()
-    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(BETA, PSI), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), monitor, seen(BETA, PSI), 5.0)
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["isolated_sensor"] == BETA
     assert monitor["output"]["isolated_at_s"] == 5.0
     assert np.flatnonzero(monitor["output"]["is_reading_unused"]).tolist() == [BETA]
-    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(PSI), 6.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), monitor, seen(PSI), 6.0)
     assert monitor["output"]["isolated_sensor"] == BETA
 
 
@@ -350,16 +350,16 @@ def alarm_and_sensor(monitor):
 
 def test_the_one_suspect_left_is_named_and_two_are_not():
     monitor = with_shares({CLIMB_TEST: 2.0})
-    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
     assert alarm_and_sensor(monitor) == (1, CLIMB_TEST, ALTITUDE)
     monitor = with_shares({ALPHA_FLOW_TEST: 2.0})
-    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), monitor, seen(), 5.0)
     assert alarm_and_sensor(monitor) == (1, ALPHA_FLOW_TEST, NO_SENSOR)
     monitor["redundancy"]["test"]["residual_bound_ratio"][SPEED_TEST] = 9.0
-    on(watching.isolate_broken_sensor, new_fdi(), monitor, seen(), 6.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), monitor, seen(), 6.0)
     assert monitor["output"]["alarm_test_index"] == ALPHA_FLOW_TEST  # the first alarm leads
     quiet = new_watch()
-    on(watching.isolate_broken_sensor, new_fdi(), quiet, seen(), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, new_fdi(), quiet, seen(), 5.0)
     assert not quiet["output"]["alarmed"]
 
 
@@ -502,7 +502,7 @@ def test_the_first_whole_frame_shows_no_jump(begun, asked):
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
-    on(watching.isolate_broken_sensor, fdi, monitor, seen(), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, fdi, monitor, seen(), 5.0)
     assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
 
 
@@ -712,7 +712,7 @@ def test_the_rates_are_asked_once_a_frame(substep, asked):
         new_fdi(),
     )
     fdi["bank"]["output"]["threshold"], fdi["bound"]["frame_innovation_bound"] = 1.0, 1.0
-    on(watching.isolate_broken_sensor, fdi, monitor, seen(), 5.0)
+    on(watching.raise_alarm_and_isolate_broken_sensor, fdi, monitor, seen(), 5.0)
     assert (monitor["memory"]["gyro_error_verdict"][1] == GYRO_ERROR_REFUTED) == asked
 
 

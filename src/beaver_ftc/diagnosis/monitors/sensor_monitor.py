@@ -455,7 +455,9 @@ def monitor_sensors(monitor, prediction, measured, surface_conclusion, filter_ba
         advance_start_stage_and_widen_W_bound(monitor)
     if monitor.config.attitude_is_noisy:
         rule_out_gyros_if_W_and_attitude_differ(monitor)
-    isolate_broken_sensor(monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t)
+    raise_alarm_and_isolate_broken_sensor(
+        monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t
+    )
     replace_isolated_readings(monitor, prediction, measured)
     mark_accelerometers_unusable(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
@@ -543,7 +545,9 @@ def rule_out_gyros_if_W_and_attitude_differ(monitor):
 
 
 @kernel
-def isolate_broken_sensor(monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t):
+def raise_alarm_and_isolate_broken_sensor(
+    monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t
+):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
     output, memory = monitor.output, monitor.memory
     find_worst_test(monitor)

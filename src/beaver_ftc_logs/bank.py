@@ -26,7 +26,7 @@ _PAIR_LOSS_TRANSITION_SHARE = 0.02
 _UNKNOWN_OFFSET_TRANSITION_SHARE = 0.05
 _NO_RESPONSE_TRANSITION_SHARE = 0.02
 _PAIR_EFFECTIVENESS_LEVELS = (0.25, 0.5, 0.75)
-_PRIOR_HEALTHY_PROBABILITY, _PRIOR_NO_RESPONSE_PROBABILITY = 0.7, 0.2
+_PRIOR_ALL_HEALTHY_PROBABILITY, _PRIOR_NO_RESPONSE_PROBABILITY = 0.7, 0.2
 _MIN_NOISE_VARIANCE_SCALE, _MAX_NOISE_VARIANCE_SCALE = 0.3, 6.0
 _MAX_SQUARED_RESIDUAL = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
@@ -206,10 +206,10 @@ def _prior_probabilities(hypothesis_kind: np.ndarray, transition_share: Floats) 
     is_fault_or_unknown_offset = (hypothesis_kind != HEALTHY) & (hypothesis_kind != NO_RESPONSE)
     prior_probability = (
         transition_share
-        * (1.0 - _PRIOR_HEALTHY_PROBABILITY - _PRIOR_NO_RESPONSE_PROBABILITY)
+        * (1.0 - _PRIOR_ALL_HEALTHY_PROBABILITY - _PRIOR_NO_RESPONSE_PROBABILITY)
         / transition_share[is_fault_or_unknown_offset].sum()
     )
-    prior_probability[0] = _PRIOR_HEALTHY_PROBABILITY
+    prior_probability[0] = _PRIOR_ALL_HEALTHY_PROBABILITY
     prior_probability[-1] = _PRIOR_NO_RESPONSE_PROBABILITY
     return np.asarray(prior_probability)
 

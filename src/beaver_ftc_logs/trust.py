@@ -732,11 +732,11 @@ def _rows_out_of_fitted_ranges_by_reason(
         )
     if fitted_ranges.airspeed_range_mps is not None and samples.airspeed is not None:
         low, high = fitted_ranges.airspeed_range_mps
-        is_outside = ~_is_within_or_unknown(
+        is_airspeed_out_of_range = ~_is_within_or_unknown(
             samples.airspeed, (1.0 - _AIRSPEED_MARGIN_SHARE) * low, (1.0 + _AIRSPEED_MARGIN_SHARE) * high
         )
         rows_by_reason[_outside_range_text("airspeed", low, high)] = _mostly_true_recently(
-            is_outside, samples
+            is_airspeed_out_of_range, samples
         )
     return rows_by_reason
 

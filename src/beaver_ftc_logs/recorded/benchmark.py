@@ -281,9 +281,9 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
         table_rows = [
             [row["day"], *_score_texts(row)] for row in data_set["rows"] if row["kind"] == "one change"
         ]
-        for kind_summary in data_set["summary"]:
+        for day_kind_summary in data_set["summary"]:
             table_rows += [
-                [f"{kind_summary['kind']}: {statistic}", *_score_texts(kind_summary[statistic])]
+                [f"{day_kind_summary['kind']}: {statistic}", *_score_texts(day_kind_summary[statistic])]
                 for statistic in ("mean", "worst")
             ]
         titled_tables.append(

@@ -122,10 +122,10 @@ def _random_day(n_surfaces: int, seed: int) -> DayChanges:
 
 
 def apply_day_changes(
-    day: DayChanges, samples: Samples, past_coefficients: Floats, noise_covariance: Floats
+    day: DayChanges, samples: Samples, lagged_rate_coefficients: Floats, noise_covariance: Floats
 ) -> Samples:
-    """The flight as it might have been on that day. past_coefficients (3 h, 3) and noise_covariance (3, 3) of
-    its model."""
+    """The flight as it might have been on that day. lagged_rate_coefficients (3 h, 3) and noise_covariance
+    (3, 3) of its model."""
     rng = np.random.default_rng(20)
     effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shift_values_earlier(samples.commands, day.command_delay_s / samples.dt_s)
@@ -139,7 +139,7 @@ def apply_day_changes(
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
     extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
     rates = rates + extra_noise_sd_ratio * _rates_under_noise(
-        rng, past_coefficients, noise_covariance, len(rates)
+        rng, lagged_rate_coefficients, noise_covariance, len(rates)
     )
     return replace(samples, commands=commands, rates=rates)
 
@@ -167,15 +167,15 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlatio
 
 
 def _rates_under_noise(
-    rng: np.random.Generator, past_coefficients: Floats, noise_covariance: Floats, n_samples: int
+    rng: np.random.Generator, lagged_rate_coefficients: Floats, noise_covariance: Floats, n_samples: int
 ) -> Floats:
     """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
     process_noise = rng.standard_normal((n_samples, 3)) @ np.linalg.cholesky(noise_covariance).T
-    n_lags = len(past_coefficients) // 3
+    n_lags = len(lagged_rate_coefficients) // 3
     rates = np.zeros((n_samples + n_lags, 3))
     for k in range(n_samples):
         rates[k + n_lags] = (
-            rates[k : k + n_lags][::-1].ravel() @ past_coefficients[: 3 * n_lags] + process_noise[k]
+            rates[k : k + n_lags][::-1].ravel() @ lagged_rate_coefficients[: 3 * n_lags] + process_noise[k]
         )
     return rates[n_lags:]
 
@@ -224,15 +224,12 @@ def _score_days(
     models_and_held_out: Sequence[tuple[Model, FlightWithUsableRows]],
     whole_flight_model: Model,
 ) -> Iterator[Document]:
-    past_coefficients, noise_covariance = (
-        whole_flight_model.intercept_past_response_noise()[1],
-        whole_flight_model.intercept_past_response_noise()[3],
-    )
+    _, lagged_rate_coefficients, _, noise_covariance = whole_flight_model.intercept_past_response_noise()
     for day in days:
         scores_by_detector: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in models_and_held_out:
             altered_samples, labels = (
-                apply_day_changes(day, held_out.samples, past_coefficients, noise_covariance),
+                apply_day_changes(day, held_out.samples, lagged_rate_coefficients, noise_covariance),
                 benchmark.labels_in_usable_span(held_out),
             )
             for detector_name, method_scores in scores_by_detector.items():

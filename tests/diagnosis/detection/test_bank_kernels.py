@@ -19,7 +19,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
         fdi["bound"]["changing_gyro_error_bound"] = noise[k + 1]
-        on(filters.update_bank, fdi, x[k + 1], x[k], believed[k])
+        on(filters.update_residuals_and_thresholds, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame_innovation_bound"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)

@@ -189,7 +189,7 @@ def test_no_offset_takes_a_surface_beyond_its_stops(low, high):
     """A loss does, where neutral is out of reach."""
     fdi, surface = new_surface(low=low, high=high, command=0.2, travel_low=0.1)
     for kind, judge in (
-        (BIAS, commanded_surface.consistent_bias_interval),
+        (BIAS, commanded_surface.bias_interval_of_judged_frame),
         (GROWING_BIAS, commanded_surface.consistent_growing_bias_interval),
     ):
         judged(judge, fdi, surface, kind, 5)
@@ -214,13 +214,13 @@ def test_within_what_is_seen_at_once_a_stop_may_have_been_met_at_its_furthest_or
 
 def test_a_bias_keeps_the_offsets_that_explain_every_frame():
     fdi, surface = new_surface(low=0.1, high=0.15, command=0.3)
-    judged(commanded_surface.consistent_bias_interval, fdi, surface, BIAS, 5)
+    judged(commanded_surface.bias_interval_of_judged_frame, fdi, surface, BIAS, 5)
     (
         surface["judged_observation"]["position_low"],
         surface["judged_observation"]["position_high"],
         surface["judged_observation"]["healthy_position"],
     ) = 0.23, 0.4, 0.4
-    judged(commanded_surface.consistent_bias_interval, fdi, surface, BIAS, 6)
+    judged(commanded_surface.bias_interval_of_judged_frame, fdi, surface, BIAS, 6)
     assert (surface["feasible_sets"]["low"][BIAS], surface["feasible_sets"]["high"][BIAS]) == pytest.approx(
         (-0.17, -0.15)
     )

@@ -167,7 +167,7 @@ def set_parity_directions(isolation, G):
 
 
 @kernel
-def update_bank(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
+def update_residuals_and_thresholds(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
     x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the

@@ -137,16 +137,16 @@ class InteractingMultipleModels:
             float(self.mode_probabilities[-1]),
             self.mode_probabilities[1:-1].reshape(3, len(LOSS_THETA_LEVELS)),
         )
-        leader_probabilities = loss_mode_probabilities.sum(axis=1)
+        loss_probability_by_main_surface = loss_mode_probabilities.sum(axis=1)
         if unknown_fault_probability > self.options["isolate"]:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)
-        most_likely_axis = int(np.argmax(leader_probabilities))
-        if leader_probabilities[most_likely_axis] < self.options["isolate"]:
+        most_likely_axis = int(np.argmax(loss_probability_by_main_surface))
+        if loss_probability_by_main_surface[most_likely_axis] < self.options["isolate"]:
             min_candidate_probability = 1.0 - self.options["isolate"]
             candidates = tuple(
                 candidate_name
                 for candidate_name, probability in zip(
-                    self.context.leaders, leader_probabilities, strict=True
+                    self.context.leaders, loss_probability_by_main_surface, strict=True
                 )
                 if probability > min_candidate_probability
             )
@@ -154,7 +154,7 @@ class InteractingMultipleModels:
         theta = float(
             loss_mode_probabilities[most_likely_axis]
             @ LOSS_THETA_LEVELS
-            / leader_probabilities[most_likely_axis]
+            / loss_probability_by_main_surface[most_likely_axis]
         )
         surface_name = self.context.leaders[most_likely_axis]
         return Verdict(

@@ -502,7 +502,7 @@ def begin_scheme(fdi, prediction, measured):
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     conclusion_record, bound_record, dt = fdi.verdict, fdi.bound, fdi.config.dt
-    filters.update_bank(
+    filters.update_residuals_and_thresholds(
         fdi.bank,
         bound_record,
         measured.x,

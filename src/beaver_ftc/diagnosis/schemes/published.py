@@ -203,7 +203,7 @@ def fdae_alarm_axis(fdae):
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
-    filters.update_bank(
+    filters.update_residuals_and_thresholds(
         fdi.bank,
         bound_record,
         measured.x,

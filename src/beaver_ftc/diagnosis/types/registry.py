@@ -95,7 +95,7 @@ def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
 
 
 # The columns that verdict.py reads; `FaultType` says what they are.
-ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, EVIDENCE_AT_REST_BY_TYPE = (
+ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, MEANING_OF_REST_BY_TYPE = (
     _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
 SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
@@ -600,7 +600,7 @@ def count_rest_as_evidence(types, surface_index):
         and not types.config.has_surface_term_errors
     ):
         for type_index in range(N_TYPES):
-            if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
+            if MEANING_OF_REST_BY_TYPE[type_index] == REST_EXCLUDES_TYPE:
                 exclude_type(surface, type_index)
 
 
@@ -613,6 +613,6 @@ def agrees_with_rest_position(surface):
             surface.judged_observation.position_low > set_high
             or surface.judged_observation.position_high < set_low
         )
-        if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
+        if MEANING_OF_REST_BY_TYPE[type_index] == REST_POSITION_IS_PARAMETER and position_is_outside_set:
             return False
     return True

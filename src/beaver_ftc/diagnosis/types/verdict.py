@@ -30,9 +30,9 @@ from beaver_ftc.diagnosis.types.registry import (
     CAN_LOOK_LIKE,
     DEFLECTION_ERROR_TYPES_BY_PRECEDENCE,
     ERROR_DEPENDS_ON_COMMAND,
-    EVIDENCE_AT_REST_BY_TYPE,
     FIRST_TYPE_WITH_SAME_NAME,
     HALF_CYCLES_BEFORE_ISOLATING_OTHERS,
+    MEANING_OF_REST_BY_TYPE,
     MODE_SERVES_TYPE,
     MUST_SHOW_ITSELF,
     N_CONSTANT_PARAMETER_TYPES,
@@ -148,7 +148,7 @@ def remaining_type_can_hide_at_rest(config, surface):
     ):
         return False
     for type_index in range(N_TYPES):
-        if EVIDENCE_AT_REST_BY_TYPE[type_index] == REST_HIDES_TYPE and type_remains(surface, type_index):
+        if MEANING_OF_REST_BY_TYPE[type_index] == REST_HIDES_TYPE and type_remains(surface, type_index):
             return True
     return False
 

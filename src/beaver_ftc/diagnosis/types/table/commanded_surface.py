@@ -164,7 +164,7 @@ def offset_interval_of_judged_frame(surface):
 
 
 @kernel
-def consistent_bias_interval(config, surface, type_index, k):
+def bias_interval_of_judged_frame(config, surface, type_index, k):
     """The offsets that explain this frame."""
     return offset_interval_of_judged_frame(surface)
 
@@ -302,7 +302,7 @@ def last_offset_rad(fdi: np.void, s: int, type_index: int) -> float | None:
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
-    consistent_interval=consistent_bias_interval, possible_deflection_range=bias_deflection_range,
+    consistent_interval=bias_interval_of_judged_frame, possible_deflection_range=bias_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_deflection_error, deflection_error_precedence=2,
     deflection_relation=DeflectionRelation(
         1.0, theta_is_share=False, theta_range_for_travel=lambda low, high: (low - high, high - low)

@@ -25,10 +25,10 @@ def test_mechanisms_stand_below_what_they_do():
     ]
     lines = [line for line in mechanisms._grouped({"mechanisms": rows}).splitlines() if line]
     assert [line[:3] if line.startswith("- ") else line for line in lines] == [
-        "Mechanisms that help:", "- b", "- e",
-        "Mechanisms that help by one criterion and cost by another:", "- c",
-        "Mechanisms that cost:", "- a",
-        "Mechanisms that change no criterion beyond chance:", "- d",
+        "Mechanisms that help:", "- B", "- E",
+        "Mechanisms that help by one criterion and cost by another:", "- C",
+        "Mechanisms that cost:", "- A",
+        "Mechanisms that change no criterion beyond chance:", "- D",
     ]  # fmt: skip
 
 

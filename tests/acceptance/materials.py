@@ -20,10 +20,10 @@ reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.5}}]}
 
 
 def lay_out(line: str, folder: Path, installation: Installation, in_short: bool = False) -> None:
-    """Put into the folder what the command names; in_short: a sweep of 200 flights with 50 of them."""
+    """Put into the folder what the command names; in_short: a sweep of 200 flights with 60 of them."""
     for name, text in files_of_pages().items():
         if any(word in line for word in (name, f"{name.removesuffix('.py')}:")):
-            (folder / name).write_text(text.replace("runs: 200\n", "runs: 50\n") if in_short else text)
+            (folder / name).write_text(text.replace("runs: 200\n", "runs: 60\n") if in_short else text)
             for other in files_of_pages():  # the base of a sweep, the detector of a scenario
                 if other in text:
                     (folder / other).write_text(files_of_pages()[other])

@@ -295,9 +295,9 @@ class ResidualNoise(NamedTuple):
 def build_residual_noise(model: Model, noise_ma_coefficients: Sequence[float] = ()) -> ResidualNoise:
     """The noise of a flight, from a model's settings. noise_ma_coefficients: the moving average by which the
     flight is whitened, empty if it is not."""
-    settings, max_squared_residual = (
-        model.settings,
-        _MAX_SQUARED_RESIDUAL if len(model.residual_ar_coefficients(noise_ma_coefficients)) else np.inf,
+    settings = model.settings
+    max_squared_residual = (
+        _MAX_SQUARED_RESIDUAL if len(model.residual_ar_coefficients(noise_ma_coefficients)) else np.inf
     )
     scale_memory_samples = settings.noise_scale_memory_s * model.rate_hz
     return ResidualNoise(

@@ -148,13 +148,11 @@ def diagnose_inputs(
     aircraft_inputs: AircraftDiagnosisInputs, diagnosed_aircraft: DiagnosedAircraft
 ) -> tuple[DiagnosisRows, Document]:
     """The rows and the document of verdict.json."""
-    samples, diagnosis, input_arrays, gap_free_stretches, replayed_verdicts_by_stretch = (
-        aircraft_inputs.samples,
-        aircraft_inputs.diagnosis,
-        aircraft_inputs.input_arrays,
-        aircraft_inputs.gap_free_stretches,
-        [],
-    )
+    samples = aircraft_inputs.samples
+    diagnosis = aircraft_inputs.diagnosis
+    input_arrays = aircraft_inputs.input_arrays
+    gap_free_stretches = aircraft_inputs.gap_free_stretches
+    replayed_verdicts_by_stretch = []
     for begin, end in gap_free_stretches:
         diagnosis.reset()
         replayed_verdicts_by_stretch.append(
@@ -245,10 +243,8 @@ def _read_sample_inputs(
 ) -> tuple[list[Floats], dict[str, float]]:
     """Rates, signals, commands and attitude at each sample, as `stepped.log_input_columns`, and the mean age
     of the values of each held column, s. needs_attitude: if false, the attitude is zeros."""
-    si_columns, mean_age_s_by_held_column = (
-        convert_to_si(recording, vehicle).columns,
-        dict(samples.mean_age_s_by_held_column),
-    )
+    si_columns = convert_to_si(recording, vehicle).columns
+    mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
 
     def sampled_values(quantity: QuantityColumn) -> Floats:
         values, mean_age_s = values_and_mean_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
@@ -301,10 +297,8 @@ def _check_units_plausible(flight_name: str, input_arrays: list[Floats], aircraf
         raise BadInput(f"{flight_name}: {reason}, allowed: {allowed_text}, true airspeed in m/s and Pa")
     for surface_index, surface in enumerate(aircraft.surfaces):
         travel = aircraft.travel[surface]
-        max_deflection_rad, max_command_rad = (
-            max(abs(travel.min_rad), abs(travel.max_rad)),
-            np.nanmax(np.abs(commands[:, surface_index]), initial=0.0),
-        )
+        max_deflection_rad = max(abs(travel.min_rad), abs(travel.max_rad))
+        max_command_rad = np.nanmax(np.abs(commands[:, surface_index]), initial=0.0)
         if max_command_rad > _MAX_COMMAND_TRAVEL_RATIO * max_deflection_rad:
             reason = (
                 f"the command of {surface} reaches {max_command_rad:.3g} rad, allowed: its stop, "
@@ -337,11 +331,9 @@ def _join_stretch_verdicts(
 ) -> ReplayedVerdicts:
     """The diagnoses of the stretches as one of the flight. Rows between stretches have no alarm and bounds 0
     and 1."""
-    verdicts, effectiveness_low, effectiveness_high = (
-        [Verdict()] * n_samples,
-        np.zeros((n_samples, n_surfaces)),
-        np.ones((n_samples, n_surfaces)),
-    )
+    verdicts = [Verdict()] * n_samples
+    effectiveness_low = np.zeros((n_samples, n_surfaces))
+    effectiveness_high = np.ones((n_samples, n_surfaces))
     command_gain_upper_bounds = np.min(
         [replayed.command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0
     )
@@ -407,10 +399,8 @@ def _add_rows_after_doubtful_alarm(
 ) -> dict[str, Mask]:
     """The reasons that have rows. If an alarm was raised in a row with a reason, the rest of its stretch gets
     a reason of its own."""
-    has_reason, is_after_doubtful_alarm = (
-        np.logical_or.reduce(list(rows_by_reason.values())),
-        np.zeros(len(rows.t_s), dtype=bool),
-    )
+    has_reason = np.logical_or.reduce(list(rows_by_reason.values()))
+    is_after_doubtful_alarm = np.zeros(len(rows.t_s), dtype=bool)
     for begin, end in gap_free_stretches:
         alarm_rows = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarm_rows.size and has_reason[alarm_rows[0]]:

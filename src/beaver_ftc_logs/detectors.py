@@ -121,10 +121,8 @@ def _diagnosis_rows_from_least_squares(
         )
         for sign in (-1.0, 1.0)
     )
-    estimated_effectiveness, has_loss = (
-        np.clip(effectiveness, 0.0, 1.0),
-        effectiveness + _MIN_LOSS_STANDARD_ERRORS * effectiveness_standard_error < 1.0,
-    )
+    estimated_effectiveness = np.clip(effectiveness, 0.0, 1.0)
+    has_loss = effectiveness + _MIN_LOSS_STANDARD_ERRORS * effectiveness_standard_error < 1.0
     if model.settings.likely_effectiveness_levels_by_group:
         for group_index, group in enumerate(model.groups):
             likely_levels = model.settings.likely_effectiveness_levels_by_group.get("+".join(group))
@@ -168,11 +166,9 @@ def _rows_with_default_bounds(
         "probability": faulty.astype(float),
         **given_bounds_and_probability,
     }
-    low, high, probability = (
-        bounds_and_probability["low"],
-        bounds_and_probability["high"],
-        bounds_and_probability["probability"],
-    )
+    low = bounds_and_probability["low"]
+    high = bounds_and_probability["high"]
+    probability = bounds_and_probability["probability"]
     return DiagnosisRows(samples.t_s, faulty, isolated_names, effectiveness, low, high, probability)
 
 
@@ -239,10 +235,8 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
         is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
     )
     expected_acceleration = (predicted_rates - previous_rates) / dt_s
-    contribution, command = (
-        np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP)),
-        np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP)),
-    )
+    contribution = np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP))
+    command = np.zeros((len(rates), _N_LOOP_SURFACES_WITH_FLAP))
     predictable_responses = np.where(is_predictable[:, None, None], group_responses, 0.0)
     for group_index, surface_indices in enumerate(surface_groups):
         contribution[:, :, group_index] = predictable_responses[:, group_index] / dt_s

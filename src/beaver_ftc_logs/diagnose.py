@@ -222,10 +222,8 @@ def _withdraw_contradicted_isolation(
         * model.settings.effective_sample_share
         * (cumulated_squared_projections - cumulated_squared_projections[window_begin_rows])
     )
-    max_log_likelihood_gain, is_contradicted = (
-        log_likelihood_gain_by_group.max(axis=1),
-        np.zeros(len(residual), dtype=bool),
-    )
+    max_log_likelihood_gain = log_likelihood_gain_by_group.max(axis=1)
+    is_contradicted = np.zeros(len(residual), dtype=bool)
     for group_index, group in enumerate(model.groups):
         is_contradicted |= _rows_isolating_any(rows.isolated_surfaces, set(group)) & (
             max_log_likelihood_gain - log_likelihood_gain_by_group[:, group_index] > min_log_likelihood_gain

@@ -52,10 +52,10 @@ def withdraw_surfaces_where_engine_may_have_failed(
     alarm_edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
     for begin, end in zip(alarm_edges[::2].tolist(), alarm_edges[1::2].tolist(), strict=True):
         evidence_begin_row = int(np.searchsorted(t_s, evidence_start_time_s[begin]))
-        falls_as_without_power, is_rising = (
-            energy_height_rate_mps[evidence_begin_row:end] <= unpowered_energy_height_rate_mps,
-            energy_height_rate_mps[evidence_begin_row:end] > 0.0,
+        falls_as_without_power = (
+            energy_height_rate_mps[evidence_begin_row:end] <= unpowered_energy_height_rate_mps
         )
+        is_rising = energy_height_rate_mps[evidence_begin_row:end] > 0.0
         index_since_evidence_begin = np.arange(end - evidence_begin_row)
         last_falling_index, last_rising_index = (
             np.maximum.accumulate(np.where(one, index_since_evidence_begin, -1))

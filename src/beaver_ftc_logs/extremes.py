@@ -101,20 +101,14 @@ def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail
 def _excess_overdispersion(excesses_and_hours_by_flight: Sequence[PeaksAndHours]) -> float:
     """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
-    excess_sum_by_flight, hours = (
-        np.array([excesses.sum() for excesses, _ in excesses_and_hours_by_flight]),
-        np.array([hours for _, hours in excesses_and_hours_by_flight]),
-    )
-    n_peaks_over_level, hours_share_by_flight = (
-        sum(len(excesses) for excesses, _ in excesses_and_hours_by_flight),
-        hours / hours.sum(),
-    )
+    excess_sum_by_flight = np.array([excesses.sum() for excesses, _ in excesses_and_hours_by_flight])
+    hours = np.array([hours for _, hours in excesses_and_hours_by_flight])
+    n_peaks_over_level = sum(len(excesses) for excesses, _ in excesses_and_hours_by_flight)
+    hours_share_by_flight = hours / hours.sum()
     if len(excesses_and_hours_by_flight) < 2 or excess_sum_by_flight.sum() <= 0.0:
         return 1.0
-    expected_excess_sum_by_flight, mean_excess_of_peaks = (
-        hours_share_by_flight * excess_sum_by_flight.sum(),
-        excess_sum_by_flight.sum() / n_peaks_over_level,
-    )
+    expected_excess_sum_by_flight = hours_share_by_flight * excess_sum_by_flight.sum()
+    mean_excess_of_peaks = excess_sum_by_flight.sum() / n_peaks_over_level
     squared_standardized_deviations = (
         excess_sum_by_flight - expected_excess_sum_by_flight
     ) ** 2 / np.maximum(2.0 * expected_excess_sum_by_flight * mean_excess_of_peaks, MIN_DIVISOR)
@@ -128,10 +122,9 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
         _exceedance_probability(threshold - tail.tail_start_level, pareto_shapes, pareto_scales)[:, None]
         * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
-    order_by_rate, rate_probabilities = (
-        np.argsort(false_alarm_rates),
-        np.repeat(grid_probabilities, len(_PEAK_RATE_QUANTILE_PROBABILITIES))
-        / len(_PEAK_RATE_QUANTILE_PROBABILITIES),
+    order_by_rate = np.argsort(false_alarm_rates)
+    rate_probabilities = np.repeat(grid_probabilities, len(_PEAK_RATE_QUANTILE_PROBABILITIES)) / len(
+        _PEAK_RATE_QUANTILE_PROBABILITIES
     )
     quantile_index = np.searchsorted(
         np.cumsum(rate_probabilities[order_by_rate]),

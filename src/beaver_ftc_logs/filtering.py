@@ -52,10 +52,8 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_flight_noise, command_delay_candidates_s = (
-        model.with_noise_model(samples.noise_ma_coefficients),
-        model.settings.command_delay_candidates_s,
-    )
+    model_with_flight_noise = model.with_noise_model(samples.noise_ma_coefficients)
+    command_delay_candidates_s = model.settings.command_delay_candidates_s
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_flight_noise, bank)
         for delay_s in command_delay_candidates_s
@@ -138,10 +136,8 @@ def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: Nois
     squared_residual = np.einsum(
         "na,ab,nb->n", residual, np.linalg.inv(noise_model.residual_covariance), residual
     )
-    t_degrees_of_freedom, log_determinant = (
-        model.settings.t_degrees_of_freedom,
-        np.linalg.slogdet(noise_model.residual_covariance)[1],
-    )
+    t_degrees_of_freedom = model.settings.t_degrees_of_freedom
+    log_determinant = np.linalg.slogdet(noise_model.residual_covariance)[1]
     log_likelihood = -0.5 * (
         (t_degrees_of_freedom + 3.0) * np.log1p(squared_residual / t_degrees_of_freedom) + log_determinant
     ) + 3.0 * np.log(sum(noise_model.ma_coefficients))
@@ -289,11 +285,9 @@ def run_bank(
     be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
     min_noise_variance_scales (n,): lower bound of the scale of the noise.
     """
-    n_samples, n_hypotheses, n_states = (
-        len(unexplained_rates),
-        len(bank.transition_share),
-        len(state_model.initial_mean),
-    )
+    n_samples = len(unexplained_rates)
+    n_hypotheses = len(bank.transition_share)
+    n_states = len(state_model.initial_mean)
     no_response_index = n_hypotheses - 1
     hypothesis_probabilities = bank.prior_probability.copy()
     state_means = np.zeros((n_hypotheses, n_states))
@@ -453,10 +447,8 @@ def _correct_hypotheses(
     log_likelihoods = np.empty(n_hypotheses)
     squared_residuals = np.empty(n_hypotheses)
     zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
-    noise_covariance, t_degrees_of_freedom = (
-        noise.covariance * noise_variance_scale,
-        noise.t_degrees_of_freedom,
-    )
+    noise_covariance = noise.covariance * noise_variance_scale
+    t_degrees_of_freedom = noise.t_degrees_of_freedom
     for h in range(n_hypotheses):
         sensitivity = _state_sensitivity(
             bank.effectiveness[h],

@@ -219,10 +219,8 @@ def isolability_document(samples: Samples, model: Model) -> dict[str, Any]:
 def _standardized_group_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     is_predictable, _, group_responses = unexplained_rates_and_responses(samples, model)
-    group_responses, residual_covariance = (
-        group_responses[is_predictable],
-        np.array(model.residual_covariance),
-    )
+    group_responses = group_responses[is_predictable]
+    residual_covariance = np.array(model.residual_covariance)
     standardized_responses = np.linalg.solve(
         np.linalg.cholesky(residual_covariance), group_responses.reshape(-1, 3).T
     ).T
@@ -308,10 +306,8 @@ def _group_pair_cosine_entries(standardized_responses: Floats, model: Model) -> 
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pair_entries = []
     for first_group_index, second_group_index in combinations(range(len(model.groups)), 2):
-        first_response, second_response = (
-            standardized_responses[:, first_group_index].ravel(),
-            standardized_responses[:, second_group_index].ravel(),
-        )
+        first_response = standardized_responses[:, first_group_index].ravel()
+        second_response = standardized_responses[:, second_group_index].ravel()
         norm_product = float(np.sqrt((first_response @ first_response) * (second_response @ second_response)))
         cosine = float(first_response @ second_response) / max(norm_product, MIN_DIVISOR)
         surfaces = [model.groups[first_group_index], model.groups[second_group_index]]

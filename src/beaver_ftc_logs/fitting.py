@@ -35,11 +35,9 @@ COMMAND_LAG_COUNT_CANDIDATES = (2, 3, 4, 6)
 _NEWEY_WEST_MAX_LAG_S = 2.0
 _MIN_RATE_SD_RAD_S = 1e-6
 _UNFITTED_MARGIN_BEFORE_FAILURE_S = 1.0
-_FAULT_PROBABILITY_FOR_ALARM, _ALARM_CONFIRMATION_TIME_S, _MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED = (
-    0.995,
-    0.3,
-    0.9,
-)
+_FAULT_PROBABILITY_FOR_ALARM = 0.995
+_ALARM_CONFIRMATION_TIME_S = 0.3
+_MAX_EFFECTIVE_SAMPLE_SHARE_UNLABELLED = 0.9
 """Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
 With parts enough that are not fitted, the rate of false alarms decides instead."""
 _DEFAULT_FALSE_ALARMS_PER_HOUR = 1.0
@@ -231,11 +229,9 @@ def bic_by_order(
         usable_flights, vehicle, max(RATE_LAG_COUNT_CANDIDATES), max(COMMAND_LAG_COUNT_CANDIDATES)
     )
     regressor_rms = np.maximum(np.sqrt((regressors**2).mean(axis=0)), MIN_DIVISOR)
-    scaled_regressor_gram, scaled_regressor_rate_products, rate_gram = (
-        (regressors / regressor_rms).T @ (regressors / regressor_rms),
-        (regressors / regressor_rms).T @ rates,
-        rates.T @ rates,
-    )
+    scaled_regressor_gram = (regressors / regressor_rms).T @ (regressors / regressor_rms)
+    scaled_regressor_rate_products = (regressors / regressor_rms).T @ rates
+    rate_gram = rates.T @ rates
     bic_of_order = {}
     for n_rate_lags in RATE_LAG_COUNT_CANDIDATES:
         for n_command_lags in COMMAND_LAG_COUNT_CANDIDATES:
@@ -257,10 +253,8 @@ def bic_by_order(
 
 def _regressor_columns_of_order(vehicle: Vehicle, n_rate_lags: int, n_command_lags: int) -> list[int]:
     """Columns of the largest design that an order has."""
-    first_signal_column, n_signals = (
-        1 + 3 * max(RATE_LAG_COUNT_CANDIDATES),
-        len(vehicle.signal_regressor_names),
-    )
+    first_signal_column = 1 + 3 * max(RATE_LAG_COUNT_CANDIDATES)
+    n_signals = len(vehicle.signal_regressor_names)
     first_command_column = first_signal_column + n_signals * vehicle.n_signal_lags(
         max(RATE_LAG_COUNT_CANDIDATES)
     )
@@ -320,10 +314,8 @@ def stacked_regression_data(
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
-    surface_groups, max_lag = (
-        regression.group_surfaces_by_commands(vehicle),
-        max(RATE_LAG_COUNT_CANDIDATES + COMMAND_LAG_COUNT_CANDIDATES),
-    )
+    surface_groups = regression.group_surfaces_by_commands(vehicle)
+    max_lag = max(RATE_LAG_COUNT_CANDIDATES + COMMAND_LAG_COUNT_CANDIDATES)
     weighted_regressors_by_flight, weighted_rates_by_flight, stretch_numbers_by_flight = [], [], []
     for flight_index, usable_flight in enumerate(usable_flights):
         samples, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
@@ -523,10 +515,8 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
             normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                 group_responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
             )
-            normalized_squared_error_sum, n_gains = (
-                normalized_squared_error_sum + normalized_squared_error,
-                n_gains + n_determined_gains,
-            )
+            normalized_squared_error_sum = normalized_squared_error_sum + normalized_squared_error
+            n_gains = n_gains + n_determined_gains
     return normalized_squared_error_sum / n_gains
 
 
@@ -550,10 +540,8 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
             group_responses = group_responses[:, :, has_known_effect].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
-                window_responses, window_residual = (
-                    _without_mean(group_responses[window_rows]),
-                    _without_mean(residual[window_rows]),
-                )
+                window_responses = _without_mean(group_responses[window_rows])
+                window_residual = _without_mean(residual[window_rows])
                 normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
@@ -630,10 +618,8 @@ def _standardized_responses_and_residual(
             np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
         )
     ).T
-    standardized_responses, standardized_residual = (
-        np.einsum("nga,ab->nbga", rate_responses, whitening_matrix),
-        residual @ whitening_matrix,
-    )
+    standardized_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
+    standardized_residual = residual @ whitening_matrix
     return _without_mean(standardized_responses), _without_mean(standardized_residual)
 
 
@@ -650,11 +636,9 @@ def _estimate_trim_random_walk_sd(
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
     c / n differ from the next with the variance 2 c / n + 2 n w / 3: two n tell w from c.
     """
-    squared_difference_sums, n_differences, span_samples = (
-        np.zeros((2, 3)),
-        np.zeros(2),
-        np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz),
-    )
+    squared_difference_sums = np.zeros((2, 3))
+    n_differences = np.zeros(2)
+    span_samples = np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz)
     for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         for held_out in held_out_flights:
@@ -739,17 +723,10 @@ def add_fitted_ranges_and_alarm_threshold(
     samples_and_usable = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    (
-        max_noise_variance_scale,
-        max_sample_log_likelihood_gain_of_mistake,
-        held_out_peaks_and_hours,
-        squared_gain_deviations,
-    ) = (
-        1.0,
-        0.0,
-        list[extremes.PeaksAndHours](),
-        list[Floats](),
-    )
+    max_noise_variance_scale = 1.0
+    max_sample_log_likelihood_gain_of_mistake = 0.0
+    held_out_peaks_and_hours = list[extremes.PeaksAndHours]()
+    squared_gain_deviations = list[Floats]()
     for fold_model, held_out_flights in _cross_validation_fits(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
@@ -1006,19 +983,17 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
     n_groups, n_command_lags = len(model.groups), model.n_command_lags
     first_command_row = len(rate_regression.coefficients) - n_groups * n_command_lags
     noise_sd = np.sqrt(np.maximum(np.diag(rate_regression.residual_covariance), MIN_DIVISOR))
-    relative_error_sd_of_summed_response, response_factor_information = (
-        np.zeros(n_groups),
-        np.full(n_groups, MIN_DIVISOR),
-    )
+    relative_error_sd_of_summed_response = np.zeros(n_groups)
+    response_factor_information = np.full(n_groups, MIN_DIVISOR)
     for group_index in range(n_groups):
         group_coefficient_rows = slice(
             first_command_row + group_index * n_command_lags,
             first_command_row + (group_index + 1) * n_command_lags,
         )
-        coefficient_error_correlation, standard_errors_over_noise_sd = (
-            rate_regression.coefficient_error_correlation[group_coefficient_rows, group_coefficient_rows],
-            rate_regression.standard_errors[group_coefficient_rows] / noise_sd,
-        )
+        coefficient_error_correlation = rate_regression.coefficient_error_correlation[
+            group_coefficient_rows, group_coefficient_rows
+        ]
+        standard_errors_over_noise_sd = rate_regression.standard_errors[group_coefficient_rows] / noise_sd
         response_sum_over_noise_sd = (
             rate_regression.coefficients[group_coefficient_rows].sum(axis=0) / noise_sd
         )
@@ -1058,10 +1033,10 @@ def gain_standard_error_by_column(
     K. As much wider as the noise of parts left out. gain_variance_between_laws: variance of a gain between
     laws: a law ties commands to these columns.
     """
-    max_covariance_inflation, noise_sd = (
-        max((noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0),
-        np.sqrt(np.diag(rate_regression.residual_covariance)),
+    max_covariance_inflation = max(
+        (noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0
     )
+    noise_sd = np.sqrt(np.diag(rate_regression.residual_covariance))
     gain_standard_error_of_column = {}
     for name, (past_rows, coefficients) in trust.coefficients_by_column_without_own_axis(model).items():
         coefficient_rows = [1 + row for row in past_rows]

@@ -73,10 +73,8 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     much of it, the flight itself shows (`filtering.recent_noise_variance_scale`)."""
     if not model.noise_models:
         return model
-    known_ma_coefficients, max_covariance_inflation = (
-        [tuple(one.ma_coefficients) for one in model.noise_models],
-        max(one.covariance_inflation for one in model.noise_models),
-    )
+    known_ma_coefficients = [tuple(one.ma_coefficients) for one in model.noise_models]
+    max_covariance_inflation = max(one.covariance_inflation for one in model.noise_models)
     quietest_covariance = min(
         (np.array(one.residual_covariance) for one in model.noise_models), key=np.linalg.det
     )
@@ -112,10 +110,8 @@ def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tu
     """
     has_labels = any(np.isfinite(one.labels).any() for one in flights)
     reason = "labels show faults under it" if has_labels else "logs of healthy flight do not tell"
-    assumption_text_of_key, assumption_lines = (
-        {"other_laws": "other laws may fly", "moving_air": "the air may move"},
-        [],
-    )
+    assumption_text_of_key = {"other_laws": "other laws may fly", "moving_air": "the air may move"}
+    assumption_lines = []
     for key, assumption_text in assumption_text_of_key.items():
         if getattr(vehicle, key) is None:
             vehicle = vehicle.model_copy(update={key: not has_labels})
@@ -171,10 +167,10 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
             ]
         ) == ma_coefficients_by_flight:
             break
-        mean_log_determinant, ma_coefficients_by_flight = (
-            np.mean([log_determinant for log_determinant, _ in log_determinants_and_ma_coefficients]),
-            new_ma_coefficients_by_flight,
+        mean_log_determinant = np.mean(
+            [log_determinant for log_determinant, _ in log_determinants_and_ma_coefficients]
         )
+        ma_coefficients_by_flight = new_ma_coefficients_by_flight
         whitened_flights = [
             whiten_samples(
                 one, noise_ma_coefficients, float(np.exp((mean_log_determinant - log_determinant) / 6.0))
@@ -335,10 +331,8 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
             for one, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
         ]
 
-    bic_to_beat, surface_names = (
-        _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE,
-        list(vehicle.surfaces),
-    )
+    bic_to_beat = _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE
+    surface_names = list(vehicle.surfaces)
     for surface_indices in regression.group_surfaces_by_commands(vehicle):
         for airspeed_power in _AIRSPEED_POWER_CANDIDATES:
             candidate_powers = vehicle.airspeed_powers | {
@@ -558,10 +552,8 @@ def _another_day_sentences(expected_performance: Document, n_flights: int) -> li
         ]
         lines.append(f"  expect of {day_text}, mean (worst): {', '.join(score_texts)}")
     if "false_alarms_per_hour" in expected_performance:
-        false_alarm_entry, missing_minutes = (
-            expected_performance["false_alarms_per_hour"],
-            expected_performance["minutes_missing"],
-        )
+        false_alarm_entry = expected_performance["false_alarms_per_hour"]
+        missing_minutes = expected_performance["minutes_missing"]
         lines.append(
             f"  false alarms: {false_alarm_entry['asked']:g} an hour asked for, "
             f"{false_alarm_entry['low']:.2g} to {false_alarm_entry['high']:.2g} at 90 %, "
@@ -716,10 +708,8 @@ def _initial_output_error_parameters(n_groups: int, dt_s: float) -> tuple[Floats
     """First guess and bounds of lag, delay, A, B and c."""
     initial_parameters = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n_groups, 0.01), *np.zeros(3)]
     unbounded = np.full(len(initial_parameters) - 2, np.inf)
-    min_parameters, max_parameters = (
-        [_MIN_SERVO_LAG_S, 0.0, *-unbounded],
-        [_MAX_SERVO_LAG_S, _MAX_COMMAND_DELAY_S, *unbounded],
-    )
+    min_parameters = [_MIN_SERVO_LAG_S, 0.0, *-unbounded]
+    max_parameters = [_MAX_SERVO_LAG_S, _MAX_COMMAND_DELAY_S, *unbounded]
     return np.array(initial_parameters), np.array(min_parameters), np.array(max_parameters)
 
 

@@ -313,10 +313,8 @@ def _rates_and_residual_in_liveliest_window(
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
     rows, residual = fitting.one_step_residuals(model, held_out)
-    rates_or_nan, residual_or_nan = (
-        np.full_like(held_out.samples.rates, np.nan),
-        np.full_like(held_out.samples.rates, np.nan),
-    )
+    rates_or_nan = np.full_like(held_out.samples.rates, np.nan)
+    residual_or_nan = np.full_like(held_out.samples.rates, np.nan)
     rates_or_nan[rows], residual_or_nan[rows] = held_out.samples.rates[rows], residual
     first_row = _first_row_of_liveliest_window(rates_or_nan, rows, window_samples)
     window_rows = slice(first_row, first_row + window_samples)

@@ -116,31 +116,25 @@ def _fit_angle_to_rate(
         ]
     )
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
-    window_begin_rows, window_end_rows = (
-        np.arange(0, len(t_s) - window_samples, window_samples),
-        np.arange(window_samples, len(t_s), window_samples),
-    )
+    window_begin_rows = np.arange(0, len(t_s) - window_samples, window_samples)
+    window_end_rows = np.arange(window_samples, len(t_s), window_samples)
     is_window_usable = (t_s[window_end_rows] - t_s[window_begin_rows]) < 2.0 * _INTEGRATION_WINDOW_S
     if pitch_rad is not None:
         cumulated_steep_count = np.cumsum(np.abs(pitch_rad) > _STEEP_PITCH_RAD)
         is_window_usable &= cumulated_steep_count[window_end_rows] == cumulated_steep_count[window_begin_rows]
-    angle_changes, rate_integrals = (
-        (angle[window_end_rows] - angle[window_begin_rows])[is_window_usable],
-        (rate_term_integrals[window_end_rows] - rate_term_integrals[window_begin_rows])[is_window_usable],
-    )
+    angle_changes = (angle[window_end_rows] - angle[window_begin_rows])[is_window_usable]
+    rate_integrals = (rate_term_integrals[window_end_rows] - rate_term_integrals[window_begin_rows])[
+        is_window_usable
+    ]
     if full_circle is not None:
         angle_changes = (angle_changes + 0.5 * full_circle) % full_circle - 0.5 * full_circle
     is_known = np.isfinite(angle_changes) & np.isfinite(rate_integrals).all(axis=1)
     angle_changes, rate_integrals = angle_changes[is_known], rate_integrals[is_known]
     coefficients = np.linalg.lstsq(rate_integrals, angle_changes, rcond=None)[0]
-    angle_changes, rate_integrals = (
-        angle_changes - rate_integrals[:, 1:] @ coefficients[1:],
-        rate_integrals[:, 0],
-    )
-    rate_integral_square_sum, angle_change_square_sum = (
-        float(rate_integrals @ rate_integrals),
-        float(angle_changes @ angle_changes),
-    )
+    angle_changes = angle_changes - rate_integrals[:, 1:] @ coefficients[1:]
+    rate_integrals = rate_integrals[:, 0]
+    rate_integral_square_sum = float(rate_integrals @ rate_integrals)
+    angle_change_square_sum = float(angle_changes @ angle_changes)
     if len(rate_integrals) < _MIN_WINDOWS or not rate_integral_square_sum * angle_change_square_sum > 0.0:
         return None
     cross_product_sum = float(rate_integrals @ angle_changes)

@@ -135,10 +135,8 @@ def whitened_rates_and_responses(
     is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(
         samples, model, scales_by_labels
     )
-    ar_coefficients, is_predictable_whitened = (
-        model.residual_ar_coefficients(samples.noise_ma_coefficients),
-        is_predictable.copy(),
-    )
+    ar_coefficients = model.residual_ar_coefficients(samples.noise_ma_coefficients)
+    is_predictable_whitened = is_predictable.copy()
     for lag in range(1, len(ar_coefficients) + 1):
         is_predictable_whitened &= _delay_rows(is_predictable, lag, False)
     return (
@@ -284,10 +282,8 @@ def variance_inflation_factors(regressors: Floats) -> Floats:
         centred_regressors[:, is_varying] / column_norms[is_varying]
     )
     eigenvalues, eigenvectors = np.linalg.eigh(correlation)
-    is_nonzero_eigenvalue, squared_eigenvectors = (
-        eigenvalues > _RANK_TOLERANCE * eigenvalues.max(initial=0.0),
-        eigenvectors**2,
-    )
+    is_nonzero_eigenvalue = eigenvalues > _RANK_TOLERANCE * eigenvalues.max(initial=0.0)
+    squared_eigenvectors = eigenvectors**2
     finite_factors = (
         squared_eigenvectors[:, is_nonzero_eigenvalue] / eigenvalues[is_nonzero_eigenvalue]
     ).sum(axis=1)

@@ -46,10 +46,8 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
     if not is_every_label_known.any():
         score_names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
         return {"rows": 0, "settings": [], **dict.fromkeys(score_names)}
-    true_effectiveness, estimated_effectiveness = (
-        labels[is_every_label_known],
-        rows.effectiveness[is_every_label_known],
-    )
+    true_effectiveness = labels[is_every_label_known]
+    estimated_effectiveness = rows.effectiveness[is_every_label_known]
     label_settings, n_rows_of_setting = np.unique(true_effectiveness, axis=0, return_counts=True)
     frequent_settings = label_settings[n_rows_of_setting >= 0.005 * len(true_effectiveness)]
     is_truly_faulty = (true_effectiveness < 1.0).any(axis=1)

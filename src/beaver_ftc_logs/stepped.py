@@ -69,10 +69,8 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
     )
     theta_bounds[0][0], theta_bounds[1][0] = -1.0, 0.0  # the first sample ends no frame
     window_samples = max(round(EFFECTIVENESS_BOUND_WINDOW_S * rate_hz), 1)
-    effectiveness_low, effectiveness_high = (
-        1.0 + _sliding_maximum(theta_bounds[0], window_samples),
-        1.0 - _sliding_maximum(-theta_bounds[1], window_samples),
-    )
+    effectiveness_low = 1.0 + _sliding_maximum(theta_bounds[0], window_samples)
+    effectiveness_high = 1.0 - _sliding_maximum(-theta_bounds[1], window_samples)
     is_unexplained = effectiveness_low > effectiveness_high
     command_gain_upper_bounds = _command_gain_upper_bounds(innovation, expected_effect)
     return ReplayedVerdicts(
@@ -94,10 +92,8 @@ def _command_gain_upper_bounds(innovation: Floats, expected_effect: Floats) -> F
         [np.broadcast_to(np.eye(3), (len(expected_effect), 3, 3)), expected_effect / innovation_sd[:, None]],
         axis=2,
     )
-    scaled_innovation, gain_upper_bounds = (
-        innovation / innovation_sd,
-        np.full(expected_effect.shape[2], -np.inf),
-    )
+    scaled_innovation = innovation / innovation_sd
+    gain_upper_bounds = np.full(expected_effect.shape[2], -np.inf)
     for part_rows in rows_by_part:
         part_upper_bounds, _ = coefficient_upper_bounds(
             regressors[part_rows].reshape(3 * len(part_rows), -1),
@@ -147,11 +143,9 @@ def diagnosis_rows_from_replay(
 ) -> DiagnosisRows:
     """The rows of a flight. fdi_config: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replayed.verdicts])
-    effectiveness, effectiveness_low, effectiveness_high = (
-        np.ones_like(replayed.single_fault_effectiveness_low),
-        np.zeros_like(replayed.single_fault_effectiveness_low),
-        np.ones_like(replayed.single_fault_effectiveness_low),
-    )
+    effectiveness = np.ones_like(replayed.single_fault_effectiveness_low)
+    effectiveness_low = np.zeros_like(replayed.single_fault_effectiveness_low)
+    effectiveness_high = np.ones_like(replayed.single_fault_effectiveness_low)
     gives_bounds = fdi_config.is_ours and not fdi_config.pairs
     for k, verdict in enumerate(replayed.verdicts):
         if gives_bounds:

@@ -176,10 +176,8 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
             for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
         ]
     )
-    command_response, residual_covariance = (
-        np.array(model.command_response),
-        np.array(model.residual_covariance),
-    )
+    command_response = np.array(model.command_response)
+    residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
     effect_power, unexplained_power = np.zeros(len(surface_groups)), np.zeros(len(surface_groups))
     for group_index in range(len(surface_groups)):
@@ -403,10 +401,8 @@ def _column_mistake_texts(
         strict=True,
     ):
         group_name, relative_motion = "+".join(group), _relative_command_motion(samples, model, group)
-        command_text, motion_text = (
-            f"the command of {group_name}",
-            f"moves {relative_motion:.3g} times as much as in the flights of the",
-        )
+        command_text = f"the command of {group_name}"
+        motion_text = f"moves {relative_motion:.3g} times as much as in the flights of the"
         if gain_upper_bound < MAX_REVERSED_GAIN:
             mistake_text = (
                 f"the rates answer {command_text} the other way round in all of it (does `scale: -1` fit?)"
@@ -598,15 +594,11 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         _flight_noise_whitening(samples, model),
         len(model.groups),
     )
-    gain_upper_bounds, gain_lower_bounds, column_gain_upper_bounds = (
-        np.full(n_groups, -np.inf),
-        np.full(n_groups, np.inf),
-        np.full(len(column_names), -np.inf),
-    )
-    noise_variance_scales, responses_and_contributions = (
-        [],
-        np.concatenate([group_responses, column_contributions], axis=1),
-    )
+    gain_upper_bounds = np.full(n_groups, -np.inf)
+    gain_lower_bounds = np.full(n_groups, np.inf)
+    column_gain_upper_bounds = np.full(len(column_names), -np.inf)
+    noise_variance_scales = []
+    responses_and_contributions = np.concatenate([group_responses, column_contributions], axis=1)
     for part_rows in rows_by_part:
         regressors, whitened_targets = _trim_and_gain_regression_data(
             part_rows, unexplained_rates, responses_and_contributions, whitening_matrix
@@ -620,10 +612,8 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
         part_upper_bounds_with_columns, _ = regression.coefficient_upper_bounds(
             regressors, whitened_targets, effective_sample_share
         )
-        gain_upper_bounds, gain_lower_bounds = (
-            np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:]),
-            np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:]),
-        )
+        gain_upper_bounds = np.maximum(gain_upper_bounds, part_coefficient_upper_bounds[3:])
+        gain_lower_bounds = np.minimum(gain_lower_bounds, -negated_part_coefficient_lower_bounds[3:])
         column_gain_upper_bounds = np.maximum(
             column_gain_upper_bounds, 1.0 + part_upper_bounds_with_columns[3 + n_groups :]
         )  # what the past does is taken off already
@@ -752,10 +742,8 @@ def _is_within_or_unknown(values: Floats, low: float, high: float) -> Mask:
 def _mostly_true_recently(is_true: Mask, samples: Samples) -> Mask:
     """Return the rows at which a condition held in half of the last seconds, or of the flight so far."""
     window_samples = max(round(_RANGE_WINDOW_S / samples.dt_s), 1)
-    cumulated_true, window_end_rows = (
-        np.concatenate([[0], np.cumsum(is_true)]),
-        np.arange(1, len(is_true) + 1),
-    )
+    cumulated_true = np.concatenate([[0], np.cumsum(is_true)])
+    window_end_rows = np.arange(1, len(is_true) + 1)
     window_begin_rows = np.maximum(window_end_rows - window_samples, 0)
     return np.asarray(
         cumulated_true[1:] - cumulated_true[window_begin_rows]

@@ -419,10 +419,8 @@ def unused_keys_as_comments(used_keys: Collection[str]) -> str:
 
 def load_vehicle(path_or_name: str | Path) -> Vehicle:
     """The vehicle in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
-    file_or_name, built_in_names = (
-        str(path_or_name),
-        sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml")),
-    )
+    file_or_name = str(path_or_name)
+    built_in_names = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
     if looks_like_a_path(file_or_name):
         text = text_of(file_or_name, _MAX_FILE_BYTES)
     else:

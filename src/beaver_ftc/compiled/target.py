@@ -393,11 +393,9 @@ def _unbox_record(kind: Any, given: Any, c: Any) -> NativeValue:
 
 @unbox(SizedRecords)
 def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
-    records, builder, bytes_of = (
-        _struct(c.context, c.builder, kind),
-        c.builder,
-        types.Array(types.uint8, 1, "A"),
-    )
+    records = _struct(c.context, c.builder, kind)
+    builder = c.builder
+    bytes_of = types.Array(types.uint8, 1, "A")
     array = make_array(bytes_of)(c.context, builder)
     there = builder.bitcast(array._getpointer(), c.pyapi.voidptr)
     code = c.pyapi.nrt_adapt_ndarray_from_python(given, there)

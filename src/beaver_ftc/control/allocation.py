@@ -374,11 +374,9 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
     effectiveness (n,); share, probe: as in `pitch`. With several elevators the backups take over no more than
     what they have lost.
     """
-    problem, output, left = (
-        allocation.memory.problem,
-        allocation.output,
-        remaining(layout, effectiveness, PITCH),
-    )
+    problem = allocation.memory.problem
+    output = allocation.output
+    left = remaining(layout, effectiveness, PITCH)
     if layout.authority[PITCH, layout.main[PITCH]] < 1.0:
         share = min(share, 1.0 - left)
     set_problem(problem, axes.G, layout, effectiveness, prediction, share, probe)

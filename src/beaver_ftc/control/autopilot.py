@@ -308,10 +308,8 @@ def advance_commands(autopilot, measured, t):
         ):
             begin_leg(autopilot, c, measured[c], t)
         if autopilot.is_commanded[c]:
-            away, most = (
-                autopilot.goal[c] - autopilot.command[c],
-                autopilot.max_command_rate[c] * autopilot.dt,
-            )
+            away = autopilot.goal[c] - autopilot.command[c]
+            most = autopilot.max_command_rate[c] * autopilot.dt
             step = min(max(away, -most), most)
             autopilot.command[c] += step
             autopilot.command_rate[c] = step / autopilot.dt if most < np.inf else 0.0
@@ -363,11 +361,9 @@ def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_ya
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
     no more roll, whatever their estimated effectiveness. engines_yaw: whether engines can yaw the
     aircraft."""
-    dt, least, effectiveness = (
-        autopilot.dt,
-        surfaces.config.least_effectiveness,
-        surfaces.output.effectiveness,
-    )
+    dt = autopilot.dt
+    least = surfaces.config.least_effectiveness
+    effectiveness = surfaces.output.effectiveness
     autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
     autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     at_stop = saturated[layout.main[ROLL]] == 1

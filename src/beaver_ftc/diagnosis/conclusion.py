@@ -168,10 +168,8 @@ def assessment_dtype(n_surfaces: int) -> np.dtype:
 def assess_surfaces(assessment, config, conclusion, types, layout, estimators, statistical_detector):
     """Fill the assessment of this frame from the outputs of the stages; statistical_detector: of
     `statistical_dtype`."""
-    diagnoses_all_types, isolated_surface_index = (
-        config.diagnoses_all_types,
-        isolated_surface(conclusion, estimators),
-    )
+    diagnoses_all_types = config.diagnoses_all_types
+    isolated_surface_index = isolated_surface(conclusion, estimators)
     assessment.detected, assessment.diagnoses_all_types = conclusion.detected, diagnoses_all_types
     assessment.isolated_surface, assessment.any_surface_lags, assessment.no_surface_to_accommodate = (
         isolated_surface_index,

@@ -76,10 +76,8 @@ class WhiteningFilter:
         one."""
         estimation_error_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
-        prediction_error_response, whitened = (
-            np.zeros((9, *added_acceleration.shape[2:])),
-            np.empty_like(added_acceleration),
-        )
+        prediction_error_response = np.zeros((9, *added_acceleration.shape[2:]))
+        whitened = np.empty_like(added_acceleration)
         for k, acceleration in enumerate(added_acceleration):
             prediction_error_response = estimation_error_transition @ prediction_error_response
             prediction_error_response[:3] += self.dt * acceleration

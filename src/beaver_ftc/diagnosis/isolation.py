@@ -86,10 +86,8 @@ def consistent_theta_interval(measured_effect, error_bound, regressor, theta_min
     high); low > high if none."""
     if regressor == 0.0:
         return (theta_min, theta_max) if abs(measured_effect) <= error_bound else EMPTY_THETA_INTERVAL
-    end_at_lower_effect, end_at_upper_effect = (
-        (measured_effect - error_bound) / regressor,
-        (measured_effect + error_bound) / regressor,
-    )
+    end_at_lower_effect = (measured_effect - error_bound) / regressor
+    end_at_upper_effect = (measured_effect + error_bound) / regressor
     return max(theta_min, min(end_at_lower_effect, end_at_upper_effect)), min(
         theta_max, max(end_at_lower_effect, end_at_upper_effect)
     )
@@ -104,10 +102,8 @@ def consistent_theta_interval_on_axis(innovation, innovation_bound, fie, fault_e
     """
     if fie.ignored_axes[axis]:
         return fie.theta_min, fie.theta_max
-    measured_effect, error_bound = (
-        innovation[axis] - fault_effect.acceleration_at_zero_theta[axis],
-        innovation_bound[axis] + fault_effect.error_bound[axis],
-    )
+    measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
+    error_bound = innovation_bound[axis] + fault_effect.error_bound[axis]
     return consistent_theta_interval(
         measured_effect, error_bound, fault_effect.regressor[axis], fie.theta_min, fie.theta_max
     )
@@ -134,15 +130,11 @@ def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_subs
     """
     s, fault_effect = fie.surface, fie.frame_mean_effect
     axis = axis_of_largest_effect(fault_effect.regressor)
-    previous_max_abs_deflection, max_abs_deflection = (
-        fie.max_abs_deflection_in_last_frame,
-        max(abs(fie.theta_min), abs(fie.theta_max)),
-    )
-    effect_error_bound, model_error_bound_table, mean_position_interval = (
-        fault_effect.error_bound[axis],
-        bound_record.model_error_bound_table,
-        (fie.theta_min, fie.theta_max),
-    )
+    previous_max_abs_deflection = fie.max_abs_deflection_in_last_frame
+    max_abs_deflection = max(abs(fie.theta_min), abs(fie.theta_max))
+    effect_error_bound = fault_effect.error_bound[axis]
+    model_error_bound_table = bound_record.model_error_bound_table
+    mean_position_interval = (fie.theta_min, fie.theta_max)
     travel_level_index = travel_level_index_at_position(
         model_error_bound_table, fie, mean_position_interval, n_substeps
     )
@@ -165,10 +157,8 @@ def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_subs
         )
         if mean_position_low > mean_position_high:
             break
-        max_abs_deflection, mean_position_interval = (
-            min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high))),
-            (mean_position_low, mean_position_high),
-        )
+        max_abs_deflection = min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high)))
+        mean_position_interval = (mean_position_low, mean_position_high)
         travel_level_index = travel_level_index_at_position(
             model_error_bound_table, fie, mean_position_interval, n_substeps
         )
@@ -496,13 +486,11 @@ def update_residual_and_thresholds(fie, threshold_kind, x):
     is_within_thresholds = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        theta_min, theta_max, filtered_regressor, theta, filtered_uncertainty_bound = (
-            fie.theta_min,
-            fie.theta_max,
-            fie.filtered_regressor[i],
-            fie.theta[i],
-            fie.filtered_uncertainty_bound[i],
-        )
+        theta_min = fie.theta_min
+        theta_max = fie.theta_max
+        filtered_regressor = fie.filtered_regressor[i]
+        theta = fie.theta[i]
+        filtered_uncertainty_bound = fie.filtered_uncertainty_bound[i]
         if threshold_kind == INTERVAL_THRESHOLD:
             threshold_interval = residual_interval(
                 theta_min,
@@ -670,12 +658,10 @@ def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, d
     the frame; fie.frame_mean_effect must be that of this frame.
     """
     for i in range(3):
-        acceleration_at_zero_theta, regressor, theta, decay = (
-            fie.frame_mean_effect.acceleration_at_zero_theta[i],
-            fie.frame_mean_effect.regressor[i],
-            fie.theta[i],
-            isolation.config.filter_decay[i],
-        )
+        acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
+        regressor = fie.frame_mean_effect.regressor[i]
+        theta = fie.theta[i]
+        decay = isolation.config.filter_decay[i]
         fie.xhat[i] = (
             x[i]
             + dt * (predicted_acceleration[i] + acceleration_at_zero_theta + regressor * theta)

@@ -239,10 +239,8 @@ def predict_acceleration(prediction, include_known_faults, effectiveness, deflec
     effectiveness (n,): estimate for each surface; deflection_bias (n,) rad: its bias, used if
     `include_biases`.
     """
-    acceleration_with_known_faults, frame_means = (
-        prediction.acceleration_with_known_faults,
-        prediction.frame_means,
-    )
+    acceleration_with_known_faults = prediction.acceleration_with_known_faults
+    frame_means = prediction.frame_means
     acceleration_with_known_faults[:] = frame_means.predicted_acceleration
     if not include_known_faults:
         return

@@ -409,11 +409,9 @@ def diagnose(frame):
     The faults that the law already takes into account are expected: they are no innovation.
     """
     fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
-    scheme, diagnoses_all_types, applied = (
-        fdi.config.scheme_number,
-        fdi.config.diagnoses_all_types,
-        frame.control.surfaces.output,
-    )
+    scheme = fdi.config.scheme_number
+    diagnoses_all_types = fdi.config.diagnoses_all_types
+    applied = frame.control.surfaces.output
     monitors.disable_if_differential_thrust(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
         schemes.begin_scheme(scheme, fdi, prediction, measured)
@@ -502,12 +500,10 @@ def command(frame):
 @apart
 def fly_profile(frame, commanded):
     """Add the outer loops' body rates to what is commanded (3,) rad/s, and set the engine."""
-    autopilot, control, prediction, value = (
-        frame.autopilot,
-        frame.control,
-        frame.prediction,
-        frame.truth.value,
-    )
+    autopilot = frame.autopilot
+    control = frame.control
+    prediction = frame.prediction
+    value = frame.truth.value
     unexplained, elevator = control.axes.disturbance[PITCH], control.layout.main[PITCH]
     if unexplained != 0.0:
         unexplained /= prediction.G[PITCH, elevator]  # rad of the elevator

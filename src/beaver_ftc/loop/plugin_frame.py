@@ -198,11 +198,9 @@ def context_of(
     """What a plug-in is given before the flight; start: the truth's channels at the start, in SI."""
     frame, aircraft = frames[0], scenario.airframe
     layout, bound, design = frame["control"]["layout"], frame["fdi"]["bound"], frames["prediction"]["design"]
-    trim_y, trim_rad, constant = (
-        start[y_places(frame)],
-        layout["trim"].copy(),
-        bound["constant_error_bound"].copy(),
-    )
+    trim_y = start[y_places(frame)]
+    trim_rad = layout["trim"].copy()
+    constant = bound["constant_error_bound"].copy()
     if bound["model_error_bound_table"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(

@@ -167,10 +167,8 @@ class Diagnosis:
         The last frame ends with the last sample. The bound follows from the declared errors. The effects are
         predictions of the design model.
         """
-        innovation, bound = (
-            self._fdi["bank"]["output"]["innovation"],
-            self._fdi["bound"]["frame_innovation_bound"],
-        )
+        innovation = self._fdi["bank"]["output"]["innovation"]
+        bound = self._fdi["bound"]["frame_innovation_bound"]
         return innovation.copy(), bound.copy(), self._frame["prediction"]["frame_means"]["Gu"].copy()
 
     def model(self) -> tuple[Vector, Vector]:

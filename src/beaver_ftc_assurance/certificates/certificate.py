@@ -314,10 +314,8 @@ def statements(
     for e, name in enumerate(tape.names):
         column = f"fie_{name}_excluded"
         if column in events:
-            k, because = (
-                events[column],
-                chance.EXCLUSION_NOT_STATED if events[column] < tape.end else TOO_LATE,
-            )
+            k = events[column]
+            because = chance.EXCLUSION_NOT_STATED if events[column] < tape.end else TOO_LATE
             known = because != TOO_LATE and k > 0  # the first row has no innovation
             found = _exclusion_inequality(scenario, tape, history, e, alarm, k) if known else None
             about = {"what": name, "column": column, "frame": k}

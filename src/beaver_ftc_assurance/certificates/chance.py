@@ -84,10 +84,8 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
     for hypothesis in (
         each for block in diagnosis.statistical_blocks for each in block.hypotheses if each.raises_alarm
     ):
-        column, share = (
-            _share_column(hypothesis, surfaces),
-            hypothesis.score / diagnosis.statistical_alarm_level,
-        )
+        column = _share_column(hypothesis, surfaces)
+        share = hypothesis.score / diagnosis.statistical_alarm_level
         found[column] = max(found.get(column, 0.0), share)
     return found
 
@@ -185,10 +183,8 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
              if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
     drift = dt * then["drift_intensity"][square]  # which is felt a frame later
     drift[1:], drift[0] = drift[:-1].copy(), 0.0
-    before, response = (
-        then["regressor_filter_state"][:, known][..., states],
-        now["regressor_response"][:, known][..., felt],
-    )
+    before = then["regressor_filter_state"][:, known][..., states]
+    response = now["regressor_response"][:, known][..., felt]
     its = {
         "signature": now["signature"][:, h][:, felt],
         "jitter": dt * dt * then["model_noise_variance"][:, felt],

@@ -830,10 +830,8 @@ def check_exclusion_by_alarm(said, document, frames):
     alarm = document["statements"][0]
     require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
     require(alarm["frame"] <= said["frame"] and said["what"] is not None, "the alarm came later")
-    effect, rows = (
-        effect_of_fault(said["what"], frames),
-        slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1),
-    )
+    effect = effect_of_fault(said["what"], frames)
+    rows = slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1)
     moved = np.abs([effect.offset[rows], effect.slope[rows], effect.spread[rows]])[..., alarm["axes"]]
     require(moved.max() == 0, "this fault moves the axes of the alarm")
 
@@ -852,10 +850,8 @@ def instrument_sides(said, log):
     require({"watch_share", "watch_test"} <= set(log), "the log has no test between instruments")
     require(TESTS[int(log["watch_test"][k])] == said["test"], "the log has another test in this row")
     require(all(most >= 0 for _, _, most in said["looks"]), "looks: a bound is below zero")
-    residual, bound = (
-        sum(z - other for z, other, _ in said["looks"]),
-        sum(most for *_, most in said["looks"]),
-    )
+    residual = sum(z - other for z, other, _ in said["looks"])
+    bound = sum(most for *_, most in said["looks"])
     require(bound > 0 and log["watch_share"][k] * (1 + 1e-9) > residual / bound, "the log's share is smaller")
     return residual, bound
 

@@ -31,10 +31,8 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
         looks = [look for look in _looks(monitor) if any(look)]
-        value, limit = (
-            sum(reading - predicted for reading, predicted, _ in looks),
-            sum(bound for *_, bound in looks),
-        )
+        value = sum(reading - predicted for reading, predicted, _ in looks)
+        limit = sum(bound for *_, bound in looks)
         if value < 0.0:  # the other way round
             looks, value = [[predicted, reading, bound] for reading, predicted, bound in looks], -value
         if value > limit:

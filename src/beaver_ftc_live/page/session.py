@@ -137,10 +137,8 @@ class Session:
             return
         before, self._said = self._said, said
         if alarm and before[0] != alarm:
-            beyond, against = (
-                f"residual of {alarm} beyond its threshold",
-                f"{alarm} disagree beyond their bound",
-            )
+            beyond = f"residual of {alarm} beyond its threshold"
+            against = f"{alarm} disagree beyond their bound"
             self._tell("alarm", beyond if verdict.axis else against, secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)

@@ -195,9 +195,9 @@ def _join_blocks_into_parts(
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
             while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:
                 joined_cells = join_blocks(held_blocks)
-                part_cells, remaining_cells = (
-                    joined_cells.select_rows(0, rows_per_part),
-                    joined_cells.select_rows(rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)),
+                part_cells = joined_cells.select_rows(0, rows_per_part)
+                remaining_cells = joined_cells.select_rows(
+                    rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)
                 )
                 part_cells.text_cell_summaries, part_cells.broken_lines = (
                     joined_cells.text_cell_summaries,

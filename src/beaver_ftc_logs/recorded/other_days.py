@@ -228,10 +228,10 @@ def _score_days(
     for day in days:
         scores_by_detector: dict[str, list[Document]] = {BANK_OF_FILTERS_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in models_and_held_out:
-            altered_samples, labels = (
-                apply_day_changes(day, held_out.samples, lagged_rate_coefficients, noise_covariance),
-                benchmark.labels_in_usable_span(held_out),
+            altered_samples = apply_day_changes(
+                day, held_out.samples, lagged_rate_coefficients, noise_covariance
             )
+            labels = benchmark.labels_in_usable_span(held_out)
             for detector_name, method_scores in scores_by_detector.items():
                 method_scores.append(
                     scoring.score_against_labels(

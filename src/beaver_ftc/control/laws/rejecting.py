@@ -647,13 +647,11 @@ def accumulate(config, memory, i, effectiveness, moment, innovation):
 def demand(law, reference, surfaces, main, transfer_share, prediction, measured):
     """Fill the law's demand and hold (3,) rad/s2; main (3,): the surface that leads each axis;
     transfer_share: the part of pitch that its stand-in carries."""
-    config, observer, memory, output, means = (
-        law.config,
-        law.observer,
-        law.memory,
-        law.output,
-        prediction.frame_means,
-    )
+    config = law.config
+    observer = law.observer
+    memory = law.memory
+    output = law.output
+    means = prediction.frame_means
     schedule(config, memory, measured.y[QDYN], transfer_share)
     observe(law, surfaces, main, measured.x, means.predicted_acceleration, means.Gu, means.G)
     if memory.estimator.active:

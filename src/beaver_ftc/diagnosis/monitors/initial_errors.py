@@ -182,10 +182,8 @@ def update_error_change_bounds(redundancy, initial_errors):
     part of it that this filter forgets in a sample."""
     share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        test_index, error_bound_at_start = (
-            index_of_test_showing_error_change(i),
-            initial_errors.error_bound_at_start[i],
-        )
+        test_index = index_of_test_showing_error_change(i)
+        error_bound_at_start = initial_errors.error_bound_at_start[i]
         change_bound = (
             max_effect_of_any_error(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
@@ -211,15 +209,11 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     """
     previous_reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
     p, q, r = previous_reading[0], previous_reading[1], previous_reading[2]
-    V, phi, theta = (
-        max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS),
-        previous_reading[PHI],
-        previous_reading[THETA],
-    )
-    max_effect_per_unit, signed_effect_per_unit = (
-        initial_errors.max_effect_per_unit_error,
-        initial_errors.signed_effect_per_unit_error,
-    )
+    V = max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    phi = previous_reading[PHI]
+    theta = previous_reading[THETA]
+    max_effect_per_unit = initial_errors.max_effect_per_unit_error
+    signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
     max_effect_per_unit[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     theta_secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))

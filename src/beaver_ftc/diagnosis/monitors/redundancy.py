@@ -42,27 +42,15 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-(
-    FIRST_TURN_TEST,
-    FIRST_ANGLE_TEST,
-    SPEED_TEST,
-    ALPHA_FLOW_TEST,
-    BETA_FLOW_TEST,
-    DENSITY_TEST,
-    CLIMB_TEST,
-    RPM_TEST,
-    MANIFOLD_PRESSURE_TEST,
-) = (
-    0,
-    3,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-)
+FIRST_TURN_TEST = 0
+FIRST_ANGLE_TEST = 3
+SPEED_TEST = 6
+ALPHA_FLOW_TEST = 7
+BETA_FLOW_TEST = 8
+DENSITY_TEST = 9
+CLIMB_TEST = 10
+RPM_TEST = 11
+MANIFOLD_PRESSURE_TEST = 12
 N_TESTS_WITH_EQUATION = 13  # tests with an equation; then those of sensors that should equal another reading
 DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_SENSORS)
@@ -267,11 +255,9 @@ def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Sc
 
 def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_s: float) -> None:
     """Fill the declared errors of the readings; a sample is a JSBSim frame."""
-    redundancy_config, monitor_config, sensor_errors = (
-        monitor["redundancy"]["config"],
-        monitor["config"],
-        declared.sensors,
-    )
+    redundancy_config = monitor["redundancy"]["config"]
+    monitor_config = monitor["config"]
+    sensor_errors = declared.sensors
     for i, name in enumerate(SENSORS):
         sensor_error = sensor_errors[name]
         (
@@ -317,10 +303,8 @@ def gust_speed_and_change_bounds(
     The speed of a gust changes like a random walk (`Dryden.velocity_walk`); a filter with a pole of lam 1/s
     keeps 1 / 2 lam of its intensity.
     """
-    sigma_mps, velocity_walk_intensity = (
-        turbulence.sigma_mps,
-        turbulence.velocity_walk(trim_airspeed_mps, MAX_AIRSPEED_OVER_TRIM),
-    )
+    sigma_mps = turbulence.sigma_mps
+    velocity_walk_intensity = turbulence.velocity_walk(trim_airspeed_mps, MAX_AIRSPEED_OVER_TRIM)
     variances_per_intensity_s = [
         sample_time_s / (1.0 - exp(-2.0 * pole * sample_time_s)) for pole in FILTER_POLES_PER_S
     ]
@@ -386,16 +370,12 @@ def fill_quaternion(phi, theta, psi, out):
 @kernel
 def advance_quaternion(quaternion, rates, duration_s, out):
     """Fill out (4,): the unit quaternion (4,) after duration_s at body rates (3,) rad/s, one Euler step."""
-    half_angle_x, half_angle_y, half_angle_z = (
-        0.5 * duration_s * rates[0],
-        0.5 * duration_s * rates[1],
-        0.5 * duration_s * rates[2],
-    )
-    q, length_after_step = (
-        quaternion,
-        np.sqrt(
-            1.0 + half_angle_x * half_angle_x + half_angle_y * half_angle_y + half_angle_z * half_angle_z
-        ),
+    half_angle_x = 0.5 * duration_s * rates[0]
+    half_angle_y = 0.5 * duration_s * rates[1]
+    half_angle_z = 0.5 * duration_s * rates[2]
+    q = quaternion
+    length_after_step = np.sqrt(
+        1.0 + half_angle_x * half_angle_x + half_angle_y * half_angle_y + half_angle_z * half_angle_z
     )
     out[0] = (q[0] - q[1] * half_angle_x - q[2] * half_angle_y - q[3] * half_angle_z) / length_after_step
     out[1] = (q[1] + q[0] * half_angle_x + q[2] * half_angle_z - q[3] * half_angle_y) / length_after_step
@@ -406,13 +386,11 @@ def advance_quaternion(quaternion, rates, duration_s, out):
 @kernel
 def small_rotation_angle(from_quaternion, to_quaternion, component):
     """Component (1, 2, 3) in body axes of the small rotation from one attitude (4,) to the other, rad."""
-    q_from, q_to, i, j, k = (
-        from_quaternion,
-        to_quaternion,
-        component,
-        component % 3 + 1,
-        (component + 1) % 3 + 1,
-    )
+    q_from = from_quaternion
+    q_to = to_quaternion
+    i = component
+    j = component % 3 + 1
+    k = (component + 1) % 3 + 1
     half_angle = q_from[0] * q_to[i] - q_from[i] * q_to[0] - q_from[j] * q_to[k] + q_from[k] * q_to[j]
     scalar_part = q_from[0] * q_to[0] + q_from[1] * q_to[1] + q_from[2] * q_to[2] + q_from[3] * q_to[3]
     return 2.0 * half_angle if scalar_part >= 0.0 else -2.0 * half_angle
@@ -496,26 +474,20 @@ def predict_readings(redundancy):
     the present body axes.
     """
     memory, h = redundancy.memory, redundancy.config.sample_time_s
-    previous_rates, predicted_reading, scratch_vector = (
-        memory.previous_reading[:3],
-        memory.predicted_reading,
-        memory.scratch[:3],
-    )
+    previous_rates = memory.previous_reading[:3]
+    predicted_reading = memory.predicted_reading
+    scratch_vector = memory.scratch[:3]
     advance_quaternion(memory.previous_quaternion, previous_rates, h, memory.predicted_quaternion)
-    q0, q1, q2, q3 = (
-        memory.predicted_quaternion[0],
-        memory.predicted_quaternion[1],
-        memory.predicted_quaternion[2],
-        memory.predicted_quaternion[3],
-    )
+    q0 = memory.predicted_quaternion[0]
+    q1 = memory.predicted_quaternion[1]
+    q2 = memory.predicted_quaternion[2]
+    q3 = memory.predicted_quaternion[3]
     predicted_reading[PHI] = np.arctan2(2.0 * (q0 * q1 + q2 * q3), 1.0 - 2.0 * (q1 * q1 + q2 * q2))
     predicted_reading[THETA] = np.arcsin(min(max(2.0 * (q0 * q2 - q1 * q3), -1.0), 1.0))
     predicted_reading[PSI] = np.arctan2(2.0 * (q0 * q3 + q1 * q2), 1.0 - 2.0 * (q2 * q2 + q3 * q3))
-    previous_theta, previous_phi, body_velocity = (
-        memory.previous_reading[THETA],
-        memory.previous_reading[PHI],
-        memory.body_velocity,
-    )
+    previous_theta = memory.previous_reading[THETA]
+    previous_phi = memory.previous_reading[PHI]
+    body_velocity = memory.body_velocity
     climb_rate = (
         body_velocity[0] * np.sin(previous_theta)
         - body_velocity[1] * np.sin(previous_phi) * np.cos(previous_theta)
@@ -556,10 +528,8 @@ def fill_residuals(redundancy, readings):
     tests[SPEED_TEST].residual = readings[AIRSPEED] - predicted_reading[AIRSPEED]
     tests[ALPHA_FLOW_TEST].residual = readings[ALPHA] - predicted_reading[ALPHA]
     tests[BETA_FLOW_TEST].residual = readings[BETA] - predicted_reading[BETA]
-    half_density, previous_half_density = (
-        readings[QDYN] / readings[AIRSPEED] ** 2,
-        memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2,
-    )
+    half_density = readings[QDYN] / readings[AIRSPEED] ** 2
+    previous_half_density = memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
     tests[DENSITY_TEST].residual = np.log(
         max(half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
         / max(previous_half_density, MIN_QDYN_PER_AIRSPEED_SQUARED)
@@ -627,10 +597,8 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
     it changes J. A momentary error turns an axis when it begins, and back when it ends with another J.
     """
     tests, config, memory = redundancy.test, redundancy.config, redundancy.memory
-    previous_error_bound, changing_error_bound = (
-        memory.previous_error_bound,
-        memory.changing_reading_error_bound,
-    )
+    previous_error_bound = memory.previous_error_bound
+    changing_error_bound = memory.changing_reading_error_bound
     max_pitch_secant = 1.0 / np.cos(min(max_pitch_angle(redundancy, readings), MAX_PITCH_RAD))
     attitude_error_bound_sum = (
         previous_error_bound[PHI] + previous_error_bound[THETA] + previous_error_bound[PSI]
@@ -688,10 +656,8 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
 def min_height_of_two_samples(redundancy, readings):
     """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
     memory = redundancy.memory
-    min_height, previous_min_height = (
-        readings[ALTITUDE] - memory.reading_error_bound[ALTITUDE],
-        memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE],
-    )
+    min_height = readings[ALTITUDE] - memory.reading_error_bound[ALTITUDE]
+    previous_min_height = memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE]
     return max(min(min_height, previous_min_height), LEAST_HEIGHT_M)
 
 
@@ -756,13 +722,11 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
             changing_error_bound[vane_index],
             second_order_factor * flow_angle_rate_error_bound,
         )
-    previous_tilt_error_bound_sum, max_recent_acceleration = (
-        previous_error_bound[PHI] + previous_error_bound[THETA],
-        max(
-            max_acceleration,
-            memory.earlier_acceleration_magnitudes[0],
-            memory.earlier_acceleration_magnitudes[1],
-        ),
+    previous_tilt_error_bound_sum = previous_error_bound[PHI] + previous_error_bound[THETA]
+    max_recent_acceleration = max(
+        max_acceleration,
+        memory.earlier_acceleration_magnitudes[0],
+        memory.earlier_acceleration_magnitudes[1],
     )
     climb_rate_error_bound = (previous_reading[AIRSPEED] + previous_error_bound[AIRSPEED]) * (
         previous_tilt_error_bound_sum + previous_vane_error_bound_sum
@@ -780,10 +744,8 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
 def log_change_error_bound(redundancy, readings, sensor):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
-    constant_error_bound, previous_reading = (
-        redundancy.config.constant_error_bound[sensor],
-        redundancy.memory.previous_reading[sensor],
-    )
+    constant_error_bound = redundancy.config.constant_error_bound[sensor]
+    previous_reading = redundancy.memory.previous_reading[sensor]
     smaller_reading = max(min(readings[sensor], previous_reading), 1.0)
     first_order_bound = constant_error_bound * abs(
         1.0 / max(readings[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
@@ -797,10 +759,8 @@ def log_change_error_bound(redundancy, readings, sensor):
 def bound_density_change_test(redundancy, readings):
     """Fill the bounds of `bound_residuals` for the logarithm of the density."""
     test, config, memory = redundancy.test[DENSITY_TEST], redundancy.config, redundancy.memory
-    reading_error_bound, changing_error_bound = (
-        memory.reading_error_bound,
-        memory.changing_reading_error_bound,
-    )
+    reading_error_bound = memory.reading_error_bound
+    changing_error_bound = memory.changing_reading_error_bound
     max_climb_rate = (
         memory.previous_reading[AIRSPEED]
         + memory.previous_error_bound[AIRSPEED]
@@ -832,10 +792,8 @@ def bound_residuals(redundancy, readings):
     through the reading that is compared with it. gyro_error_bound_sum: sum of the bounds of the three gyros;
     max_turn_rate: bound on |p| + |q| + |r|; rad/s.
     """
-    previous_error_bound, previous_reading = (
-        redundancy.memory.previous_error_bound,
-        redundancy.memory.previous_reading,
-    )
+    previous_error_bound = redundancy.memory.previous_error_bound
+    previous_reading = redundancy.memory.previous_reading
     gyro_error_bound_sum = previous_error_bound[P] + previous_error_bound[Q] + previous_error_bound[R]
     max_turn_rate = (
         abs(previous_reading[P]) + abs(previous_reading[Q]) + abs(previous_reading[R]) + gyro_error_bound_sum
@@ -899,10 +857,8 @@ def compare_duplicate_sensors(redundancy, readings, is_fresh):
     quantities, one of the two is broken."""
     memory = redundancy.memory
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
-        duplicate_sensor_index, duplicated_reading_index = (
-            DUPLICATE_SENSOR_INDEX[duplicate_index],
-            DUPLICATED_READING_INDEX[duplicate_index],
-        )
+        duplicate_sensor_index = DUPLICATE_SENSOR_INDEX[duplicate_index]
+        duplicated_reading_index = DUPLICATED_READING_INDEX[duplicate_index]
         test = redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index]
         test.residual_bound_ratio = 0.0
         if is_fresh[duplicate_sensor_index - N_IN_EQUATIONS]:

@@ -211,11 +211,9 @@ def flow_reading_jumped(monitor, readings):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
     alarm_test_index, redundancy, memory = monitor.output.alarm_test_index, monitor.redundancy, monitor.memory
-    flow_sensor, previous_reading, alarm_test = (
-        flow_sensor_of_test(alarm_test_index),
-        redundancy.memory.previous_reading,
-        redundancy.test[alarm_test_index],
-    )
+    flow_sensor = flow_sensor_of_test(alarm_test_index)
+    previous_reading = redundancy.memory.previous_reading
+    alarm_test = redundancy.test[alarm_test_index]
     # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
     residual_per_velocity_error = (
         1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
@@ -309,10 +307,8 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
         return False
     flow_hypothesis_index = initial_error_hypothesis_of_test(alarm_test_index)
     for m in range(redundancy.config.filter_decay.size):
-        expected_residual, speed_test = (
-            abs(monitor.memory.filtered_climb_error_m[m]),
-            redundancy.test[SPEED_TEST],
-        )
+        expected_residual = abs(monitor.memory.filtered_climb_error_m[m])
+        speed_test = redundancy.test[SPEED_TEST]
         if (
             alarm_test_index == SPEED_TEST
         ):  # log(density) changes by twice the relative change of the airspeed
@@ -335,27 +331,21 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     """Suspect the accelerometers along whose axis most of the spurious velocity is, unless a gyro explains
     it."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    previous_reading, flow_residual_sum_since_alarm, flow_bound_sum_since_alarm = (
-        monitor.redundancy.memory.previous_reading,
-        memory.flow_residual_sum_since_alarm,
-        memory.flow_bound_sum_since_alarm,
-    )
-    alpha, beta, V = (
-        previous_reading[ALPHA],
-        previous_reading[BETA],
-        max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS),
-    )
+    previous_reading = monitor.redundancy.memory.previous_reading
+    flow_residual_sum_since_alarm = memory.flow_residual_sum_since_alarm
+    flow_bound_sum_since_alarm = memory.flow_bound_sum_since_alarm
+    alpha = previous_reading[ALPHA]
+    beta = previous_reading[BETA]
+    V = max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
-    spurious_velocity_along_flow, spurious_velocity_down, spurious_velocity_sideways = (
-        flow_residual_sum_since_alarm[0],
-        V * np.cos(beta) * flow_residual_sum_since_alarm[1],
-        V * flow_residual_sum_since_alarm[2],
-    )
-    spurious_velocity, largest_component_magnitude, spurious_velocity_ahead = (
-        memory.spurious_velocity,
-        0.0,
-        np.cos(beta) * spurious_velocity_along_flow - np.sin(beta) * spurious_velocity_sideways,
+    spurious_velocity_along_flow = flow_residual_sum_since_alarm[0]
+    spurious_velocity_down = V * np.cos(beta) * flow_residual_sum_since_alarm[1]
+    spurious_velocity_sideways = V * flow_residual_sum_since_alarm[2]
+    spurious_velocity = memory.spurious_velocity
+    largest_component_magnitude = 0.0
+    spurious_velocity_ahead = (
+        np.cos(beta) * spurious_velocity_along_flow - np.sin(beta) * spurious_velocity_sideways
     )
     spurious_velocity[0] = np.cos(alpha) * spurious_velocity_ahead - np.sin(alpha) * spurious_velocity_down
     spurious_velocity[1] = (
@@ -499,12 +489,10 @@ def advance_start_stage_and_widen_W_bound(monitor):
 def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
     """Advance W (3,) rad/s and its bound by the frame of dt s with innovation and eta_bar (3,) rad/s2."""
     memory, D = monitor.memory, monitor.config.rate_damping_per_s
-    W, W_bound, previous_W, previous_W_bound = (
-        memory.gyro_error_estimate,
-        memory.gyro_error_estimate_bound,
-        memory.previous_gyro_error_estimate,
-        memory.previous_gyro_error_estimate_bound,
-    )
+    W = memory.gyro_error_estimate
+    W_bound = memory.gyro_error_estimate_bound
+    previous_W = memory.previous_gyro_error_estimate
+    previous_W_bound = memory.previous_gyro_error_estimate_bound
     previous_W_bound[:] = W_bound
     previous_W[:] = W
     for i in range(3):
@@ -633,10 +621,8 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
     for i in range(3):
         if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
-        apparent_gyro_error, previous_apparent_gyro_error = (
-            memory.apparent_gyro_error[i],
-            memory.previous_apparent_gyro_error[i],
-        )
+        apparent_gyro_error = memory.apparent_gyro_error[i]
+        previous_apparent_gyro_error = memory.previous_apparent_gyro_error[i]
         jump_acceleration = (apparent_gyro_error - previous_apparent_gyro_error) / dt  # rad/s2
         jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
             abs(apparent_gyro_error), abs(previous_apparent_gyro_error)
@@ -652,13 +638,11 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
             or alarm_axis >= 0
             or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
         )
-        transient_peak, remaining_peak = (
-            memory.earlier_substep_gyro_error_peak[i],
-            max(
-                abs(previous_apparent_gyro_error),
-                memory.previous_substep_gyro_error_peak[i],
-                abs(apparent_gyro_error),
-            ),
+        transient_peak = memory.earlier_substep_gyro_error_peak[i]
+        remaining_peak = max(
+            abs(previous_apparent_gyro_error),
+            memory.previous_substep_gyro_error_peak[i],
+            abs(apparent_gyro_error),
         )
         is_transient = (
             remaining_peak < MAX_REMAINING_TRANSIENT_SHARE * transient_peak
@@ -776,14 +760,10 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
     redundancy, memory = monitor.redundancy, monitor.memory
-    duplicated_reading_index, duplicated_reading_test_index = (
-        DUPLICATED_READING_INDEX[duplicate_index],
-        DUPLICATED_READING_TEST_INDEX[duplicate_index],
-    )
-    reading_test_record, duplicate_test_record = (
-        redundancy.test[duplicated_reading_test_index],
-        redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index],
-    )
+    duplicated_reading_index = DUPLICATED_READING_INDEX[duplicate_index]
+    duplicated_reading_test_index = DUPLICATED_READING_TEST_INDEX[duplicate_index]
+    reading_test_record = redundancy.test[duplicated_reading_test_index]
+    duplicate_test_record = redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index]
     # of the reading, if it is the broken one
     min_reading_error = abs(duplicate_test_record.residual) - duplicate_test_record.filtered_bound[0]
     error_may_be_hidden = min_reading_error <= MAX_HIDDEN_ERROR_PER_TEST_BOUND * max(
@@ -830,10 +810,8 @@ def find_suspects_of_flow_test(monitor, vane_index, flow_test_index, fully_actin
     of fully_acting_gyro_index's error turns the flow. No flow sensor moves the attitude's tests."""
     if monitor.output.alarm_test_index != flow_test_index:
         return
-    tests_exceeded_since_alarm, is_suspect = (
-        monitor.memory.tests_exceeded_since_alarm,
-        monitor.output.is_suspect,
-    )
+    tests_exceeded_since_alarm = monitor.memory.tests_exceeded_since_alarm
+    is_suspect = monitor.output.is_suspect
     n_exceeded_turn_tests = (
         tests_exceeded_since_alarm[FIRST_TURN_TEST]
         + tests_exceeded_since_alarm[FIRST_TURN_TEST + 1]
@@ -864,10 +842,8 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
         if flow_test_index == ALPHA_FLOW_TEST
         else abs(np.sin(alpha))
     )
-    flow_test_record, turn_test = (
-        redundancy.test[flow_test_index],
-        redundancy.test[FIRST_TURN_TEST + gyro_index],
-    )
+    flow_test_record = redundancy.test[flow_test_index]
+    turn_test = redundancy.test[FIRST_TURN_TEST + gyro_index]
     for m in range(flow_test_record.filtered_residual.size):
         flow_residual_bound = (
             FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO * flow_test_record.filtered_bound[m]
@@ -909,10 +885,8 @@ def suspect_gyros_and_attitude(monitor):
     """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
     first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
     memory, is_suspect = monitor.memory, monitor.output.is_suspect
-    tests_exceeded_since_alarm, gyro_error_verdict = (
-        memory.tests_exceeded_since_alarm,
-        memory.gyro_error_verdict,
-    )
+    tests_exceeded_since_alarm = memory.tests_exceeded_since_alarm
+    gyro_error_verdict = memory.gyro_error_verdict
     n_exceeded_turn_tests, any_angle_is_frozen = 0, False
     for i in range(3):
         n_exceeded_turn_tests += tests_exceeded_since_alarm[FIRST_TURN_TEST + i]
@@ -932,10 +906,8 @@ def suspect_gyros_and_attitude(monitor):
             may_be_only_this_angle
             and gyro_error_verdict[axis_of_largest_turn_residual(monitor, i)] != GYRO_ERROR_CONFIRMED
         )
-        n_identical_samples, min_frozen_samples = (
-            memory.n_identical_samples[PHI + i],
-            monitor.config.min_frozen_samples[PHI + i],
-        )
+        n_identical_samples = memory.n_identical_samples[PHI + i]
+        min_frozen_samples = monitor.config.min_frozen_samples[PHI + i]
         # too early to say
         may_be_frozen = 0 < n_identical_samples < min_frozen_samples < UNREACHABLE_FROZEN_SAMPLES
         is_suspect[PHI + i] = angle_may_be_wrong or (angle_explains_turning and may_be_frozen)
@@ -1087,11 +1059,9 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
 
     The rate itself is used for the next sample: its own error shows there.
     """
-    config, memory, test = (
-        monitor.redundancy.config,
-        monitor.redundancy.memory,
-        monitor.redundancy.test[FIRST_TURN_TEST + axis],
-    )
+    config = monitor.redundancy.config
+    memory = monitor.redundancy.memory
+    test = monitor.redundancy.test[FIRST_TURN_TEST + axis]
     u = prediction.u_before if monitor.memory.substep == 0 else prediction.u
     predicted_acceleration = prediction.f[axis]
     for s in range(u.size):

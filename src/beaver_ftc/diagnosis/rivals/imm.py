@@ -133,10 +133,8 @@ class InteractingMultipleModels:
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
-        unknown_fault_probability, loss_mode_probabilities = (
-            float(self.mode_probabilities[-1]),
-            self.mode_probabilities[1:-1].reshape(3, len(LOSS_THETA_LEVELS)),
-        )
+        unknown_fault_probability = float(self.mode_probabilities[-1])
+        loss_mode_probabilities = self.mode_probabilities[1:-1].reshape(3, len(LOSS_THETA_LEVELS))
         loss_probability_by_main_surface = loss_mode_probabilities.sum(axis=1)
         if unknown_fault_probability > self.options["isolate"]:
             return Verdict(True, None, "unanticipated", "unanticipated", statistic=statistic)

@@ -83,12 +83,10 @@ def start_detection_filters(fdi, x):
 @kernel
 def update_isolation_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
-    config, bound_record, isolation_record, frame_means = (
-        fdi.config,
-        fdi.bound,
-        fdi.isolation,
-        prediction.frame_means,
-    )
+    config = fdi.config
+    bound_record = fdi.bound
+    isolation_record = fdi.isolation
+    frame_means = prediction.frame_means
     is_detected = fdi.verdict.detected
     isolation.update_all_fault_effects_and_reach(
         isolation_record,
@@ -192,14 +190,10 @@ def update_and_test_if_likelihood_excludes(fdi, fie):
 @kernel
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    statistical_detector, position_estimator_index = (
-        fdi.statistical,
-        fdi.layout.position_estimator[fie.surface],
-    )
-    parity_views, surface_G_column = (
-        statistical_detector.views[: statistical_detector.n_views],
-        fdi.isolation.estimator[position_estimator_index].frame_mean_effect.regressor,
-    )
+    statistical_detector = fdi.statistical
+    position_estimator_index = fdi.layout.position_estimator[fie.surface]
+    parity_views = statistical_detector.views[: statistical_detector.n_views]
+    surface_G_column = fdi.isolation.estimator[position_estimator_index].frame_mean_effect.regressor
     return parity.views_exclude_surface(
         parity_views,
         statistical_detector.test_config,
@@ -350,22 +344,16 @@ def isolation_variant_index(config: FdiConfig) -> int:
 @apart
 def update_statistical_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    statistical_detector, y, uncertainty_bound = (
-        fdi.statistical,
-        measured.y,
-        fdi.statistical.noise.uncertainty_bound,
-    )
-    test_config, blocks, gust, forces_record = (
-        statistical_detector.test_config,
-        statistical_detector.block,
-        statistical_detector.gust,
-        statistical_detector.forces,
-    )
-    parity_views, inertial_gust, frame_means = (
-        statistical_detector.views[: statistical_detector.n_views],
-        statistical_detector.inertial_gust,
-        prediction.frame_means,
-    )
+    statistical_detector = fdi.statistical
+    y = measured.y
+    uncertainty_bound = fdi.statistical.noise.uncertainty_bound
+    test_config = statistical_detector.test_config
+    blocks = statistical_detector.block
+    gust = statistical_detector.gust
+    forces_record = statistical_detector.forces
+    parity_views = statistical_detector.views[: statistical_detector.n_views]
+    inertial_gust = statistical_detector.inertial_gust
+    frame_means = prediction.frame_means
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
     gusts.fill_frame_mean_acceleration_by_gust(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
@@ -441,10 +429,8 @@ def prepare_statistical_tests(fdi, prediction, measured, k):
 @apart
 def add_instant_to_statistical_tests(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
-    statistical_detector, instant_duration_s = (
-        fdi.statistical,
-        prediction.frame_share_per_instant * fdi.config.dt,
-    )
+    statistical_detector = fdi.statistical
+    instant_duration_s = prediction.frame_share_per_instant * fdi.config.dt
     statistical.add_instant_to_gust_and_regressors(
         statistical_detector.test_config,
         statistical_detector.noise,
@@ -545,10 +531,8 @@ def update_verdict(fdi, prediction, measured, t):
 def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    engine_asymmetry_bound, conclusion_record = (
-        fdi.bound.model_error_bound_table.engine_asymmetry_bound_now,
-        fdi.verdict,
-    )
+    engine_asymmetry_bound = fdi.bound.model_error_bound_table.engine_asymmetry_bound_now
+    conclusion_record = fdi.verdict
     if not conclusion_record.detected and monitors.detect_engine_failure(
         fdi.engine_monitor, engine_asymmetry_bound, y
     ):

@@ -63,21 +63,12 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
     """Find the positions of ailerons and rudder in the elapsed frame: nu = G (p - u) + eta solved for p; nu:
     innovation (3,), |eta| <= innovation_bound (3,) rad/s2."""
     aileron_index, rudder_index = layout.main[ROLL], layout.main[YAW]
-    aileron_effect, rudder_effect = (
-        estimators[layout.position_estimator[aileron_index]].frame_mean_effect,
-        estimators[layout.position_estimator[rudder_index]].frame_mean_effect,
-    )
-    (
-        aileron_roll_acceleration_per_rad,
-        aileron_yaw_acceleration_per_rad,
-        rudder_roll_acceleration_per_rad,
-        rudder_yaw_acceleration_per_rad,
-    ) = (
-        aileron_effect.regressor[ROLL],
-        aileron_effect.regressor[YAW],
-        rudder_effect.regressor[ROLL],
-        rudder_effect.regressor[YAW],
-    )
+    aileron_effect = estimators[layout.position_estimator[aileron_index]].frame_mean_effect
+    rudder_effect = estimators[layout.position_estimator[rudder_index]].frame_mean_effect
+    aileron_roll_acceleration_per_rad = aileron_effect.regressor[ROLL]
+    aileron_yaw_acceleration_per_rad = aileron_effect.regressor[YAW]
+    rudder_roll_acceleration_per_rad = rudder_effect.regressor[ROLL]
+    rudder_yaw_acceleration_per_rad = rudder_effect.regressor[YAW]
     roll_innovation, yaw_innovation = innovation[ROLL], innovation[YAW]
     roll_innovation_tolerance = (
         innovation_bound[ROLL] + aileron_effect.error_bound[ROLL] + rudder_effect.error_bound[ROLL]
@@ -90,33 +81,24 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         - aileron_yaw_acceleration_per_rad * rudder_roll_acceleration_per_rad
     )
     abs_determinant = abs(determinant)
-    aileron_deflection_error, aileron_deflection_error_tolerance = (
-        (
-            roll_innovation * rudder_yaw_acceleration_per_rad
-            - yaw_innovation * rudder_roll_acceleration_per_rad
-        )
-        / determinant,
-        (
-            roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
-            + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
-        )
-        / abs_determinant,
-    )
+    aileron_deflection_error = (
+        roll_innovation * rudder_yaw_acceleration_per_rad - yaw_innovation * rudder_roll_acceleration_per_rad
+    ) / determinant
+    aileron_deflection_error_tolerance = (
+        roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
+        + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
+    ) / abs_determinant
     aileron_is_within_reach = set_observed_deflection_error(
         types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
-    rudder_deflection_error, rudder_deflection_error_tolerance = (
-        (
-            yaw_innovation * aileron_roll_acceleration_per_rad
-            - roll_innovation * aileron_yaw_acceleration_per_rad
-        )
-        / determinant,
-        (
-            yaw_innovation_tolerance * abs(aileron_roll_acceleration_per_rad)
-            + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
-        )
-        / abs_determinant,
-    )
+    rudder_deflection_error = (
+        yaw_innovation * aileron_roll_acceleration_per_rad
+        - roll_innovation * aileron_yaw_acceleration_per_rad
+    ) / determinant
+    rudder_deflection_error_tolerance = (
+        yaw_innovation_tolerance * abs(aileron_roll_acceleration_per_rad)
+        + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
+    ) / abs_determinant
     if not (
         set_observed_deflection_error(
             types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
@@ -136,10 +118,8 @@ def constant_parameter_types_deflection_range(config, surface, k):
             type_min_deflection, type_max_deflection = possible_deflection_range(
                 config, surface, type_index, k
             )
-            min_deflection, max_deflection = (
-                min(min_deflection, type_min_deflection),
-                max(max_deflection, type_max_deflection),
-            )
+            min_deflection = min(min_deflection, type_min_deflection)
+            max_deflection = max(max_deflection, type_max_deflection)
     reachable_low, reachable_high = surface.actuator.reachable_low, surface.actuator.reachable_high
     return (
         min(max(min_deflection, reachable_low), reachable_high),
@@ -222,10 +202,8 @@ def decide_roll_and_yaw_isolation(types, layout, t):
     the class."""
     config, pair_record = types.config, types.pair
     roll_surface, yaw_surface = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_alone_can_be_at_fault, yaw_alone_can_be_at_fault = (
-        can_be_at_fault(roll_surface),
-        can_be_at_fault(yaw_surface),
-    )
+    roll_alone_can_be_at_fault = can_be_at_fault(roll_surface)
+    yaw_alone_can_be_at_fault = can_be_at_fault(yaw_surface)
     both_must_be_at_fault = not roll_alone_can_be_at_fault and not yaw_alone_can_be_at_fault
     class_is_refuted = (
         pair_record.lateral_fault_outside_class == 1
@@ -285,10 +263,8 @@ def store_first_pitch_fault_sets(types, s):
 @kernel
 def begin_second_pitch_fault(types, layout):
     """The one known pitch fault no longer explains the flight: there is a second fault."""
-    first_surface, second_surface = (
-        types.surface[types.pair.first_pitch_fault_surface],
-        types.surface[layout.partner[types.pair.first_pitch_fault_surface]],
-    )
+    first_surface = types.surface[types.pair.first_pitch_fault_surface]
+    second_surface = types.surface[layout.partner[types.pair.first_pitch_fault_surface]]
     restore_first_pitch_fault_sets(first_surface)
     registry.restart_fault_types_of_surface(second_surface)
     for surface in (first_surface, second_surface):
@@ -343,10 +319,8 @@ def pitch_fault_type(config, surface):
 def decide_pitch_isolation(types, layout, t):
     """Which surface of pitch is at fault, if any."""
     if detect_second_pitch_fault(types, layout):
-        first_surface, second_surface_index = (
-            types.surface[types.pair.first_pitch_fault_surface],
-            layout.partner[types.pair.first_pitch_fault_surface],
-        )
+        first_surface = types.surface[types.pair.first_pitch_fault_surface]
+        second_surface_index = layout.partner[types.pair.first_pitch_fault_surface]
         second_surface = types.surface[second_surface_index]
         set_isolation_status(first_surface, 1, first_surface.status.fault_type, t)
         second_shows_fault = (

@@ -98,10 +98,8 @@ def _can_look_like(fault_type: FaultType, other_type: FaultType) -> bool:
 ACCOMMODATION_MODE_BY_TYPE, STOP_DIRECTION_BY_TYPE, MEANING_OF_REST_BY_TYPE = (
     _column_of_types(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
 )
-SHOWS_WITHIN_HALF_CYCLES, HALF_CYCLES_BEFORE_ISOLATING_OTHERS = (
-    _column_of_types("shows_within_half_cycles"),
-    _column_of_types("half_cycles_before_isolating_others"),
-)
+SHOWS_WITHIN_HALF_CYCLES = _column_of_types("shows_within_half_cycles")
+HALF_CYCLES_BEFORE_ISOLATING_OTHERS = _column_of_types("half_cycles_before_isolating_others")
 ERROR_DEPENDS_ON_COMMAND = _column_of_types("error_depends_on_command")
 MUST_SHOW_ITSELF = np.array([row.has_shown is not None for row in TYPES])
 CAN_LOOK_LIKE = np.array(
@@ -366,10 +364,8 @@ def configure_fault_types(
     for s, (surface_name, surface_record, travel_low, travel_high) in enumerate(
         zip(surface_names, types["surface"], *travel, strict=True)
     ):
-        rate_limit_deg_s, actuator = (
-            getattr(scenario.actuators, surface_name).rate_limit_deg_s,
-            surface_record["actuator"],
-        )
+        rate_limit_deg_s = getattr(scenario.actuators, surface_name).rate_limit_deg_s
+        actuator = surface_record["actuator"]
         actuator["travel_low"], actuator["travel_high"] = travel_low, travel_high
         actuator["reachable_low"], actuator["reachable_high"] = min(travel_low, 0.0), max(travel_high, 0.0)
         actuator["approach_share_per_substep"], actuator["max_motion_per_substep"] = (

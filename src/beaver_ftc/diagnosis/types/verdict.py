@@ -312,10 +312,8 @@ def decide_surface_and_type(types, conclusion, layout, estimators, t):
 
     conclusion: that of the frame before, which gives the instants of what has not changed; t s.
     """
-    surface_index, previous_estimator_index = (
-        find_surface_at_fault(types, layout),
-        conclusion.isolated_estimator,
-    )
+    surface_index = find_surface_at_fault(types, layout)
+    previous_estimator_index = conclusion.isolated_estimator
     previous_surface_index = (
         estimators[previous_estimator_index].surface
         if previous_estimator_index >= 0
@@ -545,10 +543,8 @@ def _findings_assuming_pair(fdi: np.void, surface_names: Sequence[str]) -> Findi
 
 
 def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> Findings:
-    isolated_estimator, isolated_at_s = (
-        int(fdi["verdict"]["isolated_estimator"]),
-        float(fdi["verdict"]["isolated_at_s"]),
-    )
+    isolated_estimator = int(fdi["verdict"]["isolated_estimator"])
+    isolated_at_s = float(fdi["verdict"]["isolated_at_s"])
     if isolated_estimator == NOT_ISOLATED:
         return {
             **_NO_FINDINGS,
@@ -562,10 +558,8 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
             "isolation_type": unanticipated,
             "isolation_time_s": isolated_at_s,
         }
-    s, fault_type = (
-        int(fdi["isolation"]["estimator"][isolated_estimator]["surface"]),
-        int(fdi["verdict"]["fault_type"]),
-    )
+    s = int(fdi["isolation"]["estimator"][isolated_estimator]["surface"])
+    fault_type = int(fdi["verdict"]["fault_type"])
     return {
         **_finding_on_surface(fdi, s, fault_type, surface_names),
         "isolation_time_s": isolated_at_s,
@@ -629,10 +623,8 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
     if constant_parameter_type_indices and not fdi["types"]["config"]["has_surface_term_errors"]:
-        evidence, slowest_half_cycle_frames = (
-            surface["evidence"],
-            fdi["types"]["config"]["slowest_half_cycle_frames"],
-        )
+        evidence = surface["evidence"]
+        slowest_half_cycle_frames = fdi["types"]["config"]["slowest_half_cycle_frames"]
         anomaly_is_shorter_than_half_cycle = (
             evidence["n_anomalous_frames"] - evidence["n_rest_frames"] < slowest_half_cycle_frames
         )

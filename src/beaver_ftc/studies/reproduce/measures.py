@@ -265,10 +265,8 @@ def learning(flights: Flights, *names: str) -> float:
 
 
 def _left_of_error(flown: Flown, axis: str) -> float:
-    early, late = (
-        flown.rms_deg_s(axis, flown.fault_at_s, flown.fault_at_s + 5.0),
-        flown.rms_deg_s(axis, flown.fault_at_s + 13.0),
-    )
+    early = flown.rms_deg_s(axis, flown.fault_at_s, flown.fault_at_s + 5.0)
+    late = flown.rms_deg_s(axis, flown.fault_at_s + 13.0)
     return np.inf if flown.metrics.departure else late / early
 
 

@@ -41,10 +41,8 @@ from beaver_ftc.diagnosis.types import (
 @kernel
 def effectiveness_interval_of_judged_frame(surface):
     """The interval of 1 + theta in [0, 1] that agrees with the judged frame; low > high if none."""
-    position_low, position_high = (
-        surface.judged_observation.position_low,
-        surface.judged_observation.position_high,
-    )
+    position_low = surface.judged_observation.position_low
+    position_high = surface.judged_observation.position_high
     return isolation.consistent_theta_interval(
         0.5 * (position_low + position_high),
         0.5 * (position_high - position_low),
@@ -69,11 +67,9 @@ def consistent_loss_interval(config, surface, type_index, k):
 @kernel
 def loss_deflection_range(config, surface, type_index, k):
     """The command times what can be left."""
-    effectiveness_low, effectiveness_high, healthy_position = (
-        surface.feasible_sets.low[type_index],
-        surface.feasible_sets.high[type_index],
-        surface.last_observation.healthy_position,
-    )
+    effectiveness_low = surface.feasible_sets.low[type_index]
+    effectiveness_high = surface.feasible_sets.high[type_index]
+    healthy_position = surface.last_observation.healthy_position
     return min(effectiveness_low * healthy_position, effectiveness_high * healthy_position), max(
         effectiveness_low * healthy_position, effectiveness_high * healthy_position
     )
@@ -142,18 +138,14 @@ def offset_interval_of_judged_frame(surface):
     A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
     Nothing but a loss takes it beyond.
     """
-    position_low, position_high, healthy_position, command_record = (
-        surface.judged_observation.position_low,
-        surface.judged_observation.position_high,
-        surface.judged_observation.healthy_position,
-        surface.commands,
-    )
+    position_low = surface.judged_observation.position_low
+    position_high = surface.judged_observation.position_high
+    healthy_position = surface.judged_observation.healthy_position
+    command_record = surface.commands
     if position_high < surface.actuator.travel_low or position_low > surface.actuator.travel_high:
         return isolation.EMPTY_THETA_INTERVAL
-    min_instant_position, max_instant_position = (
-        position_low - max(healthy_position - command_record.min_healthy_position[1], 0.0),
-        position_high + max(command_record.max_healthy_position[1] - healthy_position, 0.0),
-    )
+    min_instant_position = position_low - max(healthy_position - command_record.min_healthy_position[1], 0.0)
+    max_instant_position = position_high + max(command_record.max_healthy_position[1] - healthy_position, 0.0)
     offset_low = (
         position_low - healthy_position if min_instant_position > surface.actuator.travel_low else -np.inf
     )
@@ -191,11 +183,9 @@ def bias_deflection_range(config, surface, type_index, k):
 def mean_deflection_with_offset(surface, offset_rad, extreme_healthy_position):
     """Return the mean deflection with an offset (rad); if a stop is met at an instant, that at
     `extreme_healthy_position`."""
-    command_record, actuator, mean_deflection = (
-        surface.commands,
-        surface.actuator,
-        surface.last_observation.healthy_position + offset_rad,
-    )
+    command_record = surface.commands
+    actuator = surface.actuator
+    mean_deflection = surface.last_observation.healthy_position + offset_rad
     meets_stop = (
         command_record.min_healthy_position[0] + offset_rad < actuator.travel_low
         or command_record.max_healthy_position[0] + offset_rad > actuator.travel_high
@@ -358,9 +348,11 @@ def consistent_oscillation_interval(config, surface, type_index, k):
     keeps its sign.
     """
     memory = surface.oscillatory
-    deflection_error_low, deflection_error_high = (
-        surface.judged_observation.position_low - surface.judged_observation.healthy_position,
-        surface.judged_observation.position_high - surface.judged_observation.healthy_position,
+    deflection_error_low = (
+        surface.judged_observation.position_low - surface.judged_observation.healthy_position
+    )
+    deflection_error_high = (
+        surface.judged_observation.position_high - surface.judged_observation.healthy_position
     )
     error_sign = 1 if deflection_error_low > 0.0 else (-1 if deflection_error_high < 0.0 else 0)
     if error_sign == 0 or (
@@ -415,10 +407,8 @@ def oscillation_amplitude_rad(fdi: np.void, s: int, type_index: int) -> float | 
 def oscillation_frequency_rad_s(fdi: np.void, s: int, type_index: int) -> float | None:
     """From the half-cycles counted."""
     memory = fdi["types"]["surface"][s]["oscillatory"]
-    n_counted_half_cycles, n_frames_in_half_cycles = (
-        int(memory["n_half_cycles"]) - 1,
-        int(memory["last_half_cycle_end_frame"] - memory["first_half_cycle_end_frame"]),
-    )
+    n_counted_half_cycles = int(memory["n_half_cycles"]) - 1
+    n_frames_in_half_cycles = int(memory["last_half_cycle_end_frame"] - memory["first_half_cycle_end_frame"])
     return (
         n_counted_half_cycles
         * pi
@@ -458,11 +448,9 @@ def consistent_rate_limit_interval(config, surface, type_index, k):
 
     Of several JSBSim frames in one of ours the first is the old command's.
     """
-    position_low, position_high, memory = (
-        surface.judged_observation.position_low,
-        surface.judged_observation.position_high,
-        surface.rate_limit,
-    )
+    position_low = surface.judged_observation.position_low
+    position_high = surface.judged_observation.position_high
+    memory = surface.rate_limit
     side_of_command, moves_away_from_command = surface_side_of_commands(config, surface), False
     if side_of_command == 0 or side_of_command != memory.side_of_command or k != memory.last_known_frame + 1:
         memory.position_low, memory.position_high = position_low, position_high

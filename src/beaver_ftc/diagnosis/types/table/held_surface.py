@@ -92,13 +92,11 @@ def simulate_return_in_frame(config, surface, start_position, mean_extreme_sign=
     The release is at the beginning of the frame; with a mean_extreme_sign, at any instant of it: the least
     mean if mean_extreme_sign < 0, else the greatest.
     """
-    position_sum, n_positions, position, min_position, max_position = (
-        0.0,
-        0,
-        start_position,
-        start_position,
-        start_position,
-    )
+    position_sum = 0.0
+    n_positions = 0
+    position = start_position
+    min_position = start_position
+    max_position = start_position
     for frame_in_block in range(config.frames_per_block):
         command = surface.commands.command_history[1, frame_in_block]
         for _ in range(config.n_substeps):
@@ -125,10 +123,8 @@ def simulate_return_in_frame(config, surface, start_position, mean_extreme_sign=
 @kernel
 def release_within_block_explains_block(config, surface, type_index):
     """Whether a release at an instant of the judged block explains the block."""
-    held_position_min, held_position_max = (
-        surface.release.held_position_min[type_index],
-        surface.release.held_position_max[type_index],
-    )
+    held_position_min = surface.release.held_position_min[type_index]
+    held_position_max = surface.release.held_position_max[type_index]
     if config.frames_per_block == 1 or held_position_min > held_position_max:
         return False
     lowest_mean_position, _, tolerance_of_lowest_mean = simulate_return_in_frame(
@@ -171,10 +167,8 @@ def narrow_return_interval(config, surface, release_slot, type_index):
     mean_position_from_high, _, mean_position_tolerance_from_high = simulate_return_in_frame(
         config, surface, release.return_position_high[release_slot, type_index]
     )
-    mean_position_tolerance, healthy_position = (
-        max(mean_position_tolerance_from_low, mean_position_tolerance_from_high),
-        surface.judged_observation.healthy_position,
-    )
+    mean_position_tolerance = max(mean_position_tolerance_from_low, mean_position_tolerance_from_high)
+    healthy_position = surface.judged_observation.healthy_position
     if (
         max(
             abs(mean_position_from_low - mean_position_tolerance - healthy_position),

@@ -81,6 +81,19 @@ def start_detection_filters(fdi, x):
 
 
 @kernel
+def update_detection_filters(fdi, prediction, measured):
+    """Bring the detection filters from the frame before to this one: innovation, residuals and thresholds."""
+    filters.update_residuals_and_thresholds(
+        fdi.bank,
+        fdi.bound,
+        measured.x,
+        prediction.x_before,
+        prediction.frame_means.predicted_acceleration,
+        fdi.config.dt,
+    )
+
+
+@kernel
 def update_isolation_estimators(fdi, prediction):
     """Bring the isolation estimators from the frame before to this one, once the bank has its innovation."""
     config = fdi.config
@@ -488,14 +501,7 @@ def begin_scheme(fdi, prediction, measured):
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
     conclusion_record, bound_record, dt = fdi.verdict, fdi.bound, fdi.config.dt
-    filters.update_residuals_and_thresholds(
-        fdi.bank,
-        bound_record,
-        measured.x,
-        prediction.x_before,
-        prediction.frame_means.predicted_acceleration,
-        dt,
-    )
+    update_detection_filters(fdi, prediction, measured)
     if fdi.statistical.test_config.enabled:
         update_statistical_tests(fdi, prediction, measured, k, t)
     update_isolation_estimators(fdi, prediction)

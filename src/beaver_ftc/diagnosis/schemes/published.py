@@ -203,14 +203,7 @@ def fdae_alarm_axis(fdae):
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
     published_record, bound_record, dt = fdi.published, fdi.bound, fdi.config.dt
-    filters.update_residuals_and_thresholds(
-        fdi.bank,
-        bound_record,
-        measured.x,
-        prediction.x_before,
-        prediction.frame_means.predicted_acceleration,
-        dt,
-    )
+    adaptive_estimators.update_detection_filters(fdi, prediction, measured)
     adaptive_estimators.update_isolation_estimators(fdi, prediction)
     train_fdae_network(published_record, fdi.fdae, fdi.verdict.detected, dt)
     filters.advance_fdae(

@@ -80,7 +80,9 @@ def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponenti
 
 def _whitened_effectiveness_change_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
     """Regressors (n, 3, 3 + G) of trim and lost effectiveness, and what a healthy vehicle leaves, (n, 3)."""
-    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
+    is_predictable, rates_unexplained_by_past, group_responses = unexplained_rates_and_responses(
+        samples, model
+    )
     residual_covariance = model.intercept_past_response_noise()[3]
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance))
     trim_regressors = np.broadcast_to(
@@ -92,7 +94,7 @@ def _whitened_effectiveness_change_regression(samples: Samples, model: Model) ->
         0.0,
     )
     return np.einsum("ab,nbi->nai", whitening_matrix, unwhitened_regressors), standardized_healthy_residual(
-        model, is_predictable, unexplained_rates, group_responses
+        model, is_predictable, rates_unexplained_by_past, group_responses
     )
 
 
@@ -227,12 +229,14 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
             f"{model.vehicle.name}: {len(surface_groups)} groups of surfaces, allowed for a detector of the "
             f"loop: at most {len(LOOP_SURFACES_FOR_GROUPS)}"
         )
-    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(samples, model)
+    is_predictable, rates_unexplained_by_past, group_responses = unexplained_rates_and_responses(
+        samples, model
+    )
     intercept, dt_s = model.intercept_past_response_noise()[0], 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     previous_rates = np.vstack([rates[:1], rates[:-1]])
     predicted_rates = rates - np.where(
-        is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
+        is_predictable[:, None], rates_unexplained_by_past - intercept - group_responses.sum(axis=1), 0.0
     )
     expected_acceleration = (predicted_rates - previous_rates) / dt_s
     contribution = np.zeros((len(rates), 3, _N_LOOP_SURFACES_WITH_FLAP))

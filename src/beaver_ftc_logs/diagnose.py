@@ -235,13 +235,16 @@ def _withdraw_contradicted_isolation(
 
 
 def standardized_healthy_residual(
-    model: Model, is_predictable: NDArray[np.bool_], unexplained_rates: Floats, group_responses: Floats
+    model: Model,
+    is_predictable: NDArray[np.bool_],
+    rates_unexplained_by_past: Floats,
+    group_responses: Floats,
 ) -> Floats:
     """Residual of a healthy vehicle by `unexplained_rates_and_responses`, in standard deviations of the
     noise, (n, 3); 0 where no sample can be predicted."""
     intercept, _, _, residual_covariance = model.intercept_past_response_noise()
     residual = np.where(
-        is_predictable[:, None], unexplained_rates - intercept - group_responses.sum(axis=1), 0.0
+        is_predictable[:, None], rates_unexplained_by_past - intercept - group_responses.sum(axis=1), 0.0
     )
     return np.asarray(residual @ np.linalg.inv(np.linalg.cholesky(residual_covariance)).T)
 

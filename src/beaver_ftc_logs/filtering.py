@@ -127,9 +127,9 @@ def _average_bank_runs(
 def _noise_model_log_likelihood(flight: Samples, model: Model, noise_model: NoiseModel) -> Floats:
     """Log likelihood (n,) of a noise model for a flight that is whitened by it, with all surfaces healthy; by
     the covariance of the fit, without its inflation. The filter multiplied the samples by C(1)."""
-    is_predictable, unexplained_rates, group_responses = whitened_rates_and_responses(flight, model)
+    is_predictable, rates_unexplained_by_past, group_responses = whitened_rates_and_responses(flight, model)
     residual = np.nan_to_num(
-        unexplained_rates
+        rates_unexplained_by_past
         - group_responses.sum(axis=1)
         - model.whitened_intercept(noise_model.ma_coefficients)
     )
@@ -216,7 +216,7 @@ def _model_probabilities_with_forgetting(
 def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) -> BankRunResult:
     """The result of `run_bank` for one flight."""
     is_predictable, *rates_and_responses = whitened_rates_and_responses(samples, model)
-    unexplained_rates, group_responses = (
+    rates_unexplained_by_past, group_responses = (
         np.ascontiguousarray(np.nan_to_num(array)) for array in rates_and_responses
     )
     noise = build_residual_noise(model, samples.noise_ma_coefficients)
@@ -224,14 +224,14 @@ def _run_bank_on_flight(samples: Samples, model: Model, bank: HypothesisBank) ->
     if model.vehicle.other_laws:
         residual = np.where(
             is_predictable[:, None],
-            unexplained_rates - noise.intercept_rad_s - group_responses.sum(axis=1),
+            rates_unexplained_by_past - noise.intercept_rad_s - group_responses.sum(axis=1),
             0.0,
         )
         min_noise_variance_scales = recent_noise_variance_scale(
             residual, is_predictable, noise.covariance, model.rate_hz
         )
     bank_run: BankRunResult = run_bank(
-        unexplained_rates,
+        rates_unexplained_by_past,
         group_responses,
         is_predictable,
         bank,
@@ -276,16 +276,16 @@ def recent_noise_variance_scale(
 
 @kernel
 def run_bank(
-    unexplained_rates, group_responses, is_usable, bank, state_model, noise, min_noise_variance_scales
+    rates_unexplained_by_past, group_responses, is_usable, bank, state_model, noise, min_noise_variance_scales
 ):
     """Posterior probabilities (n, H), mean trim and gains (n, N), noise scale (n,) and sample_log_likelihoods
     (n,): the log likelihood of a sample given all before it, times effective_sample_share.
 
-    Shapes: unexplained_rates (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the sample may
-    be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise (bank.py);
-    min_noise_variance_scales (n,): lower bound of the scale of the noise.
+    Shapes: rates_unexplained_by_past (n, 3); group_responses (n, G, 3) while healthy; is_usable (n,) the
+    sample may be used. bank: HypothesisBank, state_model: TrimAndGainStateModel, noise: ResidualNoise
+    (bank.py); min_noise_variance_scales (n,): lower bound of the scale of the noise.
     """
-    n_samples = len(unexplained_rates)
+    n_samples = len(rates_unexplained_by_past)
     n_hypotheses = len(bank.transition_share)
     n_states = len(state_model.initial_mean)
     no_response_index = n_hypotheses - 1
@@ -314,7 +314,7 @@ def run_bank(
                     prior_probabilities,
                     state_means,
                     state_covariances,
-                    unexplained_rates[k],
+                    rates_unexplained_by_past[k],
                     group_responses[k],
                     bank,
                     noise,
@@ -432,7 +432,7 @@ def _correct_hypotheses(
     prior_probabilities,
     state_means,
     state_covariances,
-    unexplained_rates,
+    rates_unexplained_by_past,
     group_responses,
     bank,
     noise,
@@ -459,11 +459,16 @@ def _correct_hypotheses(
         )
         if h == n_hypotheses - 1:
             squared_residuals[h], log_determinant = _update_gaussian(
-                zero_mean, zero_covariance, unexplained_rates, sensitivity, noise_covariance, noise
+                zero_mean, zero_covariance, rates_unexplained_by_past, sensitivity, noise_covariance, noise
             )
         else:
             squared_residuals[h], log_determinant = _update_gaussian(
-                state_means[h], state_covariances[h], unexplained_rates, sensitivity, noise_covariance, noise
+                state_means[h],
+                state_covariances[h],
+                rates_unexplained_by_past,
+                sensitivity,
+                noise_covariance,
+                noise,
             )
         limited_squared_residual = min(squared_residuals[h], noise.max_squared_residual)
         log_likelihoods[h] = noise.effective_sample_share * (
@@ -516,10 +521,10 @@ def _limit_states(state_means, min_state, max_state):
 
 @kernel
 def _update_gaussian(
-    state_mean, state_covariance, unexplained_rates, state_sensitivity, noise_covariance, noise
+    state_mean, state_covariance, rates_unexplained_by_past, state_sensitivity, noise_covariance, noise
 ):
-    """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by unexplained_rates (3,) =
-    state_sensitivity' state_mean + noise, state_sensitivity (N, 3).
+    """Correct one Gaussian (state_mean (N,), state_covariance (N, N), replaced) by
+    rates_unexplained_by_past (3,) = state_sensitivity' state_mean + noise, state_sensitivity (N, 3).
 
     Returns the squared residual, normalised by its covariance, and the log determinant of that covariance.
     The gain is reduced for a residual in the tail of the t distribution, and 0 above max_squared_residual.
@@ -527,7 +532,7 @@ def _update_gaussian(
     n_states, t_degrees_of_freedom = len(state_mean), noise.t_degrees_of_freedom
     cross_covariance = np.zeros((n_states, 3))
     residual_covariance = noise_covariance.copy()
-    residual = unexplained_rates.copy()
+    residual = rates_unexplained_by_past.copy()
     for i in range(n_states):
         for j in range(3):
             residual[j] -= state_mean[i] * state_sensitivity[i, j]

@@ -1143,24 +1143,24 @@ def time_whitened_residual_and_responses(
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
     (n, G, 3) as they show in it."""
-    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
+    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     usable_rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
     intercept = model.whitened_intercept(usable_flight.samples.noise_ma_coefficients)
     return (
         usable_rows,
-        (unexplained_rates - group_responses.sum(axis=1) - intercept)[usable_rows],
+        (rates_unexplained_by_past - group_responses.sum(axis=1) - intercept)[usable_rows],
         group_responses[usable_rows],
     )
 
 
 def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
-    is_predictable, unexplained_rates, group_responses = regression.unexplained_rates_and_responses(
+    is_predictable, rates_unexplained_by_past, group_responses = regression.unexplained_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True
     )
     usable_rows = np.flatnonzero(usable_flight.is_usable & is_predictable)
-    return usable_rows, (unexplained_rates - group_responses.sum(axis=1) - np.array(model.intercept))[
+    return usable_rows, (rates_unexplained_by_past - group_responses.sum(axis=1) - np.array(model.intercept))[
         usable_rows
     ]

@@ -119,10 +119,10 @@ def unexplained_rates_and_responses(
         samples, surface_indices_by_group(model), *lag_counts_and_label_scaling
     )
     _, past_coefficients, command_response, _ = model.intercept_past_response_noise()
-    unexplained_rates = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
+    rates_unexplained_by_past = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
     return (
         is_predictable,
-        unexplained_rates,
+        rates_unexplained_by_past,
         np.einsum("ngl,glr->ngr", lagged_group_commands, command_response),
     )
 
@@ -132,7 +132,7 @@ def whitened_rates_and_responses(
 ) -> tuple[NDArray[np.bool_], Floats, Floats]:
     """As `unexplained_rates_and_responses`, less the prediction of each residual from those before it by the
     flight's noise model: a healthy flight leaves a white residual."""
-    is_predictable, unexplained_rates, group_responses = unexplained_rates_and_responses(
+    is_predictable, rates_unexplained_by_past, group_responses = unexplained_rates_and_responses(
         samples, model, scales_by_labels
     )
     ar_coefficients = model.residual_ar_coefficients(samples.noise_ma_coefficients)
@@ -141,7 +141,7 @@ def whitened_rates_and_responses(
         is_predictable_whitened &= _delay_rows(is_predictable, lag, False)
     return (
         is_predictable_whitened,
-        subtract_noise_prediction(unexplained_rates, ar_coefficients),
+        subtract_noise_prediction(rates_unexplained_by_past, ar_coefficients),
         subtract_noise_prediction(group_responses, ar_coefficients),
     )
 

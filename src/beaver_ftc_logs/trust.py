@@ -519,7 +519,7 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
     number of white samples of a part; of a long flight every k-th sample is taken. None where a part is too
     short."""
     whitening_matrix, effective_sample_share, log_noise_sd_product = _flight_noise_whitening(samples, model)
-    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
+    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         samples, model
     )
     predictable_rows = np.flatnonzero(is_predictable)
@@ -530,7 +530,9 @@ def _sample_log_likelihood_by_flight_part(samples: Samples, model: Model) -> tup
     ) is None:
         return None
     regressors_and_targets = [
-        _trim_and_gain_regression_data(part_rows, unexplained_rates, group_responses, whitening_matrix)
+        _trim_and_gain_regression_data(
+            part_rows, rates_unexplained_by_past, group_responses, whitening_matrix
+        )
         for part_rows in rows_by_part
     ]
     noise_variance_scales = [
@@ -564,13 +566,16 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
 
 
 def _trim_and_gain_regression_data(
-    part_rows: NDArray[np.int64], unexplained_rates: Floats, responses: Floats, whitening_matrix: Floats
+    part_rows: NDArray[np.int64],
+    rates_unexplained_by_past: Floats,
+    responses: Floats,
+    whitening_matrix: Floats,
 ) -> tuple[Floats, Floats]:
     """Regressors (3 n, 3 + K) of trim and responses (n, K, 3), and what they are to explain, (3 n,)."""
     trim_regressors = np.broadcast_to(np.eye(3), (len(part_rows), 3, 3))
     regressors = np.concatenate([trim_regressors, responses[part_rows]], axis=1) @ whitening_matrix
     return regressors.transpose(0, 2, 1).reshape(3 * len(part_rows), -1), (
-        unexplained_rates[part_rows] @ whitening_matrix
+        rates_unexplained_by_past[part_rows] @ whitening_matrix
     ).ravel()
 
 
@@ -581,7 +586,7 @@ def _noise_variance_scale(squared_residuals: Floats) -> float:
 
 def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBoundsOverFlight | None:
     """None where a part is too short."""
-    is_predictable, unexplained_rates, group_responses = regression.whitened_rates_and_responses(
+    is_predictable, rates_unexplained_by_past, group_responses = regression.whitened_rates_and_responses(
         samples, model
     )
     if (rows_by_part := regression.split_into_flight_parts(np.flatnonzero(is_predictable))) is None:
@@ -601,7 +606,7 @@ def _bound_gains_over_flight_parts(samples: Samples, model: Model) -> _GainBound
     responses_and_contributions = np.concatenate([group_responses, column_contributions], axis=1)
     for part_rows in rows_by_part:
         regressors, whitened_targets = _trim_and_gain_regression_data(
-            part_rows, unexplained_rates, responses_and_contributions, whitening_matrix
+            part_rows, rates_unexplained_by_past, responses_and_contributions, whitening_matrix
         )
         part_coefficient_upper_bounds, squared_residuals = regression.coefficient_upper_bounds(
             regressors[:, : 3 + n_groups], whitened_targets, effective_sample_share

@@ -150,7 +150,7 @@ def bounds_in(given: Document) -> np.ndarray:
     there: list[np.ndarray] = []
 
     def watch(loop: Loop) -> Callable[[], None]:
-        error_map = loop.frames["fdi"]["bound"]["model_error_bound_table"]
+        error_map = loop.frames["fdi"]["bound"]["error_map"]
         loop.after_frame = lambda: there.append(error_map["error_bound_now"][0].copy())
         return lambda: None
 

@@ -44,7 +44,7 @@ def flown(scenario: Scenario) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     nominal = scenario.control.model_copy(update={"law": "nominal"})
     recorder, bound = Recorder(), list[np.ndarray]()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
-    error_map, fly_frame = loop.frames["fdi"]["bound"]["model_error_bound_table"], loop.plugin_frame
+    error_map, fly_frame = loop.frames["fdi"]["bound"]["error_map"], loop.plugin_frame
     assert fly_frame is not None
 
     def fly_and_note(frames: np.ndarray, references: np.ndarray, log: np.ndarray) -> int:

@@ -12,7 +12,7 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.design.model import design_record, fill_table, regressors, response
 from beaver_ftc.diagnosis import bounds, conclusion, gusts, isolation, model_prediction, schemes
-from beaver_ftc.diagnosis.bounds import error_bound_table_dtype
+from beaver_ftc.diagnosis.bounds import error_map_dtype
 from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.likelihood import block_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_RECORD_SIZE
@@ -212,7 +212,7 @@ def test_filters_of_bounds_are_those_of_residuals():
 
 
 def new_map(**fields):
-    record = np.zeros(1, error_bound_table_dtype(4)).view(np.recarray)[0]
+    record = np.zeros(1, error_map_dtype(4)).view(np.recarray)[0]
     record["n_boxes"], record["n_travel_levels"], record["n_time_rows"] = 2, 3, 2
     record["is_outside_all_boxes"] = 7
     record["box_low"], record["box_high"] = -1e6, 1e6
@@ -252,7 +252,7 @@ def test_a_surface_beyond_a_travel_that_ends_at_neutral_uses_all_of_it():
 
 @pytest.mark.parametrize(("time_s", "age"), [(0.0, 0), (10.0, 0), (10.1, 1), (60.0, 1), (60.1, -1)])
 def test_the_row_is_that_of_a_flight_so_old(time_s, age):
-    assert bounds.error_bound_table_time_row_index(new_map(time_s=time_s)) == age
+    assert bounds.error_map_time_row_index(new_map(time_s=time_s)) == age
 
 
 @pytest.mark.parametrize(
@@ -269,7 +269,7 @@ def test_the_error_is_that_of_the_innermost_box_or_unknown(roll, airspeed, time_
     record, out = new_map(time_s=time_s), np.full(3, 0.5)
     y = Y.copy()
     y[2] = airspeed
-    bounds.add_tabulated_error_bound(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
+    bounds.add_mapped_error_bound(record, np.array([roll, 0.0, 0.0]), y, np.array([0.1, 0, 0, 0]), out)
     age = 0 if time_s <= 10.0 else 1
     expected = record["error_bound"][age, box, 1] if box is not None else bounds.UNMAPPED_ERROR_RAD_S2
     assert out == pytest.approx(0.5 + expected)

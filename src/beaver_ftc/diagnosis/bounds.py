@@ -112,7 +112,7 @@ def declared_errors_dtype(n: int) -> np.dtype:
 
 
 @sized
-def error_bound_table_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
+def error_map_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
     one_surface_may_be_anywhere: one surface may be anywhere in its travel; several_surfaces_may_be_anywhere:
@@ -146,7 +146,7 @@ def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     return record(
         inertia_coupling_error_share=3, constant_error_bound=3, earth_rate_rad_s=float,
         declared_errors=declared_errors_dtype(n),
-        model_error_bound_table=error_bound_table_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3,
+        error_map=error_map_dtype(n, n_boxes), eta_bar=3, eta_bar_now=3,
         changing_gyro_error_bound=3, changing_gyro_error_bound_before=3,
         frame_innovation_bound=3,
         has_surface_term_errors=int, surface_term_error_bound_per_rad=(3, n),
@@ -155,8 +155,8 @@ def bound_dtype(n: int, n_boxes: int = MAX_BOXES) -> np.dtype:
     )  # fmt: skip
 
 
-def fill_error_bound_table(
-    model_error_bound_table: np.void,
+def fill_error_map(
+    error_map: np.void,
     aircraft: Aircraft,
     one_surface_may_be_anywhere: bool,
     several_surfaces_may_be_anywhere: bool,
@@ -167,33 +167,33 @@ def fill_error_bound_table(
     if declared_error_map is None:
         return
     n_travel_levels, n_time_rows = len(declared_error_map.travel_share), len(declared_error_map.until_s)
-    model_error_bound_table["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
-    model_error_bound_table["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
-    model_error_bound_table["n_boxes"] = len(declared_error_map.boxes)
-    model_error_bound_table["n_travel_levels"], model_error_bound_table["n_time_rows"] = (
+    error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
+    error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
+    error_map["n_boxes"] = len(declared_error_map.boxes)
+    error_map["n_travel_levels"], error_map["n_time_rows"] = (
         n_travel_levels,
         n_time_rows,
     )
-    model_error_bound_table["until_s"][:n_time_rows] = declared_error_map.until_s
-    model_error_bound_table["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
+    error_map["until_s"][:n_time_rows] = declared_error_map.until_s
+    error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
     mapped_travel_share_of_surface = np.array(
         [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
-    model_error_bound_table["travel_low"] = mapped_travel_share_of_surface * [
+    error_map["travel_low"] = mapped_travel_share_of_surface * [
         travel.min_rad for travel in aircraft.travel.values()
     ]
-    model_error_bound_table["travel_high"] = mapped_travel_share_of_surface * [
+    error_map["travel_high"] = mapped_travel_share_of_surface * [
         travel.max_rad for travel in aircraft.travel.values()
     ]
     for box_index, box in enumerate(declared_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
-        model_error_bound_table["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
-        model_error_bound_table["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
+        error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
+        error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]
         error_bound_tables_by_axis = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        model_error_bound_table["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
+        error_map["error_bound"][:n_time_rows, box_index, :n_travel_levels] = np.stack(
             error_bound_tables_by_axis, axis=-1
         )
-        model_error_bound_table["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
+        error_map["engine_asymmetry_bound"][box_index] = box.engines_apart or 0.0
 
 
 @kernel
@@ -451,73 +451,61 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
 
 
 @kernel
-def is_inside_box(model_error_bound_table, box_index):
+def is_inside_box(error_map, box_index):
     """Whether the state is in this box of the map."""
     is_inside = True
-    for i in range(model_error_bound_table.coordinates.size):
-        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(model_error_bound_table.coordinates[i]))
+    for i in range(error_map.coordinates.size):
+        rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[i]))
         is_inside = (
             is_inside
-            and model_error_bound_table.box_low[box_index, i] - rounding_margin
-            <= model_error_bound_table.coordinates[i]
-            <= model_error_bound_table.box_high[box_index, i] + rounding_margin
+            and error_map.box_low[box_index, i] - rounding_margin
+            <= error_map.coordinates[i]
+            <= error_map.box_high[box_index, i] + rounding_margin
         )
     return is_inside
 
 
 @kernel
-def is_coordinate_outside_span_of_boxes(model_error_bound_table, state_coordinate_index):
+def is_coordinate_outside_span_of_boxes(error_map, state_coordinate_index):
     """Whether this coordinate of the state is outside the range that the boxes span together."""
     lowest_box_low, highest_box_high = np.inf, -np.inf
-    for box_index in range(model_error_bound_table.n_boxes):
-        lowest_box_low = min(
-            lowest_box_low, model_error_bound_table.box_low[box_index, state_coordinate_index]
-        )
-        highest_box_high = max(
-            highest_box_high, model_error_bound_table.box_high[box_index, state_coordinate_index]
-        )
-    rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (
-        1.0 + abs(model_error_bound_table.coordinates[state_coordinate_index])
-    )
+    for box_index in range(error_map.n_boxes):
+        lowest_box_low = min(lowest_box_low, error_map.box_low[box_index, state_coordinate_index])
+        highest_box_high = max(highest_box_high, error_map.box_high[box_index, state_coordinate_index])
+    rounding_margin = _MAP_EDGE_ROUNDING_SHARE * (1.0 + abs(error_map.coordinates[state_coordinate_index]))
     return (
         not lowest_box_low - rounding_margin
-        <= model_error_bound_table.coordinates[state_coordinate_index]
+        <= error_map.coordinates[state_coordinate_index]
         <= highest_box_high + rounding_margin
     )
 
 
 @kernel
-def travel_level_index_for_positions(model_error_bound_table, u):
+def travel_level_index_for_positions(error_map, u):
     """Index of the least share of the travel that covers surfaces at u (n,) rad; the last index if all of the
     travel may be used."""
-    if model_error_bound_table.several_surfaces_may_be_anywhere:
-        return model_error_bound_table.n_travel_levels - 1
+    if error_map.several_surfaces_may_be_anywhere:
+        return error_map.n_travel_levels - 1
     max_travel_share = 0.0
     for s in range(u.size):
         if u[s] != 0.0:
-            travel_limit = (
-                model_error_bound_table.travel_high[s]
-                if u[s] > 0.0
-                else model_error_bound_table.travel_low[s]
-            )
+            travel_limit = error_map.travel_high[s] if u[s] > 0.0 else error_map.travel_low[s]
             max_travel_share = max(max_travel_share, u[s] / travel_limit) if travel_limit != 0.0 else 1.0
-    return travel_level_index_for_share(model_error_bound_table, max_travel_share)
+    return travel_level_index_for_share(error_map, max_travel_share)
 
 
 @kernel
-def travel_level_index_for_share(model_error_bound_table, travel_share):
+def travel_level_index_for_share(error_map, travel_share):
     """Index of the least share of the travel in the map that is not below `travel_share`; else the last."""
-    last_level_index = model_error_bound_table.n_travel_levels - 1
+    last_level_index = error_map.n_travel_levels - 1
     for j in range(last_level_index):
-        if travel_share <= model_error_bound_table.travel_share_by_level[j]:
+        if travel_share <= error_map.travel_share_by_level[j]:
             return j
     return last_level_index
 
 
 @kernel
-def max_travel_share_used(
-    model_error_bound_table, s, mean_position_interval, travel_share_before, n_instants
-):
+def max_travel_share_used(error_map, s, mean_position_interval, travel_share_before, n_instants):
     """The largest share of its travel that surface s can use at any of so many instants of a frame.
 
     mean_position_interval: (low, high) rad, of the mean position over the instants; travel_share_before: the
@@ -526,16 +514,12 @@ def max_travel_share_used(
     max_share_used, (mean_position_low, mean_position_high) = 0.0, mean_position_interval
     if mean_position_high > 0.0:
         max_share_used = (
-            mean_position_high / model_error_bound_table.travel_high[s]
-            if model_error_bound_table.travel_high[s] != 0.0
-            else 1.0
+            mean_position_high / error_map.travel_high[s] if error_map.travel_high[s] != 0.0 else 1.0
         )
     if mean_position_low < 0.0:
         max_share_used = max(
             max_share_used,
-            mean_position_low / model_error_bound_table.travel_low[s]
-            if model_error_bound_table.travel_low[s] != 0.0
-            else 1.0,
+            mean_position_low / error_map.travel_low[s] if error_map.travel_low[s] != 0.0 else 1.0,
         )
     if n_instants > 1:
         max_share_used = max(
@@ -545,66 +529,64 @@ def max_travel_share_used(
 
 
 @kernel
-def error_bound_table_time_row_index(model_error_bound_table):
+def error_map_time_row_index(error_map):
     """The row of the map for the present flight time, -1 if the map ends before."""
-    for time_row_index in range(model_error_bound_table.n_time_rows):
-        if model_error_bound_table.time_s <= model_error_bound_table.until_s[time_row_index]:
+    for time_row_index in range(error_map.n_time_rows):
+        if error_map.time_s <= error_map.until_s[time_row_index]:
             return time_row_index
     return -1
 
 
 @kernel
-def look_up_tabulated_error_bound(model_error_bound_table, x, y, u):
+def look_up_error_map(error_map, x, y, u):
     """Fill `coordinates` and `error_bound_now`, the mapped error at this state; x (3,) rad/s, y (4 +
     declared,), u (n,) rad."""
-    coordinates = model_error_bound_table.coordinates
+    coordinates = error_map.coordinates
     coordinates[:3], coordinates[3 : 3 + y.size] = x, y
     coordinates[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    travel_level_index = travel_level_index_for_positions(model_error_bound_table, u)
-    time_row_index = error_bound_table_time_row_index(model_error_bound_table)
-    for box_index in range(model_error_bound_table.n_boxes if time_row_index >= 0 else 0):
-        if is_inside_box(model_error_bound_table, box_index):
-            model_error_bound_table.is_outside_all_boxes = 0
-            model_error_bound_table.error_bound_now[:] = model_error_bound_table.error_bound[
+    travel_level_index = travel_level_index_for_positions(error_map, u)
+    time_row_index = error_map_time_row_index(error_map)
+    for box_index in range(error_map.n_boxes if time_row_index >= 0 else 0):
+        if is_inside_box(error_map, box_index):
+            error_map.is_outside_all_boxes = 0
+            error_map.error_bound_now[:] = error_map.error_bound[
                 time_row_index, box_index, travel_level_index
             ]
-            model_error_bound_table.box_index, model_error_bound_table.time_row_index = (
+            error_map.box_index, error_map.time_row_index = (
                 box_index,
                 time_row_index,
             )
-            model_error_bound_table.engine_asymmetry_bound_now = (
-                model_error_bound_table.engine_asymmetry_bound[box_index]
-            )
+            error_map.engine_asymmetry_bound_now = error_map.engine_asymmetry_bound[box_index]
             return
-    model_error_bound_table.is_outside_all_boxes = 1
-    model_error_bound_table.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
-    model_error_bound_table.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
+    error_map.is_outside_all_boxes = 1
+    error_map.error_bound_now[:] = UNMAPPED_ERROR_RAD_S2
+    error_map.engine_asymmetry_bound_now = UNMAPPED_ERROR_RAD_S2
 
 
 @kernel
-def additional_error_bound_at_travel_level(model_error_bound_table, travel_level_index, axis):
+def additional_error_bound_at_travel_level(error_map, travel_level_index, axis):
     """By how much the mapped error of an axis at this instant is larger if a surface is at this level of
     travel, rad/s2."""
-    if model_error_bound_table.is_outside_all_boxes:
+    if error_map.is_outside_all_boxes:
         return 0.0
     return max(
-        model_error_bound_table.error_bound[
-            model_error_bound_table.time_row_index,
-            model_error_bound_table.box_index,
+        error_map.error_bound[
+            error_map.time_row_index,
+            error_map.box_index,
             travel_level_index,
             axis,
         ]
-        - model_error_bound_table.error_bound_now[axis],
+        - error_map.error_bound_now[axis],
         0.0,
     )
 
 
 @kernel
-def add_tabulated_error_bound(model_error_bound_table, x, y, u, eta_bar):
+def add_mapped_error_bound(error_map, x, y, u, eta_bar):
     """Add to eta_bar (3,) rad/s2 the mapped error at this state; x (3,) rad/s, y, u (n,) rad."""
-    look_up_tabulated_error_bound(model_error_bound_table, x, y, u)
+    look_up_error_map(error_map, x, y, u)
     for i in range(3):
-        eta_bar[i] += model_error_bound_table.error_bound_now[i]
+        eta_bar[i] += error_map.error_bound_now[i]
 
 
 @kernel
@@ -695,8 +677,8 @@ def fill_uncertainty_bound_now(bound_record, design, measured, u):
         if bound_record.has_surface_term_errors:
             for s in range(u.size):
                 fill_acceleration_error_bound_per_rad(bound_record.declared_errors, design, s)
-    if bound_record.model_error_bound_table.n_boxes > 0:
-        add_tabulated_error_bound(bound_record.model_error_bound_table, x, y, u, bound_record.eta_bar_now)
+    if bound_record.error_map.n_boxes > 0:
+        add_mapped_error_bound(bound_record.error_map, x, y, u, bound_record.eta_bar_now)
     rates_for_published_bound = (
         bound_record.declared_errors.max_magnitude_x
         if bound_record.declared_errors.has_declared_errors
@@ -751,8 +733,8 @@ def configure_uncertainty_bound(
     )
     bound_record["constant_error_bound"] = declared.constant_rad_s2
     diagnoses_all_types = config.fault_class == "all"
-    fill_error_bound_table(
-        bound_record["model_error_bound_table"],
+    fill_error_map(
+        bound_record["error_map"],
         aircraft,
         diagnoses_all_types,
         diagnoses_all_types and config.pairs,

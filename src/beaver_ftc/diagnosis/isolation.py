@@ -133,11 +133,9 @@ def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_subs
     previous_max_abs_deflection = fie.max_abs_deflection_in_last_frame
     max_abs_deflection = max(abs(fie.theta_min), abs(fie.theta_max))
     effect_error_bound = fault_effect.error_bound[axis]
-    model_error_bound_table = bound_record.model_error_bound_table
+    error_map = bound_record.error_map
     mean_position_interval = (fie.theta_min, fie.theta_max)
-    travel_level_index = travel_level_index_at_position(
-        model_error_bound_table, fie, mean_position_interval, n_substeps
-    )
+    travel_level_index = travel_level_index_at_position(error_map, fie, mean_position_interval, n_substeps)
     measured_effect = innovation[axis] - fault_effect.acceleration_at_zero_theta[axis]
     first_substep_allowance_rad = 2.0 * previous_max_abs_deflection / n_substeps if n_substeps > 1 else 0.0
     for _ in range(N_DEFLECTION_BOUND_ITERATIONS):
@@ -160,12 +158,12 @@ def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_subs
         max_abs_deflection = min(max_abs_deflection, max(abs(mean_position_low), abs(mean_position_high)))
         mean_position_interval = (mean_position_low, mean_position_high)
         travel_level_index = travel_level_index_at_position(
-            model_error_bound_table, fie, mean_position_interval, n_substeps
+            error_map, fie, mean_position_interval, n_substeps
         )
     fie.max_abs_deflection_in_last_frame = max_abs_deflection
-    if model_error_bound_table.one_surface_may_be_anywhere:
+    if error_map.one_surface_may_be_anywhere:
         fie.max_travel_share_in_last_frame = max_travel_share_used(
-            model_error_bound_table, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
+            error_map, s, mean_position_interval, fie.max_travel_share_in_last_frame, n_substeps
         )
     for i in range(3):
         fault_effect.error_bound[i] += max(
@@ -180,18 +178,18 @@ def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_subs
 
 
 @kernel
-def travel_level_index_at_position(model_error_bound_table, fie, mean_position_interval, n_substeps):
+def travel_level_index_at_position(error_map, fie, mean_position_interval, n_substeps):
     """The level of the error map that covers a surface whose mean position is in `mean_position_interval`,
     (low, high) rad.
 
     It is 0 without a map.
     """
-    if not model_error_bound_table.one_surface_may_be_anywhere:
+    if not error_map.one_surface_may_be_anywhere:
         return 0
     return travel_level_index_for_share(
-        model_error_bound_table,
+        error_map,
         max_travel_share_used(
-            model_error_bound_table,
+            error_map,
             fie.surface,
             mean_position_interval,
             fie.max_travel_share_in_last_frame,
@@ -446,8 +444,7 @@ def update_fault_effect_and_reach(
     )
     set_effect_error_bound(fault_effect, effect_error_bound, fie.surface)
     if (
-        bound_record.has_surface_term_errors
-        or bound_record.model_error_bound_table.one_surface_may_be_anywhere
+        bound_record.has_surface_term_errors or bound_record.error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
         widen_tolerance_by_surface_term_errors(
             fie, bound_record, filter_bank.output.innovation, config.n_substeps

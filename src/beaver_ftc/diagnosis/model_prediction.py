@@ -107,12 +107,12 @@ def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
                 sums.surface_term_error_bound_at_command[i, s] += (
                     bound_record.declared_errors.acceleration_error_bound_per_rad[i, s] * abs(u[s])
                 )
-    if bound_record.model_error_bound_table.one_surface_may_be_anywhere:
-        for j in range(bound_record.model_error_bound_table.n_travel_levels):
+    if bound_record.error_map.one_surface_may_be_anywhere:
+        for j in range(bound_record.error_map.n_travel_levels):
             for i in range(3):
                 bound_record.additional_error_bound_by_travel_level[j, i] += (
                     prediction.frame_share_per_instant
-                    * additional_error_bound_at_travel_level(bound_record.model_error_bound_table, j, i)
+                    * additional_error_bound_at_travel_level(bound_record.error_map, j, i)
                 )
     if diagnoses_all_types:
         for s, axis in enumerate(layout.dominant_axis):
@@ -187,7 +187,7 @@ def fill_effect_tolerance_for_fault_change(prediction):
 @kernel
 def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_index, dt):
     """Fill the bound on the uncertainty at this instant, and the means over the elapsed frame, k, of dt s."""
-    bound_record.model_error_bound_table.time_s = frame_index * dt
+    bound_record.error_map.time_s = frame_index * dt
     fill_uncertainty_bound_now(bound_record, prediction.design, measured, prediction.u)
     bound_record.eta_bar[:] = bound_record.eta_bar_now
     if bound_record.declared_errors.has_declared_errors:

@@ -304,10 +304,10 @@ class DiagnosisReadout:
     @cached_property
     def mapped_error(self) -> MappedModelError:
         """The design model's error here, where the aircraft maps it."""
-        model_error_bound_table = self._fdi["bound"]["model_error_bound_table"]
+        error_map = self._fdi["bound"]["error_map"]
         return MappedModelError(
-            not model_error_bound_table["is_outside_all_boxes"],
-            model_error_bound_table["error_bound_now"].copy(),
+            not error_map["is_outside_all_boxes"],
+            error_map["error_bound_now"].copy(),
         )
 
     @cached_property

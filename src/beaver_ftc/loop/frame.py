@@ -30,7 +30,7 @@ from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
 from beaver_ftc.diagnosis.bounds import (
     N_MAP_COORDINATES,
-    error_bound_table_time_row_index,
+    error_map_time_row_index,
     is_coordinate_outside_span_of_boxes,
 )
 from beaver_ftc.diagnosis.conclusion import assess_surfaces, assess_unknown_acceleration
@@ -210,7 +210,7 @@ def note_envelope(envelope, outside, t):
 @kernel
 def note_inconclusive(inconclusive, fdi, t):
     """Count this frame, and why nothing can be concluded in it; t s."""
-    enabled, error_map = fdi.config.enabled, fdi.bound.model_error_bound_table
+    enabled, error_map = fdi.config.enabled, fdi.bound.error_map
     inconclusive.watched += 1
     if enabled and (error_map.n_boxes == 0 or not error_map.is_outside_all_boxes):
         return
@@ -219,7 +219,7 @@ def note_inconclusive(inconclusive, fdi, t):
     inconclusive.frames += 1
     if not enabled:
         inconclusive.undiagnosed += 1
-    elif error_bound_table_time_row_index(error_map) < 0:
+    elif error_map_time_row_index(error_map) < 0:
         inconclusive.late += 1
     else:
         note_place(inconclusive, error_map)

@@ -96,7 +96,7 @@ def _reason(quantity: str, frames: int, measured: Span | None, flown: Span | Non
 
 def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
     """Why the built-in diagnosis can conclude nothing at the frame just flown; empty if it can."""
-    error_map = frame["fdi"]["bound"]["model_error_bound_table"]
+    error_map = frame["fdi"]["bound"]["error_map"]
     if not frame["fdi"]["config"]["enabled"]:
         return NO_DIAGNOSIS
     if not error_map["n_boxes"] or not error_map["is_outside_all_boxes"]:

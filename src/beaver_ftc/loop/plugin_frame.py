@@ -201,7 +201,7 @@ def context_of(
     trim_y = start[y_places(frame)]
     trim_rad = layout["trim"].copy()
     constant = bound["constant_error_bound"].copy()
-    if bound["model_error_bound_table"]["n_boxes"]:
+    if bound["error_map"]["n_boxes"]:
         constant += aircraft.model_error_rad_s2  # the most that the aircraft's terms leave in it
     return Context(
         dt_s=float(frame["dt"]),

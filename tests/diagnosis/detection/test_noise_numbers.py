@@ -13,7 +13,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import coefficient_slopes, design_record, inertia_coefficients, jacobian
 from beaver_ftc.diagnosis import bounds as bound_kernels
 from beaver_ftc.diagnosis import gusts
-from beaver_ftc.diagnosis.bounds import error_bound_table_dtype, max_inertia_coefficient_errors
+from beaver_ftc.diagnosis.bounds import error_map_dtype, max_inertia_coefficient_errors
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_EFFECT,
@@ -437,7 +437,7 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
     """An error that goes with a surface from one end of its bound to the other in that quarter, in any number
     of frames: the pace covers each step, and no frame more than the whole way."""
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
-    error_map = np.zeros(1, error_bound_table_dtype(3)).view(np.recarray)[0]
+    error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.2, 0.4)
     record.noise.base_frame_uncertainty_change_over_bound = 0.02
     rng = np.random.default_rng(1)
@@ -460,7 +460,7 @@ def test_an_error_crosses_its_bound_within_a_quarter_of_a_surfaces_travel():
 def test_a_surface_that_stands_still_again_moves_no_error():
     """Each frame is held against the one before it, not against where the surfaces were at first."""
     record = np.zeros(1, statistical_dtype()).view(np.recarray)[0]
-    error_map = np.zeros(1, error_bound_table_dtype(3)).view(np.recarray)[0]
+    error_map = np.zeros(1, error_map_dtype(3)).view(np.recarray)[0]
     error_map.travel_low, error_map.travel_high = (-0.3, -0.2, -0.4), (0.1, 0.25, 0.5)
     record.noise.base_frame_uncertainty_change_over_bound, paces = 0.02, []
     for u in ((0.0, 0.0, 0.0), *[(0.01, -0.02, 0.0)] * 2, (0.01, -0.02, 0.018), (0.01, -0.02, 0.0)):

@@ -42,7 +42,7 @@ class Mapped(DesignPlant):
 
     def __init__(self, **given):
         super().__init__(fault_class="all", aircraft=mapped_beaver(), **given)
-        self.map = self.fdi["bound"]["model_error_bound_table"]
+        self.map = self.fdi["bound"]["error_map"]
         self.map["one_surface_may_be_anywhere"], self.map["several_surfaces_may_be_anywhere"] = 1, 0
         self.map["travel_low"], self.map["travel_high"] = TRAVEL_RAD
         self.amplitude *= 0.3
@@ -105,7 +105,7 @@ def test_by_the_error_of_healthy_surfaces_alone_it_would_be():
 )  # fmt: skip
 def test_the_share_of_its_travel_is_the_furthest_at_any_instant(where, before, instants, share):
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
-    error_map = new_fdi()["bound"]["model_error_bound_table"]
+    error_map = new_fdi()["bound"]["error_map"]
     error_map["travel_low"][1], error_map["travel_high"][1] = -0.2, 0.4
     assert bounds.max_travel_share_used(error_map, 1, where, before, instants) == pytest.approx(share)
 
@@ -114,15 +114,15 @@ def test_the_room_of_a_position_is_that_of_where_it_can_have_been():
     fdi = new_fdi()
     fie, bound = estimator(fdi, POSITION, surface=1, low=-0.5, high=0.5), fdi["bound"]
     (
-        bound["model_error_bound_table"]["one_surface_may_be_anywhere"],
-        bound["model_error_bound_table"]["n_travel_levels"],
-        bound["model_error_bound_table"]["travel_share_by_level"][:3],
+        bound["error_map"]["one_surface_may_be_anywhere"],
+        bound["error_map"]["n_travel_levels"],
+        bound["error_map"]["travel_share_by_level"][:3],
     ) = (
         1,
         3,
         SHARE,
     )
-    bound["model_error_bound_table"]["travel_low"], bound["model_error_bound_table"]["travel_high"] = (
+    bound["error_map"]["travel_low"], bound["error_map"]["travel_high"] = (
         -0.5,
         0.5,
     )

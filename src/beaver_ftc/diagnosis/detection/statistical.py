@@ -213,9 +213,7 @@ def configure_statistical_detector(
         statistical_settings, aircraft, dt_s
     )
     test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
-    test_config["has_model_error_bound_table"] = (
-        aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
-    )
+    test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust, declared, mass)
@@ -601,7 +599,7 @@ TEST_CONFIG_RECORD = record(
     n_score_columns=int,
     uses_regressors=int,  # whether unknown constants have tolerances
     frame_share_per_instant=float,  # one over the number of instants in a frame
-    has_model_error_bound_table=int,  # whether the model's error is mapped
+    has_error_map=int,  # whether the model's error is mapped
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
@@ -683,7 +681,7 @@ def update_blocks(
             dt,
             evidence_decay_factor,
             upper_bound_decay_factor_per_frame,
-            test_config.has_model_error_bound_table,
+            test_config.has_error_map,
         )
 
 
@@ -950,26 +948,24 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
             u,
         )
     fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt)
-    if bound_record.model_error_bound_table.n_boxes > 0:
-        update_uncertainty_change(noise_model, blocks, bound_record.model_error_bound_table, u)
+    if bound_record.error_map.n_boxes > 0:
+        update_uncertainty_change(noise_model, blocks, bound_record.error_map, u)
     if gust.output.accounts_for_gusts:
         gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
 
 @kernel
-def update_uncertainty_change(noise_model, blocks, model_error_bound_table, u):
+def update_uncertainty_change(noise_model, blocks, error_map, u):
     """Fill the rate of change of every block for the next frame: the model's mapped error changes with the
     surfaces."""
     max_travel_share_moved = 0.0
     for s in range(u.size):
-        travel_width_rad = max(
-            model_error_bound_table.travel_high[s] - model_error_bound_table.travel_low[s], MIN_TRAVEL_RAD
-        )
+        travel_width_rad = max(error_map.travel_high[s] - error_map.travel_low[s], MIN_TRAVEL_RAD)
         max_travel_share_moved = max(
             max_travel_share_moved,
-            abs(u[s] - model_error_bound_table.surface_positions_before[s]) / travel_width_rad,
+            abs(u[s] - error_map.surface_positions_before[s]) / travel_width_rad,
         )
-        model_error_bound_table.surface_positions_before[s] = u[s]
+        error_map.surface_positions_before[s] = u[s]
     for block in blocks:
         block.uncertainty_change_over_bound_per_frame = min(
             noise_model.base_frame_uncertainty_change_over_bound
@@ -1025,17 +1021,17 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
         bound_record.earth_rate_rad_s,
         uncertainty_bound,
     )
-    has_model_error_bound_table = bound_record.model_error_bound_table.n_boxes > 0
+    has_error_map = bound_record.error_map.n_boxes > 0
     for i in range(3):
         uncertainty_bound[i] += noise_model.deflection_error_effect_bound[i]
-        if has_model_error_bound_table:
+        if has_error_map:
             uncertainty_bound[i] += min(
-                bound_record.model_error_bound_table.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
+                bound_record.error_map.error_bound_now[i], UNMAPPED_ERROR_IN_FILTERS_RAD_S2
             )
-        if bound_record.model_error_bound_table.one_surface_may_be_anywhere:
+        if bound_record.error_map.one_surface_may_be_anywhere:
             noise_model.additional_bound_for_surface_anywhere[i] = additional_error_bound_at_travel_level(
-                bound_record.model_error_bound_table,
-                bound_record.model_error_bound_table.n_travel_levels - 1,
+                bound_record.error_map,
+                bound_record.error_map.n_travel_levels - 1,
                 i,
             )
     for block_index, block in enumerate(blocks):

@@ -396,7 +396,7 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     parity.update_view_tests(
         parity_views, test_config, statistical_detector.tone_config, y, dt, k, is_alarm_latched
     )
-    is_model_error_known = fdi.bound.model_error_bound_table.is_outside_all_boxes == 0
+    is_model_error_known = fdi.bound.error_map.is_outside_all_boxes == 0
     statistical.update_alarm(
         statistical_detector.alarm,
         test_config,
@@ -537,7 +537,7 @@ def update_verdict(fdi, prediction, measured, t):
 def detect_alarm_axis_or_engine_failure(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    engine_asymmetry_bound = fdi.bound.model_error_bound_table.engine_asymmetry_bound_now
+    engine_asymmetry_bound = fdi.bound.error_map.engine_asymmetry_bound_now
     conclusion_record = fdi.verdict
     if not conclusion_record.detected and monitors.detect_engine_failure(
         fdi.engine_monitor, engine_asymmetry_bound, y

@@ -217,7 +217,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
     least = max(
-        size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS * size
+        size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS * size
     )
     shown = has_surface_term_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])

@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis.detection.forces import (
 )
 from beaver_ftc.diagnosis.detection.parity import (
     AXIS_VIEW,
-    VANE_VIEW,
+    ORTHOGONAL_TO_VANE_ERROR,
     configure_parity_views,
     configure_tone_tests,
 )
@@ -473,9 +473,9 @@ def test_each_surface_is_looked_past_in_the_axis_it_leads_and_its_force(viewed):
     ]
     assert seen == [
         (1, PITCH, NORMAL_FORCE, 0, 0), (3, PITCH, NORMAL_FORCE, 0, 0),
-        (VANE_VIEW, PITCH, NORMAL_FORCE, 0, 1),
+        (ORTHOGONAL_TO_VANE_ERROR, PITCH, NORMAL_FORCE, 0, 1),
         (AXIS_VIEW, PITCH, NORMAL_FORCE, 1, 1), (0, ROLL, SIDE_FORCE, 0, 0), (2, YAW, SIDE_FORCE, 0, 0),
-        (VANE_VIEW, YAW, SIDE_FORCE, 0, 1), (AXIS_VIEW, YAW, SIDE_FORCE, 1, 1),
+        (ORTHOGONAL_TO_VANE_ERROR, YAW, SIDE_FORCE, 0, 1), (AXIS_VIEW, YAW, SIDE_FORCE, 1, 1),
     ]  # fmt: skip
 
 
@@ -489,13 +489,13 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     s = int(view["orthogonal_to_surface"])
     of_it = (
         force["axis_and_force_innovation_per_vane_error"]
-        if s == VANE_VIEW
+        if s == ORTHOGONAL_TO_VANE_ERROR
         else (G[first, s], force["scaled_force_per_surface_rad"][s])
     )
     assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
     assert np.count_nonzero(view["direction"]) == 2
-    if s != VANE_VIEW:
+    if s != ORTHOGONAL_TO_VANE_ERROR:
         assert Across.is_view_sensitive_to_fault(viewed, view, s, G[:, s]) == 0
         assert Across.is_view_sensitive_to_fault(
             viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]
@@ -832,13 +832,16 @@ def without_force(coefficient, surface):
     return Aircraft(AIRCRAFT.file.model_copy(update={"forces": changed}), AIRCRAFT.folder)
 
 
-UP_VIEWS = [(ELEVATOR, (PITCH, NORMAL_FORCE)), (FLAP, (PITCH, NORMAL_FORCE)), (VANE_VIEW,
-    (PITCH, NORMAL_FORCE)),
-            (AXIS_VIEW, (PITCH, NORMAL_FORCE))]  # fmt: skip
+UP_VIEWS = [
+    (ELEVATOR, (PITCH, NORMAL_FORCE)),
+    (FLAP, (PITCH, NORMAL_FORCE)),
+    (ORTHOGONAL_TO_VANE_ERROR, (PITCH, NORMAL_FORCE)),
+    (AXIS_VIEW, (PITCH, NORMAL_FORCE)),
+]
 SIDE_VIEWS = [
     (0, (ROLL, SIDE_FORCE)),
     (2, (YAW, SIDE_FORCE)),
-    (VANE_VIEW, (YAW, SIDE_FORCE)),
+    (ORTHOGONAL_TO_VANE_ERROR, (YAW, SIDE_FORCE)),
     (AXIS_VIEW, (YAW, SIDE_FORCE)),
 ]
 

@@ -14,9 +14,9 @@ from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.parity import (
     AXIS_VIEW,
     N_TONE_FREQUENCIES,
+    ORTHOGONAL_TO_VANE_ERROR,
     TONE_FREQUENCIES_RAD_S,
     TONE_MEMORY_S,
-    VANE_VIEW,
 )
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE, YAW
 
@@ -300,7 +300,7 @@ def test_the_loudest_tone_counts_as_the_best_test_of_a_view(view):
         (0, (0, SIDE_FORCE), {SIDE_FORCE: -0.95, 0: 0.3}, 0, 9.0),
         (0, (0, SIDE_FORCE), {SIDE_FORCE: 0.85, 0: 0.5}, 0, 0.0),
         (0, (0, YAW), {YAW: 1.0}, 0, 0.0),
-        (VANE_VIEW, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
+        (ORTHOGONAL_TO_VANE_ERROR, (PITCH, SIDE_FORCE), {SIDE_FORCE: 1.0}, 0, 0.0),
     ],
 )
 def test_what_raises_the_alarm_beside_the_blocks(surface, plane, mix, inertial, expected):

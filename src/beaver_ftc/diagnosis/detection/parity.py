@@ -145,15 +145,15 @@ def is_within_envelope(tone_config, y):
 
 
 @kernel
-def update_tone_tests(view, tone_config, detector_alarm_level, inside_envelope, uses_regressors, dt):
+def update_tone_tests(view, tone_config, detector_alarm_level, is_inside_envelope, uses_regressors, dt):
     """Update the tests of a view with one frame, which the view's block has whitened; dt s.
 
-    uses_regressors: whether the regressors of the block count. Without `inside_envelope` the frame counts as
-    zero, so the sums decay.
+    uses_regressors: whether the regressors of the block count. Without `is_inside_envelope` the frame counts
+    as zero, so the sums decay.
     """
     tone_tests, block = view.tone_tests, view.block
     n_regressors = block.n_regressors if uses_regressors else 0
-    inverse_innovation_std = np.sqrt(block.S_inverse[0, 0]) if inside_envelope else 0.0
+    inverse_innovation_std = np.sqrt(block.S_inverse[0, 0]) if is_inside_envelope else 0.0
     tone_tests.normalised_innovation_sum += inverse_innovation_std * block.unscaled_white_innovation_rad_s[0]
     for j in range(n_regressors):
         tone_tests.normalised_regressor_sums[j] += inverse_innovation_std * block.regressor_response[j, 0]
@@ -372,14 +372,16 @@ PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO = (
 MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
     0.9  # component of a direction of length 1, above which a view counts as one of the force
 )
-MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS = (
+MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS = (
     0.1  # least length that the errors leave of a column, as a share of its length
 )
-PITCH_PLANE, LATERAL_PLANE, YAW_PLANE = (PITCH, NORMAL_FORCE), (ROLL, YAW), (YAW, SIDE_FORCE)
+PITCH_AND_NORMAL_FORCE = (PITCH, NORMAL_FORCE)
+ROLL_AND_YAW = (ROLL, YAW)
+YAW_AND_SIDE_FORCE = (YAW, SIDE_FORCE)
 
 # Values of `orthogonal_to_surface` in a view without one: a view of an axis; one across the column of an
 # error of a vane.
-AXIS_VIEW, VANE_VIEW = -1, -2
+AXIS_VIEW, ORTHOGONAL_TO_VANE_ERROR = -1, -2
 
 
 class StatisticalRecordSize(NamedTuple):
@@ -400,7 +402,8 @@ USUAL_RECORD_SIZE = StatisticalRecordSize(
 def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
     """A view whose block has these capacities."""
     return record(
-        orthogonal_to_surface=int,  # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
+        # whose column the direction is orthogonal to, or AXIS_VIEW, or ORTHOGONAL_TO_VANE_ERROR
+        orthogonal_to_surface=int,
         alarm_axis=int,  # reported with an alarm of this view
         direction=5, unit_column=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
         plane_axes=(int, 2),  # the two components that the column has
@@ -441,7 +444,7 @@ def innovation_component_for_view(view, forces, gust, inertial_gust, innovation,
 def column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index):
     """Entry 0 or 1 of the column in a view's plane and the bound on its error, rad/s2 per rad."""
     component, s = view.plane_axes[plane_axis_index], view.orthogonal_to_surface
-    if s == VANE_VIEW:
+    if s == ORTHOGONAL_TO_VANE_ERROR:
         column_entry = forces.component[
             view.plane_axes[1] - SIDE_FORCE
         ].axis_and_force_innovation_per_vane_error[plane_axis_index]
@@ -465,33 +468,33 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
     Returns the share of the innovation along the column that errors of the column let leak into the view.
     """
     if view.is_orthogonal_to_rolling_gust:
-        return set_direction_across_vane_and_rolling_gust(view, forces, gust)
+        return set_direction_orthogonal_to_vane_and_rolling_gust(view, forces, gust)
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
     first_entry, first_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 0)
     second_entry, second_error_bound = column_entry_and_error_bound(view, forces, bound_record, G, 1)
-    column_length = np.sqrt(first_entry * first_entry + second_entry * second_entry)
-    if column_length == 0.0:
+    column_norm = np.sqrt(first_entry * first_entry + second_entry * second_entry)
+    if column_norm == 0.0:
         return 0.0
-    view.direction[first_component] = -second_entry / column_length
-    view.direction[second_component] = first_entry / column_length
-    view.unit_column[first_component] = first_entry / column_length
-    view.unit_column[second_component] = second_entry / column_length
+    view.direction[first_component] = -second_entry / column_norm
+    view.direction[second_component] = first_entry / column_norm
+    view.unit_column[first_component] = first_entry / column_norm
+    view.unit_column[second_component] = second_entry / column_norm
     error_bound_along_direction = (
         abs(view.direction[first_component]) * first_error_bound
         + abs(view.direction[second_component]) * second_error_bound
     )
-    column_length_error_bound = (
+    column_norm_error_bound = (
         abs(view.direction[second_component]) * first_error_bound
         + abs(view.direction[first_component]) * second_error_bound
     )
     return error_bound_along_direction / max(
-        column_length - column_length_error_bound, MIN_COLUMN_LENGTH_SHARE_LEFT_BY_ERRORS * column_length
+        column_norm - column_norm_error_bound, MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS * column_norm
     )
 
 
 @kernel
-def set_direction_across_vane_and_rolling_gust(view, forces, gust):
-    """Fill `direction` and `unit_column` for the direction across two vectors; return the share that leaks.
+def set_direction_orthogonal_to_vane_and_rolling_gust(view, forces, gust):
+    """Fill `direction`, orthogonal to two vectors, and `unit_column`; return the share that leaks.
 
     The direction is the vector product of the two in (roll, yaw, side force).
 
@@ -512,14 +515,14 @@ def set_direction_across_vane_and_rolling_gust(view, forces, gust):
     direction_side_force = (
         vane_roll_effect * rolling_gust_yaw_effect - vane_yaw_effect * rolling_gust_roll_effect
     )
-    direction_length = np.sqrt(
+    direction_norm = np.sqrt(
         direction_roll * direction_roll
         + direction_yaw * direction_yaw
         + direction_side_force * direction_side_force
     )
-    if direction_length == 0.0:
+    if direction_norm == 0.0:
         return 0.0
-    vane_column_length = np.sqrt(
+    vane_column_norm = np.sqrt(
         vane_roll_effect * vane_roll_effect
         + vane_yaw_effect * vane_yaw_effect
         + vane_side_force_effect * vane_side_force_effect
@@ -530,10 +533,10 @@ def set_direction_across_vane_and_rolling_gust(view, forces, gust):
         (YAW, vane_yaw_effect, direction_yaw),
         (SIDE_FORCE, vane_side_force_effect, direction_side_force),
     ):
-        view.direction[i] = direction_entry / direction_length
-        view.unit_column[i] = vane_effect / vane_column_length
+        view.direction[i] = direction_entry / direction_norm
+        view.unit_column[i] = vane_effect / vane_column_norm
         error_bound_along_direction += VANE_EFFECT_RELATIVE_TOLERANCE * abs(view.direction[i] * vane_effect)
-    return error_bound_along_direction / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_length)
+    return error_bound_along_direction / ((1.0 - VANE_EFFECT_RELATIVE_TOLERANCE) * vane_column_norm)
 
 
 @kernel
@@ -716,7 +719,7 @@ def fill_view_innovations_and_noise(
 @kernel
 def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_alarm_latched):
     """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
-    inside_envelope = is_within_envelope(tone_config, y)
+    is_inside_envelope = is_within_envelope(tone_config, y)
     evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
     onset_slot = likelihood.onset_slot_to_reset(frame_index)
     for view in views:
@@ -733,7 +736,7 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_al
             not view.uses_inertial_flow_angle
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
             update_tone_tests(
-                view, tone_config, test_config.alarm_level, inside_envelope, uses_regressors, dt
+                view, tone_config, test_config.alarm_level, is_inside_envelope, uses_regressors, dt
             )
         view.decaying_peak_score = max(
             (1.0 - (1.0 - test_config.evidence_decay_factor) / PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO)
@@ -826,9 +829,9 @@ def views_exclude_surface(views, test_config, forces, gust, s, effectiveness_col
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    orthogonal_to_surface: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW;
-    direction: at the start of the flight; surfaces_tested_for_loss: their indices; uses_inertial_flow_angle:
-    the force is that at the flow angle from inertial motion.
+    orthogonal_to_surface: the surface to whose column it is orthogonal, or ORTHOGONAL_TO_VANE_ERROR, or
+    AXIS_VIEW; direction: at the start of the flight; surfaces_tested_for_loss: their indices;
+    uses_inertial_flow_angle: the force is that at the flow angle from inertial motion.
     """
 
     orthogonal_to_surface: int
@@ -841,7 +844,7 @@ class ParityDirection(NamedTuple):
     )
 
 
-def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
+def parity_directions_of(aircraft: Aircraft, uses_forces: bool = False) -> Iterator[ParityDirection]:
     """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
 
     With accelerometers also, in the plane of a rate and its force, across the column of each surface that
@@ -852,15 +855,15 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
     yield ParityDirection(
         AXIS_VIEW,
         _sum_of_unit_vectors((PITCH,)),
-        PITCH_PLANE,
+        PITCH_AND_NORMAL_FORCE,
         pitch_surface_indices,
         may_use_vane_gust_estimate=True,
     )
-    yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), LATERAL_PLANE, lateral_surface_indices)
+    yield ParityDirection(AXIS_VIEW, _sum_of_unit_vectors((ROLL,)), ROLL_AND_YAW, lateral_surface_indices)
     yield ParityDirection(
         AXIS_VIEW,
         _sum_of_unit_vectors((YAW,)),
-        LATERAL_PLANE,
+        ROLL_AND_YAW,
         lateral_surface_indices,
         may_use_vane_gust_estimate=True,
     )
@@ -872,15 +875,15 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
         yield ParityDirection(
             s,
             _sum_of_unit_vectors((ROLL,)),
-            LATERAL_PLANE,
+            ROLL_AND_YAW,
             other_surface_indices,
             may_use_vane_gust_estimate=is_roll_surface,
         )
-    if not with_forces:
+    if not uses_forces:
         return
-    for force_index, plane_axes, plane_moving_surface_indices in (
-        (NORMAL_COMPONENT, PITCH_PLANE, pitch_surface_indices),
-        (SIDE_COMPONENT, YAW_PLANE, lateral_surface_indices),
+    for force_index, plane_axes, plane_surface_indices in (
+        (NORMAL_COMPONENT, PITCH_AND_NORMAL_FORCE, pitch_surface_indices),
+        (SIDE_COMPONENT, YAW_AND_SIDE_FORCE, lateral_surface_indices),
     ):
         surfaces_distinguished_by_force = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
         for s in surfaces_distinguished_by_force:
@@ -891,19 +894,19 @@ def parity_directions_of(aircraft: Aircraft, with_forces: bool = False) -> Itera
                 column_components,
                 [
                     other_surface_index
-                    for other_surface_index in plane_moving_surface_indices
+                    for other_surface_index in plane_surface_indices
                     if other_surface_index != s
                 ],
             )
         if surfaces_distinguished_by_force:
             yield ParityDirection(
-                VANE_VIEW, _sum_of_unit_vectors(plane_axes), plane_axes, plane_moving_surface_indices
+                ORTHOGONAL_TO_VANE_ERROR, _sum_of_unit_vectors(plane_axes), plane_axes, plane_surface_indices
             )
             yield ParityDirection(
                 AXIS_VIEW,
                 _sum_of_unit_vectors(plane_axes[1:]),
                 plane_axes,
-                plane_moving_surface_indices,
+                plane_surface_indices,
                 uses_inertial_flow_angle=True,
             )
 
@@ -979,7 +982,9 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             if orthogonal_to_surface == AXIS_VIEW and not uses_inertial_flow_angle
             else plane_axes[0]
         )
-        rate_block = statistical["block"][PITCH_BLOCK if plane_axes == PITCH_PLANE else LATERAL_BLOCK]
+        rate_block = statistical["block"][
+            PITCH_BLOCK if plane_axes == PITCH_AND_NORMAL_FORCE else LATERAL_BLOCK
+        ]
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
         law_reacts_to_gust = statistical["gust"]["output"]["accounts_for_gusts"] and direction[PITCH]
@@ -999,7 +1004,9 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             block[field_name] = rate_block[field_name]
         block["regressor_tolerance"][:n_regressors] = rate_block["regressor_tolerance"][:n_regressors]
         if may_use_vane_gust_estimate and subtracts_gust_estimate_from_rates:
-            view["confirming_force_component"] = NORMAL_FORCE if plane_axes == PITCH_PLANE else SIDE_FORCE
+            view["confirming_force_component"] = (
+                NORMAL_FORCE if plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
+            )
         if any(direction[SIDE_FORCE:]):
             force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
             view["confirming_force_component"] = plane_axes[1]
@@ -1018,12 +1025,14 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         hypotheses = block["hypothesis"][: len(hypothesis_kinds)]
         hypotheses["kind"], hypotheses["surface"] = hypothesis_kinds, [-1, *loss_surface_indices]
         view["is_orthogonal_to_rolling_gust"] = (
-            orthogonal_to_surface == VANE_VIEW
-            and plane_axes == YAW_PLANE
+            orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
+            and plane_axes == YAW_AND_SIDE_FORCE
             and statistical["gust"]["output"]["accounts_for_gusts"]
         )
         view["uses_inertial_flow_angle"] = uses_inertial_flow_angle
-        view["is_immune_to_vane_error"] = uses_inertial_flow_angle or orthogonal_to_surface == VANE_VIEW
+        view["is_immune_to_vane_error"] = (
+            uses_inertial_flow_angle or orthogonal_to_surface == ORTHOGONAL_TO_VANE_ERROR
+        )
         likelihood.set_supporting_correlation_signs(block, hypothesis_kinds)
 
 

@@ -774,12 +774,12 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
     update_all_force_innovations(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
-    forces.fill_readings_without_vanes(
+    forces.fill_y_with_flow_angles_from_forces(
         record, np.zeros(3), np.append(off, np.zeros(record["y_without_vanes"].size - 5))
     )
     assert record["y_without_vanes"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y_without_vanes"][:2].copy(), np.array([0.02, -0.03, 0.01])
-    forces.fill_readings_without_vanes(
+    forces.fill_y_with_flow_angles_from_forces(
         record, turning, np.append(off, np.zeros(record["y_without_vanes"].size - 5))
     )
     damped = (

@@ -36,7 +36,7 @@ MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run 
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
 MAX_FORCE_FLOW_LAG_S = 0.002
 FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S = 0.3  # share of a drift that may change within a second
-SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES = {
+SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES = {
     False: 0.05,
     True: 0.2,
 }  # of the term in the rate of sideslip: gusts have a part in it
@@ -91,14 +91,16 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
     forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
     for force_index in range(2):
         previous_predicted_scaled_force = forces.component[force_index].predicted_scaled_force
-        update_force_innovation(forces, gust, force_index, measured, u)
+        update_force_innovation_and_regressors(forces, gust, force_index, measured, u)
         fill_force_flow_lag_error_bound(
             forces.component[force_index],
             previous_predicted_scaled_force,
             forces.n_updates_capped_at_minimum,
             dt,
         )
-        integrate_inertial_flow_angle(forces, forces.component[force_index], force_index, measured.y, dt)
+        update_inertial_flow_angle_and_innovation(
+            forces, forces.component[force_index], force_index, measured.y, dt
+        )
     fill_flow_angle_rates(forces, measured)
     forces.n_updates_capped_at_minimum = min(forces.n_updates_capped_at_minimum + 1, MIN_FORCE_UPDATES)
 
@@ -115,7 +117,7 @@ def fill_force_flow_lag_error_bound(force_record, previous_predicted_scaled_forc
 
 
 @kernel
-def fill_readings_without_vanes(forces, air_rotation, y):
+def fill_y_with_flow_angles_from_forces(forces, air_rotation, y):
     """Fill `y` with the readings y, but alpha and beta worked out from the forces.
 
     air_rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
@@ -141,7 +143,7 @@ def stop_using_forces(forces, gust, inertial_gust):
 
 
 @kernel
-def integrate_inertial_flow_angle(forces, force_record, force_index, y, dt):
+def update_inertial_flow_angle_and_innovation(forces, force_record, force_index, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
     vane_angle = y[BETA if force_index == SIDE_COMPONENT else ALPHA]
     innovation_per_vane_rad = (
@@ -159,7 +161,7 @@ def integrate_inertial_flow_angle(forces, force_record, force_index, y, dt):
 
 
 @kernel
-def update_force_innovation(forces, gust, force_index, measured, u):
+def update_force_innovation_and_regressors(forces, gust, force_index, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
     force_table, force_record = gust.memory.force_table, forces.component[force_index]
     first_term_index = force_table.free_from[SIDE_FORCE_TABLE_INDEX + force_index]
@@ -225,29 +227,31 @@ def fill_flow_angle_rates(forces, measured):
     gravity, x, specific_force = forces.gravity, measured.x, measured.force
     phi, theta = measured.attitude[0], measured.attitude[1]
     alpha, beta, V = measured.y[ALPHA], measured.y[BETA], measured.y[AIRSPEED]
-    unit_flow_forward, unit_flow_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
-    unit_flow_down = np.sin(alpha) * np.cos(beta)
+    unit_velocity_forward, unit_velocity_right = np.cos(alpha) * np.cos(beta), np.sin(beta)
+    unit_velocity_down = np.sin(alpha) * np.cos(beta)
     forward_acceleration = specific_force[0] - gravity * np.sin(theta)
     right_acceleration = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
     down_acceleration = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
     airspeed_rate = (
-        unit_flow_forward * forward_acceleration
-        + unit_flow_right * right_acceleration
-        + unit_flow_down * down_acceleration
+        unit_velocity_forward * forward_acceleration
+        + unit_velocity_right * right_acceleration
+        + unit_velocity_down * down_acceleration
     )
-    right_velocity_rate = right_acceleration + V * (x[0] * unit_flow_down - x[2] * unit_flow_forward)
-    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * unit_flow_right) / (
+    right_velocity_rate = right_acceleration + V * (x[0] * unit_velocity_down - x[2] * unit_velocity_forward)
+    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * unit_velocity_right) / (
         V * np.cos(beta)
     )
-    forward_velocity_rate = forward_acceleration + V * (x[2] * unit_flow_right - x[1] * unit_flow_down)
-    down_velocity_rate = down_acceleration + V * (x[1] * unit_flow_forward - x[0] * unit_flow_right)
+    forward_velocity_rate = forward_acceleration + V * (
+        x[2] * unit_velocity_right - x[1] * unit_velocity_down
+    )
+    down_velocity_rate = down_acceleration + V * (x[1] * unit_velocity_forward - x[0] * unit_velocity_right)
     forces.flow_angle_rate[NORMAL_COMPONENT] = (
         down_velocity_rate * np.cos(alpha) - forward_velocity_rate * np.sin(alpha)
     ) / (V * np.cos(beta))
 
 
 def force_terms(aircraft: Aircraft, force_index: int) -> list[Term]:
-    """The terms of one direction, as `update_force_innovation` goes through them."""
+    """The terms of one direction, as `update_force_innovation_and_regressors` goes through them."""
     return [
         term
         for term in aircraft.measurable_forces
@@ -359,7 +363,8 @@ def _flow_angle_drift_bound(
     on the incidence, and in full on sideslip."""
     attitude_error_bound = sensor_errors["phi"].steady + sensor_errors["theta"].steady
     gyro_error_bound = sum(
-        sensor_errors[gyro].steady + TYPICAL_BODY_RATE_RAD_S * sensor_errors[gyro].slope for gyro in AXES
+        sensor_errors[gyro_name].steady + TYPICAL_BODY_RATE_RAD_S * sensor_errors[gyro_name].slope
+        for gyro_name in AXES
     )
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
@@ -401,7 +406,8 @@ def _configure_force_tolerances(
     n_regressors = len(terms)
     if force_index == SIDE_COMPONENT:
         force_record["regressor_tolerance"][n_regressors] = (
-            relative_coefficient_tolerance + SIDESLIP_RATE_TERM_TOLERANCE_BY_AIR_MOVES[declared.air.moves]
+            relative_coefficient_tolerance
+            + SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES[declared.air.moves]
         )
         n_regressors = n_regressors + 1
     if accelerometer_errors.steady:

@@ -478,7 +478,7 @@ def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, predicti
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_all_force_innovations(forces_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.accounts_for_gusts:
-        forces.fill_readings_without_vanes(
+        forces.fill_y_with_flow_angles_from_forces(
             forces_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
         )
         gusts.store_accelerometer_reading(inertial_gust, measured.force)

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from scipy.stats import kstest
 
 from beaver_ftc.diagnosis.detection import likelihood
-from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_EFFECT, N_ONSET_SLOTS, STEP_FAULT
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_ONSET_SLOTS, STEP_FAULT
 from beaver_ftc.diagnosis.state import LOSS
 from samples import samples
 
@@ -120,7 +120,7 @@ def test_errors_of_coefficients_within_their_tolerance_never_add_to_a_score(case
     signatures, regressors = rng.normal(size=(frames, 3, n)), rng.normal(size=(frames, 3, n))
     error = tolerance * (np.sign(share) if corner else share)
     nu = drawn(_block(case), frames, DT, rng)
-    kinds = LOSS, STEP_FAULT, ALPHA_CUBED_EFFECT
+    kinds = LOSS, STEP_FAULT, ALPHA_CUBED_MOMENT
     clean = _shown(_block(case, *kinds), nu, signatures, keep=keep)
     wrong = nu + np.einsum("j,kjn->kn", error, regressors)
     careful = _shown(_block(case, *kinds, tolerance=tolerance), wrong, signatures, regressors, keep=keep)

@@ -8,7 +8,7 @@ from statistics_of import Statistical, put
 
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA_CUBED_EFFECT,
+    ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LOSS_END,
     N_ONSET_SLOTS,
@@ -333,7 +333,7 @@ def test_a_loss_grows_stays_or_gives_back_what_it_was():
         (GROWING_LOSS, True, -1.0),
         (LOSS_END, True, 1.0),
         (STEP_FAULT, False, 1.0),
-        (ALPHA_CUBED_EFFECT, False, 1.0),
+        (ALPHA_CUBED_MOMENT, False, 1.0),
     ],
 )
 def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
@@ -347,7 +347,7 @@ def test_a_loss_takes_away_and_its_end_gives_back(kind, sided, score):
         assert onset_tests["score"][0] == pytest.approx(score * sign if sided else 1.0)
 
 
-@pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA_CUBED_EFFECT, 0.5), (STEP_FAULT, 0.5)])
+@pytest.mark.parametrize(("kind", "certain"), [(LOSS, 24.5), (ALPHA_CUBED_MOMENT, 0.5), (STEP_FAULT, 0.5)])
 def test_a_mapped_error_is_doubt_of_all_but_a_loss(kind, certain):
     """Evidence of 7 standard deviations, of which what is bounded may be 6: logarithms 7^2 / 2, 1 / 2."""
     block = with_hypotheses(block_of(TOGETHER, [1e-3, 1e-3]), kind)
@@ -466,7 +466,7 @@ def test_signatures_are_what_surfaces_gave_steps_and_the_cubic_moment():
         strict=False,
     ):
         hypothesis["kind"], hypothesis["surface"], hypothesis["axis"] = kind, surface, axis
-    record["block"][0]["hypothesis"]["kind"][:3] = LOSS, STEP_FAULT, ALPHA_CUBED_EFFECT
+    record["block"][0]["hypothesis"]["kind"][:3] = LOSS, STEP_FAULT, ALPHA_CUBED_MOMENT
     record["block"][0]["hypothesis"]["surface"][:3] = 1, -1, -1
     record["block"][0]["hypothesis"]["axis"][:3] = 1, 1, 1
     Gu = np.arange(12.0).reshape(3, 4)

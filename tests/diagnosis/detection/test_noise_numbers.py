@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import error_map_dtype, max_inertia_coefficient_errors
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA_CUBED_EFFECT,
+    ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LOSS_END,
     N_ONSET_SLOTS,
@@ -125,7 +125,7 @@ def test_every_plane_has_its_losses_their_courses_steps_and_pitch_the_cubic_mome
         return {(int(h["kind"]), int(h["surface"]), int(h["axis"]), int(h["raises_alarm"])) for h in found}
 
     assert hypotheses(pitch) == {
-        (LOSS, ELEVATOR, 1, 1), (STEP_FAULT, -1, 1, 1), (ALPHA_CUBED_EFFECT, -1, 1, 0), (GROWING_LOSS,
+        (LOSS, ELEVATOR, 1, 1), (STEP_FAULT, -1, 1, 1), (ALPHA_CUBED_MOMENT, -1, 1, 0), (GROWING_LOSS,
         ELEVATOR, 1, 0),
         (LOSS_END, ELEVATOR, 1, 0),
     }  # fmt: skip

@@ -76,12 +76,12 @@ USUAL_MAX_HYPOTHESES_PER_BLOCK = (
     8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
 )
 MIN_UNCERTAINTY_BOUND_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
-STEP_FAULT, ALPHA_CUBED_EFFECT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
+STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
 SUPPORTING_CORRELATION_SIGN_BY_KIND = {
     LOSS: -1.0,
     STEP_FAULT: 0.0,
-    ALPHA_CUBED_EFFECT: 0.0,
+    ALPHA_CUBED_MOMENT: 0.0,
     GROWING_LOSS: -1.0,
     LOSS_END: 1.0,
 }
@@ -300,19 +300,19 @@ def whiten_regressors(block, dt):
     rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
     drift_gain_00, drift_gain_01 = drift_gain[0, 0], drift_gain[0, 1]
     drift_gain_10, drift_gain_11 = drift_gain[1, 0], drift_gain[1, 1]
-    regressor = block.regressor
-    filter_state = block.regressor_filter_state
-    response = block.regressor_response
+    regressors = block.regressor
+    filter_states = block.regressor_filter_state
+    responses = block.regressor_response
     for j in range(block.n_regressors):
-        response_0 = filter_state[j, 0] + dt * (regressor[j, 0] - filter_state[j, 2])
-        response_1 = filter_state[j, 1] + dt * (regressor[j, 1] - filter_state[j, 3])
-        response[j, 0], response[j, 1] = response_0, response_1
-        filter_state[j, 0] = response_0 - rate_gain_00 * response_0 - rate_gain_01 * response_1
-        filter_state[j, 1] = response_1 - rate_gain_10 * response_0 - rate_gain_11 * response_1
-        filter_state[j, 2] = drift_decay_factor * filter_state[j, 2] + (
+        response_0 = filter_states[j, 0] + dt * (regressors[j, 0] - filter_states[j, 2])
+        response_1 = filter_states[j, 1] + dt * (regressors[j, 1] - filter_states[j, 3])
+        responses[j, 0], responses[j, 1] = response_0, response_1
+        filter_states[j, 0] = response_0 - rate_gain_00 * response_0 - rate_gain_01 * response_1
+        filter_states[j, 1] = response_1 - rate_gain_10 * response_0 - rate_gain_11 * response_1
+        filter_states[j, 2] = drift_decay_factor * filter_states[j, 2] + (
             drift_gain_00 * response_0 + drift_gain_01 * response_1
         )
-        filter_state[j, 3] = drift_decay_factor * filter_state[j, 3] + (
+        filter_states[j, 3] = drift_decay_factor * filter_states[j, 3] + (
             drift_gain_10 * response_0 + drift_gain_11 * response_1
         )
 
@@ -356,13 +356,13 @@ def fill_predictable_innovation(block, dt):
             block.calm_air_information += (
                 predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
             )
-    information_with_prior = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
-    cross_correlation_with_margin = (
+    information_plus_prior = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
+    cross_correlation_plus_prior_and_margin = (
         block.calm_air_cross_correlation
         + CALM_AIR_SHARE_PRIOR_INFORMATION
-        + CALM_AIR_SHARE_MARGIN_STD * sqrt(information_with_prior)
+        + CALM_AIR_SHARE_MARGIN_STD * sqrt(information_plus_prior)
     )
-    calm_air_share = min(max(cross_correlation_with_margin / information_with_prior, 0.0), 1.0)
+    calm_air_share = min(max(cross_correlation_plus_prior_and_margin / information_plus_prior, 0.0), 1.0)
     for i in range(block.n_axes):
         predictable_innovation[i] *= calm_air_share
 
@@ -531,19 +531,19 @@ def accumulate_correlations_and_bounds(block, onset_tests, n_tests, dt, evidence
         onset_tests.correlation_by_calm_air[k] = (
             evidence_decay_factor * onset_tests.correlation_by_calm_air[k]
         ) + (weight_0 * predictable_0 + weight_1 * predictable_1)
-        varying_bound_increment = transient_response_sum_bound_0 * abs(
+        varying_uncertainty_bound_increment = transient_response_sum_bound_0 * abs(
             weight_0 - correlation_weight[0, k]
         ) + transient_response_sum_bound_1 * abs(weight_1 - correlation_weight[1, k])
-        constant_bound_increment = settled_response_bound_0 * abs(weight_0) + settled_response_bound_1 * abs(
-            weight_1
-        )
+        constant_uncertainty_bound_increment = settled_response_bound_0 * abs(
+            weight_0
+        ) + settled_response_bound_1 * abs(weight_1)
         onset_tests.max_correlation_by_constant_uncertainty[k] = (
             evidence_decay_factor * onset_tests.max_correlation_by_constant_uncertainty[k]
-            + constant_bound_increment
+            + constant_uncertainty_bound_increment
         )
         onset_tests.max_correlation_by_varying_uncertainty[k] = (
             evidence_decay_factor * onset_tests.max_correlation_by_varying_uncertainty[k]
-            + varying_bound_increment
+            + varying_uncertainty_bound_increment
         )
         onset_tests.max_correlation_by_rate_limited_uncertainty[k] = (
             evidence_decay_factor * onset_tests.max_correlation_by_rate_limited_uncertainty[k]

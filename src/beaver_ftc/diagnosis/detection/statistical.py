@@ -48,7 +48,7 @@ from beaver_ftc.diagnosis.bounds import (
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES_RECORD, TrimState, configure_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA_CUBED_EFFECT,
+    ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LATERAL_BLOCK,
     LOSS_END,
@@ -92,7 +92,7 @@ N_TESTED_SIGNS_BY_KIND = {
     GROWING_LOSS: 1,
     LOSS_END: 1,
     STEP_FAULT: 2,
-    ALPHA_CUBED_EFFECT: 2,
+    ALPHA_CUBED_MOMENT: 2,
 }  # a loss has a sign, a step may go either way
 # Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
 # faster; a constant loss explains the rest.
@@ -118,7 +118,7 @@ def axes_and_hypotheses_by_block(
     pitch_hypotheses = (
         *_loss_hypotheses(aircraft, PITCH_AXES),
         *_step_fault_hypotheses(PITCH_AXES),
-        (ALPHA_CUBED_EFFECT, -1, 1, 0),
+        (ALPHA_CUBED_MOMENT, -1, 1, 0),
     )
     lateral_hypotheses = (*_loss_hypotheses(aircraft, LATERAL_AXES), *_step_fault_hypotheses(LATERAL_AXES))
     pitch_hypotheses, lateral_hypotheses = (

@@ -19,7 +19,7 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
-_RIDGE_SHARE = 1e-10
+_GRAM_REGULARIZATION = 1e-10
 _RANK_TOLERANCE = 1e-12
 _N_FLIGHT_PARTS, _MIN_PART_ROWS, BOUND_MARGIN_STANDARD_ERRORS = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
@@ -118,12 +118,12 @@ def unexplained_rates_and_responses(
     past_regressors, lagged_group_commands, is_predictable = build_regressors(
         samples, surface_indices_by_group(model), *lag_counts_and_label_scaling
     )
-    _, past_coefficients, command_response, _ = model.intercept_past_response_noise()
+    _, past_coefficients, response_coefficients, _ = model.intercept_past_response_noise()
     rates_unexplained_by_past = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
     return (
         is_predictable,
         rates_unexplained_by_past,
-        np.einsum("ngl,glr->ngr", lagged_group_commands, command_response),
+        np.einsum("ngl,glr->ngr", lagged_group_commands, response_coefficients),
     )
 
 
@@ -193,7 +193,7 @@ def least_squares(
     regressor_scale = np.where(regressor_rms > _RANK_TOLERANCE * regressor_rms.max(), regressor_rms, np.inf)
     scaled_regressors = regressors / regressor_scale
     scaled_inverse_gram: Floats = np.asarray(
-        np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_RIDGE_SHARE), dtype=np.float64
+        np.linalg.pinv(scaled_regressors.T @ scaled_regressors, rcond=_GRAM_REGULARIZATION), dtype=np.float64
     )
     scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ rates)
     residuals = rates - scaled_regressors @ scaled_coefficients
@@ -254,7 +254,7 @@ def coefficient_upper_bounds(
     scaled_regressors = regressors / regressor_rms
     scaled_inverse_gram = np.linalg.inv(
         scaled_regressors.T @ scaled_regressors
-        + _RIDGE_SHARE * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
+        + _GRAM_REGULARIZATION * len(scaled_regressors) * np.eye(scaled_regressors.shape[1])
     )
     scaled_coefficients = scaled_inverse_gram @ (scaled_regressors.T @ outputs)
     squared_residuals = (outputs - scaled_regressors @ scaled_coefficients) ** 2
@@ -294,13 +294,13 @@ def variance_inflation_factors(regressors: Floats) -> Floats:
 
 
 def power_spectral_density(
-    residuals: Floats, dt_s: float, segment_samples: int = 256
+    residuals: Floats, dt_s: float, max_samples_per_segment: int = 256
 ) -> tuple[Floats, Floats]:
     """One-sided spectral density of each residual, (f,) Hz and (f, 3), by averaged periodograms."""
     from scipy import signal
 
-    n_per_segment = min(segment_samples, len(residuals))
+    n_samples_per_segment = min(max_samples_per_segment, len(residuals))
     frequency_hz, power_density = signal.welch(
-        residuals, fs=1.0 / dt_s, nperseg=n_per_segment, axis=0, detrend="constant"
+        residuals, fs=1.0 / dt_s, nperseg=n_samples_per_segment, axis=0, detrend="constant"
     )
     return frequency_hz, power_density

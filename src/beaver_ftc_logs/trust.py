@@ -84,9 +84,9 @@ def compute_fitted_ranges(
 def _estimate_unpowered_energy_height_rate_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
     used_energy_height_rates_mps = [
-        one.energy_height_rate_mps[is_used]
-        for one, is_used in flights
-        if one.energy_height_rate_mps is not None
+        flight.energy_height_rate_mps[is_used]
+        for flight, is_used in flights
+        if flight.energy_height_rate_mps is not None
     ]
     energy_height_rates_mps = (
         np.concatenate(used_energy_height_rates_mps) if used_energy_height_rates_mps else np.empty(0)
@@ -103,8 +103,8 @@ def central_ranges(values: Floats) -> list[list[float]]:
     """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
     if not values.shape[1]:
         return []
-    known_values = np.where(np.isfinite(values).any(axis=0), values, 0.0)
-    return np.nanquantile(known_values, _RANGE_QUANTILES, axis=0).T.tolist()
+    values_with_unknown_columns_zero = np.where(np.isfinite(values).any(axis=0), values, 0.0)
+    return np.nanquantile(values_with_unknown_columns_zero, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
 def _correlation_matrix(values: Floats) -> Floats:
@@ -120,9 +120,9 @@ def _longest_unchanged_time_s_by_column(flights: Sequence[tuple[Samples, Mask]])
     return {
         column_name: max(
             (
-                float(one.time_since_change_s[column_name].max(initial=0.0))
-                for one, _ in flights
-                if column_name in one.time_since_change_s
+                float(flight.time_since_change_s[column_name].max(initial=0.0))
+                for flight, _ in flights
+                if column_name in flight.time_since_change_s
             )
         )
         for column_name in column_names
@@ -158,7 +158,7 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     regressors_by_flight = [
-        regression.build_regressors(one, surface_groups, *regressor_arguments) for one, _ in flights
+        regression.build_regressors(flight, surface_groups, *regressor_arguments) for flight, _ in flights
     ]
     is_row_used_by_flight = [
         is_used & is_predictable
@@ -176,7 +176,7 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
             for regressors, is_row_used in zip(regressors_by_flight, is_row_used_by_flight, strict=True)
         ]
     )
-    command_response = np.array(model.command_response)
+    response_coefficients = np.array(model.command_response)
     residual_covariance = np.array(model.residual_covariance)
     whitening_matrix = np.linalg.inv(np.linalg.cholesky(residual_covariance)).T
     effect_power, unexplained_power = np.zeros(len(surface_groups)), np.zeros(len(surface_groups))
@@ -189,7 +189,9 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
         other_regressors = np.column_stack(
             [np.ones(len(past_regressors)), past_regressors, *other_lagged_commands]
         )
-        whitened_effect = lagged_commands[:, group_index] @ command_response[group_index] @ whitening_matrix
+        whitened_effect = (
+            lagged_commands[:, group_index] @ response_coefficients[group_index] @ whitening_matrix
+        )
         whitened_effect = whitened_effect - whitened_effect.mean(axis=0)
         effect_power[group_index] = float((whitened_effect**2).sum()) / len(whitened_effect)
         if effect_power[group_index] > _MIN_EFFECT_NOISE_POWER_RATIO:
@@ -264,9 +266,9 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
     rate_sd_ratios = np.nanstd(samples.rates, axis=0) / np.maximum(fitted_ranges.rate_sd_rad_s, MIN_DIVISOR)
     geometric_mean_sd_ratio = float(np.exp(np.mean(np.log(np.maximum(rate_sd_ratios, MIN_DIVISOR)))))
     for unit, units_per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        do_axes_share_one_ratio = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
+        is_ratio_alike_on_axes = rate_sd_ratios.max() < _MAX_AXIS_RATIO_OF_ONE_UNIT * rate_sd_ratios.min()
         if (
-            do_axes_share_one_ratio
+            is_ratio_alike_on_axes
             and 1.0 / _UNIT_TOLERANCE_FACTOR**2
             < geometric_mean_sd_ratio / units_per_rad
             < _UNIT_TOLERANCE_FACTOR**2
@@ -277,7 +279,7 @@ def check_rate_units(samples: Samples, fitted_ranges: FittedRanges | None) -> No
                 f"allowed: rates in rad/s; a factor of {1.0 / units_per_rad:.4g} (`unit: {unit}`) fits"
             )
         if (
-            do_axes_share_one_ratio
+            is_ratio_alike_on_axes
             and 1.0 / _UNIT_TOLERANCE_FACTOR**2
             < geometric_mean_sd_ratio * units_per_rad
             < _UNIT_TOLERANCE_FACTOR**2
@@ -301,19 +303,19 @@ def check_command_units(
     rate_width_ratios = _range_widths(central_ranges(rates)) / np.maximum(
         _range_widths(fitted_ranges.rate_ranges_rad_s), MIN_DIVISOR
     )
-    do_rates_move_as_fitted = (
+    is_rate_motion_as_fitted = (
         rate_width_ratios.min() > 1.0 / _MAX_ALIKE_MOTION_FACTOR
         and rate_width_ratios.max() < _MAX_ALIKE_MOTION_FACTOR
     )
-    max_command_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
-        1.0 if do_rates_move_as_fitted else max(rate_width_ratios.max(), 1.0)
+    allowed_command_width_ratio = _MIN_OTHER_UNIT_FACTOR * (
+        1.0 if is_rate_motion_as_fitted else max(rate_width_ratios.max(), 1.0)
     )
     command_width_ratios = _range_widths(central_ranges(commands)) / np.maximum(
         _range_widths(fitted_ranges.command_ranges), MIN_DIVISOR
     )
     for surface, width_ratio in zip(surfaces, command_width_ratios.tolist(), strict=True):
-        if max_command_width_ratio < width_ratio < 1e4 or (
-            do_rates_move_as_fitted and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
+        if allowed_command_width_ratio < width_ratio < 1e4 or (
+            is_rate_motion_as_fitted and 1e-4 < width_ratio < 1.0 / _MIN_OTHER_UNIT_FACTOR
         ):
             raise BadInput(
                 f"{flight_name}: the command of {surface} moves {width_ratio:.3g} times as much as "
@@ -347,13 +349,17 @@ def check_columns_as_identified(samples: Samples, model: Model) -> None:
     if not any(is_group_effect_known(model)):
         return
     whitened_flights_and_models = [
-        (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
-        for one in model.noise_models
+        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
+        for noise_model in model.noise_models
     ]
     flights_and_log_likelihoods = [
-        (one, log_likelihoods_and_sample_count)
-        for one in whitened_flights_and_models or [(samples, model)]
-        if (log_likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(*one))
+        (whitened_flight_and_model, log_likelihoods_and_sample_count)
+        for whitened_flight_and_model in whitened_flights_and_models or [(samples, model)]
+        if (
+            log_likelihoods_and_sample_count := _sample_log_likelihood_by_flight_part(
+                *whitened_flight_and_model
+            )
+        )
     ]
     if not flights_and_log_likelihoods:
         return
@@ -663,9 +669,9 @@ def _column_contributions_to_rates(samples: Samples, model: Model) -> tuple[Floa
 def coefficients_by_column_without_own_axis(model: Model) -> dict[str, tuple[list[int], Floats]]:
     """By column of rates and signals its rows of `past`, and their coefficients (K, 3) but for those of a
     rate on its own axis."""
-    rate_columns = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
+    rate_column_names = [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
     column_of_row = (
-        rate_columns * model.n_rate_lags
+        rate_column_names * model.n_rate_lags
         + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(model.n_rate_lags)
     )
     coefficients, rows_of_column = np.array(model.past_coefficients), dict[str, list[int]]()
@@ -701,10 +707,10 @@ def rows_not_credible_by_reason(samples: Samples, model: Model) -> dict[str, Mas
 def _was_clipped_recently(is_clipped: Mask, dt_s: float) -> Mask:
     """Whether a condition held in the last half minute."""
     row_index = np.arange(len(is_clipped))
-    rows_since_clipping = row_index - np.maximum.accumulate(
+    n_rows_since_clipping = row_index - np.maximum.accumulate(
         np.where(is_clipped, row_index, -len(is_clipped) - round(_DISTRUST_AFTER_CLIPPING_S / dt_s))
     )
-    return np.asarray(rows_since_clipping * dt_s <= _DISTRUST_AFTER_CLIPPING_S)
+    return np.asarray(n_rows_since_clipping * dt_s <= _DISTRUST_AFTER_CLIPPING_S)
 
 
 def _drop_empty_reasons(rows_by_reason: dict[str, Mask]) -> dict[str, Mask]:
@@ -766,7 +772,7 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
     fitted_unchanged_time_s_by_column = (
         model.fitted_ranges.longest_unchanged_time_s_by_column if model.fitted_ranges else {}
     )
-    expected_longest_unchanged_time_s = {
+    expected_longest_unchanged_time_s_by_column = {
         column_name: 0.0 if column_name in _rate_column_names(model) else np.inf
         for column_name in samples.time_since_change_s
     } | fitted_unchanged_time_s_by_column
@@ -774,12 +780,12 @@ def _max_unchanged_time_s_by_column(samples: Samples, model: Model) -> dict[str,
         column_name: MIN_STILL_S / 3.0
         if column_name in fitted_unchanged_time_s_by_column and column_name in _rate_column_names(model)
         else MIN_STILL_S
-        for column_name in expected_longest_unchanged_time_s
+        for column_name in expected_longest_unchanged_time_s_by_column
     }
     return {
         column_name: max(
             min_unchanged_time_limit_s_by_column[column_name],
-            _MAX_UNCHANGED_TIME_FACTOR * expected_longest_unchanged_time_s[column_name],
+            _MAX_UNCHANGED_TIME_FACTOR * expected_longest_unchanged_time_s_by_column[column_name],
         )
         for column_name in samples.time_since_change_s
     }

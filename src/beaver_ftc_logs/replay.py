@@ -78,7 +78,7 @@ def _replay_verdict(
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
     t_s = log_columns["t_s"]
     detected_row_times_s = [
-        float(row_t_s) for row_t_s, one in zip(t_s, verdicts, strict=True) if one.detected
+        float(row_t_s) for row_t_s, row_verdict in zip(t_s, verdicts, strict=True) if row_verdict.detected
     ]
     isolation_s, name = _last_isolation_start_and_name(t_s, verdicts)
     logged_and_replayed = zip(log_columns.get("detected", []), verdicts, strict=False)
@@ -92,7 +92,7 @@ def _replay_verdict(
         "isolation_s": isolation_s,
         "isolated": name,
         "rows_that_differ": sum(
-            bool(logged_flag) != one.detected for logged_flag, one in logged_and_replayed
+            bool(logged_flag) != row_verdict.detected for logged_flag, row_verdict in logged_and_replayed
         ),
         "left_out": _unreplayed_inputs(scenario),
     }
@@ -102,9 +102,9 @@ def _replay_verdict(
 def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
     """Since when what is named at last has been named: what was withdrawn before does not count."""
     named_since_s, name = None, None
-    for row_t_s, one in zip(t_s, verdicts, strict=True):
-        if one.isolated != name:
-            named_since_s, name = float(row_t_s) if one.isolated else None, one.isolated
+    for row_t_s, row_verdict in zip(t_s, verdicts, strict=True):
+        if row_verdict.isolated != name:
+            named_since_s, name = float(row_t_s) if row_verdict.isolated else None, row_verdict.isolated
     return named_since_s, name
 
 
@@ -150,4 +150,4 @@ def as_text(verdict: Document) -> str:
         outcome += f", {verdict['isolated']} isolated at {verdict['isolation_s']:.2f} s"
     comparison_texts = {True: "as flown", False: "not as flown", None: "nothing beside it to compare with"}
     lines = [f"{verdict['flight']}: {outcome}; {comparison_texts[verdict['as_flown']]}"]
-    return "\n".join([*lines, *(f"  left out: {one}" for one in verdict["left_out"])])
+    return "\n".join([*lines, *(f"  left out: {input_text}" for input_text in verdict["left_out"])])

@@ -69,11 +69,13 @@ def _simulate_rows(
         t_s = k * dt_s
         if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:
             demanded_attitude = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
-        commands = _control_law(attitude, rates, demanded_attitude)
+        roll_and_pitch_command = _control_law(attitude, rates, demanded_attitude)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
-        yield [1000.0 * t_s, *measured_rates_deg_s, *commands, *attitude]
+        yield [1000.0 * t_s, *measured_rates_deg_s, *roll_and_pitch_command, *attitude]
         effective_elevon_positions = (
-            np.array([commands.sum(), commands[0] - commands[1]]) / 2.0 * [1.0, left_effectiveness(t_s)]
+            np.array([roll_and_pitch_command.sum(), roll_and_pitch_command[0] - roll_and_pitch_command[1]])
+            / 2.0
+            * [1.0, left_effectiveness(t_s)]
         )
         turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + np.sqrt(
             dt_s

@@ -134,10 +134,10 @@ def _is_right_group(
     share_of_known_name = {name: share for name, share in name_shares.items() if name != UNKNOWN_SURFACE}
     if not failed_group_indices or not share_of_known_name:
         return None
-    most_frequent_surfaces = set(
+    surfaces_of_most_frequent_name = set(
         max(share_of_known_name, key=lambda name: share_of_known_name[name]).split("+")
     )
     named_group_indices = {
-        group_index for group_index, group in enumerate(groups) if most_frequent_surfaces & set(group)
+        group_index for group_index, group in enumerate(groups) if surfaces_of_most_frequent_name & set(group)
     }
     return bool(named_group_indices) and named_group_indices <= failed_group_indices

@@ -41,19 +41,21 @@ def is_clipped(values: Floats) -> Mask:
     is_clipped_row = np.zeros(len(values), dtype=bool)
     for signed_values in (values, -values):
         finite_values = np.where(np.isfinite(signed_values), signed_values, -np.inf)
-        is_at_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (signed_values > 0.0)
+        is_at_running_maximum = (signed_values == np.maximum.accumulate(finite_values)) & (
+            signed_values > 0.0
+        )
         row_index = np.arange(len(signed_values))
         at_maximum_since_row = np.maximum.accumulate(
-            np.where(_differs_from_previous(signed_values) | ~is_at_maximum, row_index, 0)
+            np.where(_differs_from_previous(signed_values) | ~is_at_running_maximum, row_index, 0)
         )
         running_maximum_ordinal = np.cumsum(
             _differs_from_previous(np.maximum.accumulate(finite_values)).astype(np.int64)
         )  # a larger value begins the count again
-        n_rows_at_maximum = np.cumsum(is_at_maximum) - _count_rows_at_previous_maxima(
-            is_at_maximum, running_maximum_ordinal
+        n_rows_at_maximum = np.cumsum(is_at_running_maximum) - _count_rows_at_previous_maxima(
+            is_at_running_maximum, running_maximum_ordinal
         )
         is_clipped_row |= (
-            is_at_maximum
+            is_at_running_maximum
             & (row_index - at_maximum_since_row >= _MIN_CLIPPED_CONSECUTIVE_ROWS - 1)
             & (n_rows_at_maximum >= _MIN_CLIPPED_TOTAL_ROWS)
         )
@@ -61,14 +63,16 @@ def is_clipped(values: Floats) -> Mask:
 
 
 def _count_rows_at_previous_maxima(
-    is_at_maximum: Mask, running_maximum_ordinal: NDArray[np.int64]
+    is_at_running_maximum: Mask, running_maximum_ordinal: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Count, for each row, the rows at smaller largest values: those before the present largest value was
     reached. running_maximum_ordinal (n,): number of the present largest value, counted from 1."""
-    cumulated_rows_at_maximum = np.cumsum(is_at_maximum)
+    cumulated_rows_at_maximum = np.cumsum(is_at_running_maximum)
     first_row_of_each_maximum = np.flatnonzero(np.diff(running_maximum_ordinal, prepend=0))
     return (
-        (cumulated_rows_at_maximum - is_at_maximum)[first_row_of_each_maximum][running_maximum_ordinal - 1]
+        (cumulated_rows_at_maximum - is_at_running_maximum)[first_row_of_each_maximum][
+            running_maximum_ordinal - 1
+        ]
         if len(first_row_of_each_maximum)
         else np.zeros(len(running_maximum_ordinal), dtype=np.int64)
     )
@@ -80,18 +84,18 @@ def find_spike_rows(values: Floats) -> NDArray[np.int64]:
     finite_rows = np.flatnonzero(np.isfinite(values))
     if len(finite_rows) < MIN_STILL_ROWS:
         return finite_rows[:0]
-    value_steps = np.diff(values[finite_rows])
-    median_step = (
-        float(np.median(np.abs(value_steps[value_steps != 0.0]))) if (value_steps != 0.0).any() else 0.0
+    signed_steps = np.diff(values[finite_rows])
+    median_step_size = (
+        float(np.median(np.abs(signed_steps[signed_steps != 0.0]))) if (signed_steps != 0.0).any() else 0.0
     )
-    is_spike = (np.abs(value_steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step) & (
-        np.abs(value_steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step
+    is_spike = (np.abs(signed_steps[:-1]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step_size) & (
+        np.abs(signed_steps[1:]) > _MIN_SPIKE_STEP_OVER_MEDIAN * median_step_size
     )
-    is_spike &= value_steps[:-1] * value_steps[1:] < 0.0
+    is_spike &= signed_steps[:-1] * signed_steps[1:] < 0.0
     spike_rows = finite_rows[1:-1][is_spike]
     return (
         spike_rows
-        if median_step > 0.0 and len(spike_rows) <= _MAX_SPIKE_SHARE * len(finite_rows)
+        if median_step_size > 0.0 and len(spike_rows) <= _MAX_SPIKE_SHARE * len(finite_rows)
         else finite_rows[:0]
     )
 
@@ -113,6 +117,6 @@ def column_defect_texts(name: str, column: Column, is_measured_rate: bool) -> li
             f"{name}: clipped at {np.abs(values[is_clipped_row]).max():.4g} in {is_clipped_row.sum()} rows"
         )
     if is_measured_rate and len(spike_rows := find_spike_rows(values)):
-        jump_count_text = "1 jump" if len(spike_rows) == 1 else f"{len(spike_rows)} jumps"
-        defect_texts.append(f"{name}: {jump_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
+        spike_count_text = "1 jump" if len(spike_rows) == 1 else f"{len(spike_rows)} jumps"
+        defect_texts.append(f"{name}: {spike_count_text}, the first at {column.t_s[spike_rows[0]]:.2f} s")
     return defect_texts

@@ -61,8 +61,8 @@ def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: floa
     verdicts: list[Verdict] = []
     innovation, innovation_bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
     expected_effect = np.empty((*innovation.shape, inputs[2].shape[1]))
-    for k, sample in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
-        verdicts.append(diagnosis.step(*sample))
+    for k, sample_inputs in enumerate(zip(*map(np.ascontiguousarray, inputs), strict=True)):
+        verdicts.append(diagnosis.step(*sample_inputs))
         innovation[k], innovation_bound[k], expected_effect[k] = diagnosis.innovation()
     theta_bounds = _bounds_of_explaining_losses(
         innovation[:, :, None], innovation_bound[:, :, None], expected_effect
@@ -146,9 +146,9 @@ def diagnosis_rows_from_replay(
     effectiveness = np.ones_like(replayed.single_fault_effectiveness_low)
     effectiveness_low = np.zeros_like(replayed.single_fault_effectiveness_low)
     effectiveness_high = np.ones_like(replayed.single_fault_effectiveness_low)
-    gives_bounds = fdi_config.is_ours and not fdi_config.pairs
+    may_bound_effectiveness = fdi_config.is_ours and not fdi_config.pairs
     for k, verdict in enumerate(replayed.verdicts):
-        if gives_bounds:
+        if may_bound_effectiveness:
             _fill_effectiveness_bounds(
                 verdict,
                 surfaces,

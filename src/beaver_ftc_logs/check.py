@@ -17,7 +17,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
 from beaver_ftc_logs.readers import check_exists, detect_reader, read_parts
 from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers_of_column
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
 from beaver_ftc_logs.units import (
     ACCELERATION,
@@ -205,7 +205,7 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
             if missing_axes
             else "no column looks like a command"
         )
-        nearest_text = nearest_names("rate" if missing_axes else "command", recording.columns)
+        nearest_text = nearest_names_text("rate" if missing_axes else "command", recording.columns)
         remarks.append(
             f"{path}: {problem}, allowed: a vehicle file that names it; the log has {nearest_text}"
         )
@@ -337,7 +337,7 @@ def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
     allowed_text = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     raise BadInput(
         f"{path}: no column of time, allowed: {allowed_text}; it has "
-        f"{nearest_names(TIME_COLUMN, table_columns)}"
+        f"{nearest_names_text(TIME_COLUMN, table_columns)}"
     )
 
 

@@ -18,12 +18,12 @@ from beaver_ftc_logs.regression import (
     variance_inflation_factors,
 )
 from beaver_ftc_logs.samples import (
+    ADDED_GYRO_NOISE_LEVELS_RAD_S,
+    ADDED_NOISE_MA_COEFFICIENTS,
     NOISE_MA_CANDIDATES,
-    UNSEEN_GYRO_NOISE_RAD_S,
-    UNSEEN_NOISE_MA_COEFFICIENTS,
     Samples,
-    scale_by_dynamic_pressure,
     whiten_samples,
+    with_airspeed_effects,
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -79,7 +79,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
         (np.array(one.residual_covariance) for one in model.noise_models), key=np.linalg.det
     )
     noise_models = list(model.noise_models)
-    for ma_coefficients in UNSEEN_NOISE_MA_COEFFICIENTS:
+    for ma_coefficients in ADDED_NOISE_MA_COEFFICIENTS:
         if ma_coefficients not in known_ma_coefficients:
             whitened_flights = fitting.flights_with_usable_rows(
                 [whiten_samples(one, ma_coefficients) for one in flights]
@@ -92,7 +92,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
                     wider=max_covariance_inflation,
                 )
             )
-    for gyro_noise_rad_s in UNSEEN_GYRO_NOISE_RAD_S:
+    for gyro_noise_rad_s in ADDED_GYRO_NOISE_LEVELS_RAD_S:
         ar_coefficients, residual_covariance = gyro_noise.residual_predictor_by_yule_walker(
             model, quietest_covariance, gyro_noise_rad_s, fitting.AUTOREGRESSIVE_ORDER
         )
@@ -287,8 +287,7 @@ def _choose_dynamic_pressure_scaling(
     if vehicle.reference_airspeed_mps is not None or reference_airspeed_mps <= 0.0:
         return flights, vehicle
     scaled_flights = [
-        scale_by_dynamic_pressure(one, reference_airspeed_mps, vehicle.surface_airspeed_powers)
-        for one in flights
+        with_airspeed_effects(one, reference_airspeed_mps, vehicle.surface_airspeed_powers) for one in flights
     ]
     scaled_vehicle = vehicle.model_copy(update={"reference_airspeed_mps": reference_airspeed_mps})
     if _min_bic(flights, vehicle) - _min_bic(scaled_flights, scaled_vehicle) < _DECISIVE_BIC_DIFFERENCE:
@@ -310,7 +309,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
     linkages change the square. Another than that must explain decisively more."""
 
     scaled_flights = [
-        scale_by_dynamic_pressure(one, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers)
+        with_airspeed_effects(one, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers)
         for one in flights
     ]
     whitened_flights = whiten_flights(
@@ -319,7 +318,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
 
     def scale_and_whiten_flights(scaled_vehicle: Vehicle, does_whiten: bool = True) -> list[Samples]:
         rescaled_flights = [
-            scale_by_dynamic_pressure(
+            with_airspeed_effects(
                 one, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
             for one in flights

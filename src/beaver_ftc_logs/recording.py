@@ -52,7 +52,7 @@ class RecordedFlight:
     notes: tuple[str, ...] = field(default=())
 
 
-def nearest_names(wanted_name: str, names: Iterable[str]) -> str:
+def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
     sorted_names = sorted(names)
     ranked_names = sorted(

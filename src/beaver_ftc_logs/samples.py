@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_flight, read_parts
-from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, nearest_names
+from beaver_ftc_logs.recording import Column, Floats, LoggedFailure, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
 from beaver_ftc_logs.vehicle import Vehicle
 
 MIN_LOG_RATE_HZ, _MAX_LOG_RATE_HZ = 4.0, 1e5
 _MIN_LOG_SAMPLES = 50
-_MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _IMPLAUSIBLE_RATE_SD_RAD_S = 1e6, 60.0, 3.0
+_MAX_LOGGED_MAGNITUDE, _MAX_BODY_RATE_RAD_S, _MAX_PLAUSIBLE_RATE_SD_RAD_S = 1e6, 60.0, 3.0
 _DYNAMIC_PRESSURE_RATIO_LIMITS = (0.1, 10.0)
 """Least and largest dynamic pressure over that at the reference, whatever the airspeed says."""
 MAX_FIT_SAMPLES, _FIT_STRETCH_SAMPLES = 200_000, 5000
@@ -35,8 +35,8 @@ NOISE_MA_CANDIDATES = (
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 """Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
-UNSEEN_NOISE_MA_COEFFICIENTS = NOISE_MA_CANDIDATES[:2]
-UNSEEN_GYRO_NOISE_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
+ADDED_NOISE_MA_COEFFICIENTS = NOISE_MA_CANDIDATES[:2]
+ADDED_GYRO_NOISE_LEVELS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
 """Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a
 laboratory's to a toy's, so close together that none is 1.8 times off."""
 _MIN_GAP_STEPS = 3.5
@@ -89,17 +89,19 @@ _PER_SAMPLE_FIELDS = (
 
 def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     """Put a recording on one time base. Raises BadInput with the reason where the log cannot be used."""
-    rate_columns = [getattr(vehicle.rates, axis).column for axis in "pqr"]
-    used_columns = list(dict.fromkeys([*rate_columns, *vehicle.command_columns, *vehicle.signal_columns]))
+    rate_column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    used_column_names = list(
+        dict.fromkeys([*rate_column_names, *vehicle.command_columns, *vehicle.signal_columns])
+    )
     recording = convert_to_si(recording, vehicle)
-    _check_columns(recording, used_columns, rate_columns=rate_columns)
+    _check_columns(recording, used_column_names, rate_column_names=rate_column_names)
     _check_rates_fit_attitude(recording, vehicle)
-    log_stamps_s = recording.columns[rate_columns[0]].t_s
+    log_stamps_s = recording.columns[rate_column_names[0]].t_s
     t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
     values_and_mean_age_by_column = {
-        name: values_and_mean_age_at(recording.columns[name], t_s, step_s) for name in used_columns
+        name: values_and_mean_age_at(recording.columns[name], t_s, step_s) for name in used_column_names
     }
-    for name in rate_columns:
+    for name in rate_column_names:
         values, mean_age_s = values_and_mean_age_by_column[name]
         values_and_mean_age_by_column[name] = (
             np.where(_is_stale(recording.columns[name], t_s, step_s), np.nan, values),
@@ -116,7 +118,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     samples = Samples(
         name=recording.name,
         t_s=t_s,
-        rates=stacked_columns(rate_columns),
+        rates=stacked_columns(rate_column_names),
         commands=np.einsum("nc,sc->ns", stacked_columns(vehicle.command_columns), mixer_matrix(vehicle)),
         signals=stacked_columns(vehicle.signal_columns),
         labels=_labelled_effectiveness_by_surface(recording, vehicle, t_s),
@@ -131,13 +133,13 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
         log_stamps_s=log_stamps_s,
         notes=(
             *recording.notes,
-            *dict.fromkeys(_used_column_defect_texts(recording, used_columns, rate_columns)),
+            *dict.fromkeys(_used_column_defect_texts(recording, used_column_names, rate_column_names)),
         ),
         airspeed=_sampled_airspeed(recording, vehicle, t_s, step_s),
         time_since_change_s={
-            name: _time_since_change_s(recording.columns[name], t_s) for name in used_columns
+            name: _time_since_change_s(recording.columns[name], t_s) for name in used_column_names
         },
-        is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_columns], t_s),
+        is_rate_clipped=_is_rate_clipped([recording.columns[name] for name in rate_column_names], t_s),
         energy_height_rate_mps=_sampled_energy_height_rate_mps(
             recording, vehicle, (t_s, stretch_number, step_s)
         ),
@@ -146,11 +148,11 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     return (
         samples
         if reference_airspeed_mps is None
-        else scale_by_dynamic_pressure(samples, reference_airspeed_mps, vehicle.surface_airspeed_powers)
+        else with_airspeed_effects(samples, reference_airspeed_mps, vehicle.surface_airspeed_powers)
     )
 
 
-def scale_by_dynamic_pressure(
+def with_airspeed_effects(
     samples: Samples, reference_airspeed_mps: float, airspeed_powers: Sequence[float] = (2.0,)
 ) -> Samples:
     """The flight with what the airspeed V does of its own: commands times V / reference to the power of each
@@ -160,10 +162,10 @@ def scale_by_dynamic_pressure(
     dynamic_pressure_ratio = np.clip(
         np.nan_to_num(airspeed / reference_airspeed_mps, nan=1.0) ** 2, *_DYNAMIC_PRESSURE_RATIO_LIMITS
     )[:, None]
-    airspeed_products = np.column_stack([samples.rates, samples.signals]) * (
+    products_with_airspeed_deviation = np.column_stack([samples.rates, samples.signals]) * (
         np.sqrt(dynamic_pressure_ratio) - 1.0
     )
-    signals_and_products = np.column_stack([samples.signals, airspeed_products])
+    signals_and_products = np.column_stack([samples.signals, products_with_airspeed_deviation])
     return replace(
         samples,
         commands=samples.commands * dynamic_pressure_ratio ** (0.5 * np.array(airspeed_powers)),
@@ -206,16 +208,16 @@ def whiten_samples(
 
 
 def _used_column_defect_texts(
-    recording: RecordedFlight, used_columns: list[str], rate_columns: list[str]
+    recording: RecordedFlight, used_column_names: list[str], rate_column_names: list[str]
 ) -> Iterator[str]:
     """Yield a line for each mistake in the columns that are used."""
-    for name in used_columns:
+    for name in used_column_names:
         yield from signals.column_defect_texts(
-            name, recording.columns[name], is_measured_rate=name in rate_columns
+            name, recording.columns[name], is_measured_rate=name in rate_column_names
         )
         if (
-            name in rate_columns
-            and (rate_sd := float(np.nanstd(recording.columns[name].values))) > _IMPLAUSIBLE_RATE_SD_RAD_S
+            name in rate_column_names
+            and (rate_sd := float(np.nanstd(recording.columns[name].values))) > _MAX_PLAUSIBLE_RATE_SD_RAD_S
         ):
             yield (
                 f"{name}: spreads {rate_sd:.3g} rad/s, as hardly an aircraft does: is it "
@@ -258,17 +260,21 @@ def _sampled_airspeed(
 
 
 def _sampled_energy_height_rate_mps(
-    recording: RecordedFlight, vehicle: Vehicle, time_base: tuple[Floats, NDArray[np.int64], float]
+    recording: RecordedFlight,
+    vehicle: Vehicle,
+    times_stretches_and_step: tuple[Floats, NDArray[np.int64], float],
 ) -> Floats | None:
-    """As in Samples; time_base: times, stretches and step of the samples."""
-    energy_columns = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    logged_columns = [
-        recording.columns[one.column] for one in energy_columns if one.column in recording.columns
+    """As in Samples; times_stretches_and_step: of the samples."""
+    energy_quantities = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
+    energy_columns = [
+        recording.columns[quantity.column]
+        for quantity in energy_quantities
+        if quantity.column in recording.columns
     ]
-    if len(logged_columns) < 2 or not all(len(column.t_s) > 1 for column in logged_columns):
+    if len(energy_columns) < 2 or not all(len(column.t_s) > 1 for column in energy_columns):
         return None
-    t_s, stretch_number, step_s = time_base
-    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in logged_columns)
+    t_s, stretch_number, step_s = times_stretches_and_step
+    altitude, airspeed = (values_and_mean_age_at(column, t_s, step_s)[0] for column in energy_columns)
     return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
@@ -279,12 +285,12 @@ def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> No
     if attitude and not signals.is_clipped(next(iter(rate_column_by_name.values())).values).any():
         angle_quantities = [attitude.roll, attitude.pitch, attitude.yaw]
         named_angles = [
-            (one.column, columns[one.column]) if one and one.column in columns else None
-            for one in angle_quantities
+            (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
+            for quantity in angle_quantities
         ]
         possible_rate_column_names = [
             *vehicle.signal_columns,
-            *(one.column for one in vehicle.flow.values()),
+            *(quantity.column for quantity in vehicle.flow.values()),
             *vehicle.command_columns,
         ]
         possible_rate_columns = {
@@ -302,9 +308,9 @@ def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> No
 
 def convert_to_si(recording: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
     """A recording with the columns that a vehicle names in SI."""
-    quantity_of_column = {one.column: one for _, one in vehicle.model_quantities()}
-    quantity_of_column |= {one.column: one for one in vehicle.flow.values()}
-    quantity_of_column |= {one.column: one for _, _, one in vehicle.quantities_of_known_kind()}
+    quantity_of_column = {quantity.column: quantity for _, quantity in vehicle.model_quantities()}
+    quantity_of_column |= {quantity.column: quantity for quantity in vehicle.flow.values()}
+    quantity_of_column |= {quantity.column: quantity for _, _, quantity in vehicle.quantities_of_known_kind()}
     converted_columns = {
         name: replace(column, values=quantity_of_column[name].to_si(column.values))
         for name, column in recording.columns.items()
@@ -322,16 +328,18 @@ def mixer_matrix(vehicle: Vehicle) -> Floats:
     return np.array(mixer_rows, dtype=float)
 
 
-def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_columns: list[str]) -> None:
+def _check_columns(
+    recording: RecordedFlight, used_column_names: list[str], rate_column_names: list[str]
+) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
-    missing_names = [name for name in used_columns if name not in recording.columns]
+    missing_names = [name for name in used_column_names if name not in recording.columns]
     if missing_names:
-        nearest_text = nearest_names(missing_names[0], recording.columns)
+        nearest_text = nearest_names_text(missing_names[0], recording.columns)
         reason = f"no column {missing_names[0]}, allowed: a log that has it; it has {nearest_text}"
         raise BadInput(f"{recording.name}: {reason}")
     max_abs_of_column = {}
-    for name in used_columns:
+    for name in used_column_names:
         values = recording.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{recording.name}: column {name} holds no number, allowed: a logged quantity")
@@ -341,7 +349,7 @@ def _check_columns(recording: RecordedFlight, used_columns: list[str], rate_colu
                 f"column {name} holds {max_abs_of_column[name]:g}, allowed: up to {_MAX_LOGGED_MAGNITUDE:g}"
             )
             raise BadInput(f"{recording.name}: {mistake}")
-    for name in rate_columns:
+    for name in rate_column_names:
         if max_abs_of_column[name] > _MAX_BODY_RATE_RAD_S:
             max_rate_rad_s_if_deg_s = np.deg2rad(max_abs_of_column[name])
             deg_hint = (
@@ -378,14 +386,14 @@ def _time_base(
         )
     if rate_hz <= 1.05 * max_rate_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
-    regular_time_base = _regular_time_base(stamps, 1.0 / max_rate_hz)
-    if len(regular_time_base[0]) < _MIN_LOG_SAMPLES:
+    regular_times_stretches_and_step = _regular_time_base(stamps, 1.0 / max_rate_hz)
+    if len(regular_times_stretches_and_step[0]) < _MIN_LOG_SAMPLES:
         raise BadInput(
             f"{flight_name}: {len(stamps)} rows within {stamps[-1] - stamps[0]:.3g} s are "
-            f"{len(regular_time_base[0])} samples at "
+            f"{len(regular_times_stretches_and_step[0])} samples at "
             f"{max_rate_hz:g} Hz, allowed: at least {_MIN_LOG_SAMPLES}; is time in another unit?"
         )
-    return regular_time_base
+    return regular_times_stretches_and_step
 
 
 def _other_time_unit_hint(rate_hz: float) -> str:
@@ -491,45 +499,48 @@ def constant_stretches(values: Floats) -> list[tuple[int, int]]:
     return list(pairwise([0, *change_rows.tolist(), len(values)]))
 
 
-def read_for_vehicle(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
+def read_for_vehicle(path: Path, vehicle: Vehicle, reader_name: str | None = None) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
-    return read_flight(path, *_reader_arguments(vehicle, reader))
+    return read_flight(path, *_reader_arguments(vehicle, reader_name))
 
 
 def read_parts_for_vehicle(
-    path: Path, vehicle: Vehicle, reader: str | None = None
+    path: Path, vehicle: Vehicle, reader_name: str | None = None
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
-    return read_parts(path, *_reader_arguments(vehicle, reader))
+    return read_parts(path, *_reader_arguments(vehicle, reader_name))
 
 
 def _reader_arguments(
-    vehicle: Vehicle, reader: str | None
+    vehicle: Vehicle, reader_name: str | None
 ) -> tuple[str | None, tuple[str, str] | None, list[str]]:
     time_column_and_unit = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
-    return reader or vehicle.reader, time_column_and_unit, vehicle.column_names()
+    return reader_name or vehicle.reader, time_column_and_unit, vehicle.column_names()
 
 
-def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
+def stream_flights(
+    paths: Sequence[Path], vehicle: Vehicle, reader_name: str | None = None
+) -> Iterator[Samples]:
     """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
     that cannot be used."""
-    short_flights_or_none = [
-        one if one.n_log_parts == 1 else None for one in load_flights_for_fit(paths, vehicle, reader)
+    flights_none_where_long = [
+        flight if flight.n_log_parts == 1 else None
+        for flight in load_flights_for_fit(paths, vehicle, reader_name)
     ]
-    for path, samples in zip(paths, short_flights_or_none, strict=True):
+    for path, samples in zip(paths, flights_none_where_long, strict=True):
         if samples is not None:
             yield samples
             continue
-        for recording in read_parts_for_vehicle(path, vehicle, reader):
+        for recording in read_parts_for_vehicle(path, vehicle, reader_name):
             yield resample(recording, vehicle)
 
 
-def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
+def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader_name: str | None) -> Samples:
     """A flight; of a long one stretches that are spread over it evenly."""
     kept_stretches: list[Samples] = []
     keep_every_nth_stretch, n_stretches_seen, read_until_s = 1, 0, -np.inf
-    for part_number, recording in enumerate(read_parts_for_vehicle(path, vehicle, reader), 1):
+    for part_number, recording in enumerate(read_parts_for_vehicle(path, vehicle, reader_name), 1):
         samples = resample(recording, vehicle)
         for begin in range(
             int(np.searchsorted(samples.t_s, read_until_s, side="right")),
@@ -566,28 +577,28 @@ def _select_rows(samples: Samples, rows: slice) -> Samples:
     )
 
 
-def _concatenate_samples(name: str, flights: list[Samples], n_log_parts: int) -> Samples:
-    """Samples one after the other, with a gap between."""
-    field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(flights[0], name) is not None]
+def _concatenate_samples(name: str, stretches: list[Samples], n_log_parts: int) -> Samples:
+    """Samples of stretches one after the other, with a gap between."""
+    field_names = [name for name in _PER_SAMPLE_FIELDS if getattr(stretches[0], name) is not None]
     joined_fields: dict[str, Any] = {
-        name: np.concatenate([getattr(one, name) for one in flights]) for name in field_names
+        name: np.concatenate([getattr(stretch, name) for stretch in stretches]) for name in field_names
     }
     is_stretch_begin = (
         np.diff(joined_fields["stretch_number"], prepend=joined_fields["stretch_number"][0]) != 0
     )
-    is_stretch_begin[np.cumsum([len(one.t_s) for one in flights])[:-1]] = True
+    is_stretch_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
     joined_fields["stretch_number"] = np.cumsum(is_stretch_begin)
     time_since_change_s = {
-        name: np.concatenate([one.time_since_change_s[name] for one in flights])
-        for name in flights[0].time_since_change_s
+        name: np.concatenate([stretch.time_since_change_s[name] for stretch in stretches])
+        for name in stretches[0].time_since_change_s
     }
     long_log_note = (
         f"a long log, read in {n_log_parts} parts: {len(is_stretch_begin)} samples of it, spread evenly, are "
         "looked at"
     )
-    notes = (long_log_note, *dict.fromkeys(note for one in flights for note in one.notes))
+    notes = (long_log_note, *dict.fromkeys(note for stretch in stretches for note in stretch.notes))
     return replace(
-        flights[0],
+        stretches[0],
         name=name,
         notes=notes,
         n_log_parts=n_log_parts,
@@ -597,14 +608,16 @@ def _concatenate_samples(name: str, flights: list[Samples], n_log_parts: int) ->
     )
 
 
-def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
+def load_flights_for_fit(
+    paths: Sequence[Path], vehicle: Vehicle, reader_name: str | None = None
+) -> list[Samples]:
     """The flights, each on one time base, of a long one what a fit wants of it. Raises BadInput with a line
     for each that cannot be used."""
     flights: list[Samples] = []
     mistakes: list[str] = []
     for path in paths:
         try:
-            flights.append(_read_flight_for_fit(path, vehicle, reader))
+            flights.append(_read_flight_for_fit(path, vehicle, reader_name))
         except BadInput as error:
             mistakes.append(str(error))
     for name, n_flights_of_name in Counter(samples.name for samples in flights).items():

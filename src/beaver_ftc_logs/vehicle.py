@@ -42,7 +42,7 @@ _STILL_AIR_MAX_RATE_HZ, _MOVING_AIR_MAX_RATE_HZ = 20.0, 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
-_VEHICLE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
+_SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
 
@@ -281,7 +281,7 @@ class Vehicle(Section):
         reason = (
             "a surface's name has letters, digits, - and _ only, allowed: one"  # it is part of a column's
         )
-        bad_names = [name for name in self.surfaces if not _VEHICLE_NAME_PATTERN.fullmatch(name)]
+        bad_names = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad_names]
         for surface, weight_by_command in self.surfaces.items():
             mistakes += _unknown_name_mistakes(
@@ -299,7 +299,7 @@ class Vehicle(Section):
             if quantity.unit is not None and KIND_AND_SI_FACTOR_OF_UNIT[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._columns_read_in_two_ways()
+        mistakes += self._doubly_read_column_mistakes()
         refuse(mistakes)
         return self
 
@@ -325,7 +325,7 @@ class Vehicle(Section):
                 quantities.append((("flow", name), ANGLE, self.flow[name]))
         return quantities
 
-    def _columns_read_in_two_ways(self) -> list[Conflict]:
+    def _doubly_read_column_mistakes(self) -> list[Conflict]:
         """One column read in two ways."""
         first_quantity_of_column: dict[str, QuantityColumn] = {}
         for location, quantity in [
@@ -380,10 +380,10 @@ class Vehicle(Section):
     @property
     def signal_regressor_names(self) -> list[str]:
         """Return the regressors besides the rates' own past: signals, and the products of both with the
-        airspeed (`samples.scale_by_dynamic_pressure`)."""
-        rate_columns = [getattr(self.rates, axis).column for axis in "pqr"]
+        airspeed (`samples.with_airspeed_effects`)."""
+        rate_column_names = [getattr(self.rates, axis).column for axis in "pqr"]
         names_multiplied_by_airspeed = (
-            rate_columns + self.signal_columns if self.reference_airspeed_mps is not None else []
+            rate_column_names + self.signal_columns if self.reference_airspeed_mps is not None else []
         )
         return self.signal_columns + [f"{name} by airspeed" for name in names_multiplied_by_airspeed]
 

@@ -18,7 +18,7 @@ from beaver_ftc_logs.readers.text import (
     read_cells,
     text_cell_and_layout_remarks,
 )
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.units import SECONDS_PER_TIME_UNIT
 
 TIME_COLUMN = "t_s"
@@ -64,7 +64,7 @@ def read_parts(
         allowed_text = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         raise BadInput(
             f"{path}: no column {time_column}, allowed: {allowed_text}; it has "
-            f"{nearest_names(time_column, all_columns)}"
+            f"{nearest_names_text(time_column, all_columns)}"
         )
     for part_number, (cells, column_remarks, has_more) in enumerate(parts, 1):
         table = _with_unread_columns_as_nan(all_columns, cells)

@@ -258,10 +258,10 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     flights = [flown((1.0,), 0.5, 2000, 31)]
     model = moving.model_copy(update={"noise_models": moving.noise_models[:1]})
     found = identification.add_unseen_noise_models(model, flights)
-    gyros, others = found.noise_models[-len(samples.UNSEEN_GYRO_NOISE_RAD_S) :], found.noise_models[1:]
+    gyros, others = found.noise_models[-len(samples.ADDED_GYRO_NOISE_LEVELS_RAD_S) :], found.noise_models[1:]
     others = others[: -len(gyros)]
     assert found.noise_models[0] == model.noise_models[0]
-    assert {tuple(one.ma_coefficients) for one in others} == {*samples.UNSEEN_NOISE_MA_COEFFICIENTS} - {
+    assert {tuple(one.ma_coefficients) for one in others} == {*samples.ADDED_NOISE_MA_COEFFICIENTS} - {
         tuple(model.noise_models[0].ma_coefficients)
     }
     for one in others:

@@ -171,7 +171,7 @@ def diagnose_inputs(
     )
     rows_by_reason = _undiagnosable_rows_by_reason(
         input_arrays[1], diagnosed_aircraft.aircraft, aircraft_inputs.has_missing_value, gap_free_stretches
-    ) | _unexplained_start_rows_by_reason(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
+    ) | _rows_after_unexplained_start_by_reason(samples.t_s, gap_free_stretches, replayed_flight_verdicts)
     rows = rows.without_verdict(_add_rows_after_doubtful_alarm(gap_free_stretches, rows, rows_by_reason))
     return rows, _verdict_document(
         samples, rows, replayed_flight_verdicts, diagnosed_aircraft, aircraft_inputs.mean_age_s_by_held_column
@@ -184,7 +184,7 @@ def _check_command_signs(
     """Raise BadInput if the rates respond to a command with the opposite sign in every part of a stretch."""
     for surface, gain_upper_bound in zip(
         aircraft.surfaces,
-        np.min([one.command_gain_upper_bounds for one in replayed_verdicts_by_stretch], axis=0),
+        np.min([replayed.command_gain_upper_bounds for replayed in replayed_verdicts_by_stretch], axis=0),
         strict=True,
     ):
         if gain_upper_bound < trust.MAX_REVERSED_GAIN:
@@ -319,8 +319,10 @@ def _gap_free_stretches(samples: Samples, has_missing_value: Mask, rate_hz: floa
     is_known = ~has_missing_value
     joins_next_row = is_known[1:] & is_known[:-1] & ~is_uneven_step
     stretch_edges = np.flatnonzero(np.diff(np.concatenate([[False], joins_next_row, [False]]).astype(int)))
-    begin_end_pairs = zip(stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True)
-    return [(begin, end + 1) for begin, end in begin_end_pairs if end + 1 - begin >= _MIN_STRETCH_SAMPLES]
+    first_and_last_rows = zip(stretch_edges[::2].tolist(), stretch_edges[1::2].tolist(), strict=True)
+    return [
+        (first, last + 1) for first, last in first_and_last_rows if last + 1 - first >= _MIN_STRETCH_SAMPLES
+    ]
 
 
 def _join_stretch_verdicts(
@@ -370,7 +372,7 @@ def _undiagnosable_rows_by_reason(
     }
 
 
-def _unexplained_start_rows_by_reason(
+def _rows_after_unexplained_start_by_reason(
     t_s: Floats, gap_free_stretches: list[tuple[int, int]], replayed_flight_verdicts: ReplayedVerdicts
 ) -> dict[str, Mask]:
     """The rows (n,), with their reason, from the alarm on of stretches in which no fault explains the

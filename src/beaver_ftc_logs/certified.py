@@ -24,18 +24,18 @@ def write_certificate(aircraft_inputs: AircraftDiagnosisInputs, rows: DiagnosisR
         for stretch in aircraft_inputs.gap_free_stretches
         if rows.faulty[stretch[0] : stretch[1]].any()
     )
-    start, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
-    stretch_inputs = [np.ascontiguousarray(stretch[start:end]) for stretch in aircraft_inputs.input_arrays]
+    begin, end = next(stretches_with_alarm, aircraft_inputs.gap_free_stretches[0])
+    stretch_inputs = [np.ascontiguousarray(array[begin:end]) for array in aircraft_inputs.input_arrays]
     diagnosis = aircraft_inputs.diagnosis
 
-    def step_frames() -> Iterator[int]:
+    def step_samples() -> Iterator[int]:
         for sample_index, sample in enumerate(zip(*stretch_inputs, strict=True)):
             diagnosis.step(*sample)
             yield sample_index
 
     diagnosis.reset()
-    frames, scenario = diagnosis.inside()
+    frame_record, scenario = diagnosis.inside()
     named_scenario = scenario.model_copy(update={"name": aircraft_inputs.samples.name})
-    log, document = by_frames.proved(named_scenario, frames, step_frames())
-    document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[start])})
+    log, document = by_frames.proved(named_scenario, frame_record, step_samples())
+    document = certificate.with_digest(document | {"begins_s": float(aircraft_inputs.samples.t_s[begin])})
     by_frames.write(named_scenario, log, document, folder)

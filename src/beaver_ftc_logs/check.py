@@ -168,14 +168,14 @@ def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> li
     return comparison_texts
 
 
-def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column: str, rate_column: str) -> str:
+def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column_name: str, rate_column_name: str) -> str:
     agreement_text = (
         "they agree"
         if abs(fit.correlation) > _MIN_ANGLE_RATE_CORRELATION
         else "they tell nothing of one another"
     )
     return (
-        f"the change of {angle_column} is {fit.slope:.3f} times the integral of {rate_column} "
+        f"the change of {angle_column_name} is {fit.slope:.3f} times the integral of {rate_column_name} "
         f"(correlation {fit.correlation:.2f}): {agreement_text}"
     )
 
@@ -189,10 +189,12 @@ def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Docume
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
     reader_name = reader or detect_reader(path)
-    time_column_and_unit = _find_time_column(path, remarks) if reader_name == "table" else None
+    time_column_and_unit = _find_time_column_and_unit(path, remarks) if reader_name == "table" else None
     recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column_and_unit, recognized_columns))
-    names_with_numbers = [name for name, one in recording.columns.items() if np.isfinite(one.values).any()]
+    names_with_numbers = [
+        name for name, column in recording.columns.items() if np.isfinite(column.values).any()
+    ]
     column_of_quantity = {
         quantity: _matching_column(pattern, names_with_numbers)
         for quantity, pattern in _COLUMN_NAME_PATTERNS.items()
@@ -254,8 +256,8 @@ def _propose_vehicle(
             axis: _vehicle_file_column_entry(str(name), angle_unit, "rad")
             for axis, name in angle_column_names.items()
         }
-    if z_acceleration_column := column_of_quantity["az"]:
-        median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column].values)))
+    if z_acceleration_column_name := column_of_quantity["az"]:
+        median_magnitude = float(np.nanmedian(np.abs(columns[z_acceleration_column_name].values)))
         acceleration_unit = (
             nearest_unit(ACCELERATION, KIND_AND_SI_FACTOR_OF_UNIT["g"][1] / median_magnitude, 2.0)
             if median_magnitude > 0.0
@@ -263,7 +265,7 @@ def _propose_vehicle(
         )
         if acceleration_unit:
             vehicle["acceleration"] = _vehicle_file_column_entry(
-                z_acceleration_column, acceleration_unit, "m/s2"
+                z_acceleration_column_name, acceleration_unit, "m/s2"
             )
     if column_of_quantity["airspeed"]:
         vehicle["airspeed"] = column_of_quantity["airspeed"]
@@ -272,11 +274,11 @@ def _propose_vehicle(
 
 def _recognized_columns(names: Iterable[str]) -> list[str]:
     """Columns of a table that may be something: a wide one is not read whole."""
-    pattern = "|".join(f"({one})" for one in _COLUMN_NAME_PATTERNS.values())
+    pattern = "|".join(f"({quantity_pattern})" for quantity_pattern in _COLUMN_NAME_PATTERNS.values())
     recognized = [
         name
         for name in names
-        if re.fullmatch(pattern, _normalized_name(name)) or _may_be_command_column(name)
+        if re.fullmatch(pattern, _snake_case_name(name)) or _may_be_command_column(name)
     ]
     return recognized[:_MAX_READ_COLUMNS]
 
@@ -288,7 +290,7 @@ def _may_be_command_column(column_name: str) -> bool:
     )
 
 
-def _normalized_name(column_name: str) -> str:
+def _snake_case_name(column_name: str) -> str:
     """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
     name_with_unit_suffix = re.sub(
         r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", column_name.strip().lower()
@@ -301,7 +303,7 @@ def _matching_column(pattern: str, names: Sequence[str]) -> str | None:
     matching_names = [
         name
         for name in names
-        if re.fullmatch(pattern, _normalized_name(name)) and not _may_be_command_column(name)
+        if re.fullmatch(pattern, _snake_case_name(name)) and not _may_be_command_column(name)
     ]
     return min(matching_names, key=lambda name: (len(name), name), default=None)
 
@@ -313,13 +315,13 @@ def _command_columns(names: Sequence[str], column_of_quantity: dict[str, str | N
     ][:_MAX_PROPOSED_COMMANDS]
 
 
-def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
+def _find_time_column_and_unit(path: Path, remarks: list[str]) -> tuple[str, str]:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     table_columns = column_names(path)
-    time_like_columns = [
-        name for name in table_columns if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _normalized_name(name))
+    columns_named_like_time = [
+        name for name in table_columns if re.fullmatch(_COLUMN_NAME_PATTERNS["time"], _snake_case_name(name))
     ]
-    for name in sorted(time_like_columns, key=lambda name: name != TIME_COLUMN):
+    for name in sorted(columns_named_like_time, key=lambda name: name != TIME_COLUMN):
         stamps = first_numbers_of_column(path, name)
         median_step = float(np.median(np.diff(stamps[np.isfinite(stamps)][:50]))) if len(stamps) > 1 else 0.0
         plausible_units = [
@@ -329,7 +331,8 @@ def _find_time_column(path: Path, remarks: list[str]) -> tuple[str, str]:
         ]
         if plausible_units:
             unit = next(
-                (one for one in plausible_units if _normalized_name(name).endswith(one)), plausible_units[0]
+                (unit for unit in plausible_units if _snake_case_name(name).endswith(unit)),
+                plausible_units[0],
             )
             if (name, unit) != (TIME_COLUMN, "s"):
                 remarks.append(f"time is in column {name}, its steps fit {unit}")

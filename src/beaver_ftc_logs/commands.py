@@ -70,8 +70,8 @@ def identify(
     from beaver_ftc_logs.samples import load_flights_for_fit
     from beaver_ftc_logs.vehicle import load_vehicle, with_false_alarm_rate
 
-    page = out.with_suffix(".html")
-    refuse_to_replace_foreign_file(page)
+    page_path = out.with_suffix(".html")
+    refuse_to_replace_foreign_file(page_path)
     loaded_vehicle = load_vehicle(vehicle)
     if false_alarms_per_hour is not None:
         loaded_vehicle = with_false_alarm_rate(loaded_vehicle, false_alarms_per_hour)
@@ -80,21 +80,25 @@ def identify(
     )
     model = identify(loaded_flights, loaded_vehicle)
     page_html = render_identification(loaded_flights, model)
-    for path, text in ((out, as_text(model)), (page, page_html)):
+    for path, text in ((out, as_text(model)), (page_path, page_html)):
         with clear_disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, text.encode("utf-8"))
     document = {
         "model": str(out),
-        "page": str(page),
+        "page": str(page_path),
         "identified": model.identification_results,
         "settings": model.settings.model_dump(by_alias=True),
     }
-    long_log_lines = [f"  {one.name}: {one.notes[0]}" for one in loaded_flights if one.n_log_parts > 1]
+    long_log_lines = [
+        f"  {samples.name}: {samples.notes[0]}" for samples in loaded_flights if samples.n_log_parts > 1
+    ]
     answer(
         format,
         document,
-        lambda: "\n".join([identification_text(model), *long_log_lines, f"model: {out}", f"page: {page}"]),
+        lambda: "\n".join(
+            [identification_text(model), *long_log_lines, f"model: {out}", f"page: {page_path}"]
+        ),
     )
 
 
@@ -109,15 +113,15 @@ def _check_logs(
         reason = f"{out} exists, allowed: another name" if out.exists() else "a vehicle file is given already"
         raise BadInput(f"identify: --check --out: {reason}")
     findings = [check_log(path, loaded_vehicle, reader) for path in flights]
-    guessed_vehicle = next((one["vehicle"] for one in findings if one["vehicle"]), None)
-    texts = [as_text(one) for one in findings]
+    guessed_vehicle = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
+    texts = [as_text(finding) for finding in findings]
     if guessed_vehicle is not None and out is not None:
         _write_vehicle_file(out, vehicle_file_text(guessed_vehicle))
         texts.append(f"vehicle file: {out}")
     elif guessed_vehicle is not None:
         texts.append(vehicle_file_text(guessed_vehicle))
     answer(format, {"logs": findings, "vehicle": guessed_vehicle}, lambda: "\n".join(texts))
-    if not all(one["usable"] for one in findings):
+    if not all(finding["usable"] for finding in findings):
         raise typer.Exit(2)
 
 

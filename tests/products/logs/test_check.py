@@ -323,7 +323,7 @@ def test_names_as_the_patterns_have_them():
         " Roll Rate [deg/s] ": "roll_rate_deg_s", "gyro_rad[0]": "gyro_rad[0]", "Time (ms)": "time_ms",
         "a / b": "a_b",
     }  # fmt: skip
-    assert {name: check._normalized_name(name) for name in spelled} == spelled
+    assert {name: check._snake_case_name(name) for name in spelled} == spelled
     plain = {"my log/2": "my_log_2", "__": "log", "a" * 101: "a" * 100, "_b-1_": "b-1"}
     assert {name: check._as_vehicle_or_surface_name(name) for name in plain} == plain
     rates = ["gyro_x_cmd", "IMU.GyrX", "rolling", "gyro_x", "GyrX"]
@@ -364,9 +364,9 @@ def test_time_is_the_column_whose_steps_fit_a_log(tmp_path, text, found, lines):
     path.write_text(text)
     if found is None:
         with pytest.raises(BadInput, match=r"no column of time, allowed: a table with t_s in seconds"):
-            check._find_time_column(path, said)
+            check._find_time_column_and_unit(path, said)
         return
-    assert (check._find_time_column(path, said), said) == (found, lines)
+    assert (check._find_time_column_and_unit(path, said), said) == (found, lines)
 
 
 @pytest.mark.parametrize(("down", "acceleration"), [

@@ -50,7 +50,7 @@ LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
 _MIN_LOSS_STANDARD_ERRORS = 5.0
 _STANDARD_ERRORS_OF_90_PERCENT = 1.645
-LOOP_SURFACES_FOR_GROUPS = ("aileron", "elevator", "rudder")
+LOOP_SURFACE_BY_GROUP_INDEX = ("aileron", "elevator", "rudder")
 _N_LOOP_SURFACES_WITH_FLAP = 4
 _DECLARED_GYRO_NOISE_RAD_S = 1e-4
 BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
@@ -59,17 +59,17 @@ BANK_OF_FILTERS_DETECTOR = "bank-of-filters"
 def _diagnose_by_least_squares(samples: Samples, model: Model, forgets_exponentially: bool) -> DiagnosisRows:
     """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened."""
     regressors, residual = _whitened_effectiveness_change_regression(samples, model)
-    information = _fading_or_sliding_sums(
+    information_matrix = _fading_or_sliding_sums(
         np.einsum("nai,naj->nij", regressors, regressors), samples.dt_s, forgets_exponentially
     )
-    score_vector = _fading_or_sliding_sums(
+    information_vector = _fading_or_sliding_sums(
         np.einsum("nai,na->ni", regressors, residual), samples.dt_s, forgets_exponentially
     )
     prior_information = np.diag(
         [*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(regressors.shape[2] - 3, 4.0)]
     )
-    estimate_covariance = np.linalg.inv(information + prior_information)
-    trim_and_effectiveness_change = np.einsum("nij,nj->ni", estimate_covariance, score_vector)
+    estimate_covariance = np.linalg.inv(information_matrix + prior_information)
+    trim_and_effectiveness_change = np.einsum("nij,nj->ni", estimate_covariance, information_vector)
     effectiveness_standard_error = np.sqrt(
         np.maximum(np.diagonal(estimate_covariance, axis1=1, axis2=2)[:, 3:], 0.0)
     )
@@ -179,17 +179,17 @@ def diagnose_by_freeze_rule(
 ) -> DiagnosisRows | None:
     """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
     surface_names = list(model.vehicle.surfaces)
-    servo_outputs = model.vehicle.outputs
-    servo_output_column_by_surface = {
-        name: servo_output.column
-        for name, servo_output in servo_outputs.items()
-        if servo_output.column in recording.columns
+    quantity_column_by_surface = model.vehicle.outputs
+    servo_output_column_name_by_surface = {
+        name: quantity_column.column
+        for name, quantity_column in quantity_column_by_surface.items()
+        if quantity_column.column in recording.columns
     }
-    if not servo_output_column_by_surface:
+    if not servo_output_column_name_by_surface:
         return None
     is_frozen = np.zeros((len(samples.t_s), len(surface_names)), dtype=bool)
-    for name in servo_output_column_by_surface:
-        column = recording.columns[servo_output_column_by_surface[name]]
+    for name in servo_output_column_name_by_surface:
+        column = recording.columns[servo_output_column_name_by_surface[name]]
         last_output_rows = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
         differs_from_previous_row = np.concatenate([[True], np.diff(column.values) != 0.0])
         unchanged_since_s = column.t_s[
@@ -224,10 +224,10 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     Where the model cannot predict (a gap, a lost sample) the innovation is 0.
     """
     surface_groups = surface_indices_by_group(model)
-    if len(surface_groups) > len(LOOP_SURFACES_FOR_GROUPS):
+    if len(surface_groups) > len(LOOP_SURFACE_BY_GROUP_INDEX):
         raise BadInput(
             f"{model.vehicle.name}: {len(surface_groups)} groups of surfaces, allowed for a detector of the "
-            f"loop: at most {len(LOOP_SURFACES_FOR_GROUPS)}"
+            f"loop: at most {len(LOOP_SURFACE_BY_GROUP_INDEX)}"
         )
     is_predictable, rates_unexplained_by_past, group_responses = unexplained_rates_and_responses(
         samples, model
@@ -279,7 +279,7 @@ def loop_detector_context(model: Model) -> Context:
         trim_rad=np.zeros(_N_LOOP_SURFACES_WITH_FLAP),
         travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP_SURFACES_WITH_FLAP)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
-        surfaces=(*LOOP_SURFACES_FOR_GROUPS, "flap"),
+        surfaces=(*LOOP_SURFACE_BY_GROUP_INDEX, "flap"),
         declared=Declared(noise=declared_noise_sd, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
@@ -298,10 +298,10 @@ def diagnosis_rows_from_verdicts(verdicts: list[Verdict], samples: Samples, mode
     effectiveness, effectiveness_low = np.ones((2, n_samples, len(model.vehicle.surfaces)))
     isolated_names = np.full(n_samples, "", dtype=object)
     for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACES_FOR_GROUPS[: len(surface_groups)]:
+        if verdicts[k].isolated not in LOOP_SURFACE_BY_GROUP_INDEX[: len(surface_groups)]:
             isolated_names[k], effectiveness_low[k] = UNKNOWN_SURFACE, 0.0
             continue
-        group_index = LOOP_SURFACES_FOR_GROUPS.index(str(verdicts[k].isolated))
+        group_index = LOOP_SURFACE_BY_GROUP_INDEX.index(str(verdicts[k].isolated))
         isolated_names[k], effectiveness_low[k, surface_groups[group_index]] = (
             "+".join(model.groups[group_index]),
             0.0,

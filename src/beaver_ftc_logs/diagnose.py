@@ -124,12 +124,12 @@ def finalize_rows_at_log_stamps(
     rows = _add_surfaces_of_unknown_effect_to_names(
         samples, model, _withdraw_isolation_after_engine_failure(samples, model, rows)
     )
-    has_known_gain = np.array(trust.is_group_gain_known(model), dtype=float)[None]
-    has_unknown_gain = np.broadcast_to(
-        expand_group_values_to_surfaces(has_known_gain, model) == 0.0, rows.effectiveness_low.shape
+    is_group_gain_known = np.array(trust.is_group_gain_known(model), dtype=float)[None]
+    is_surface_gain_unknown = np.broadcast_to(
+        expand_group_values_to_surfaces(is_group_gain_known, model) == 0.0, rows.effectiveness_low.shape
     )
     return _rows_at_log_stamps(
-        samples, rows.without_estimate(has_unknown_gain).without_verdict(rows_by_reason)
+        samples, rows.without_estimate(is_surface_gain_unknown).without_verdict(rows_by_reason)
     )
 
 
@@ -158,7 +158,7 @@ def _add_surfaces_of_unknown_effect_to_names(
         if not named_surfaces <= set(surfaces):
             continue
         is_in_name = np.array(
-            [one in named_surfaces or bool(may_be_added[k, i]) for i, one in enumerate(surfaces)]
+            [surface in named_surfaces or bool(may_be_added[k, i]) for i, surface in enumerate(surfaces)]
         )
         names_by_row[k] = "+".join(compress(surfaces, is_in_name))
         if is_in_name.sum() > len(named_surfaces) or (
@@ -298,7 +298,8 @@ def diagnosis_rows_from_posterior(
         for group_index in range(len(model.groups))
     ]
     effectiveness, effectiveness_low, effectiveness_high = (
-        np.column_stack(arrays) for arrays in zip(*estimate_and_bounds_by_group, strict=True)
+        np.column_stack(values_by_group)
+        for values_by_group in zip(*estimate_and_bounds_by_group, strict=True)
     )
     has_no_response = no_response_probability > _MAX_NO_RESPONSE_PROBABILITY
     (
@@ -350,20 +351,22 @@ def _group_effectiveness_and_bounds(
 
 def _has_held_long_enough(condition: NDArray[np.bool_], model: Model) -> NDArray[np.bool_]:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    min_held_samples = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
-    held_samples = np.arange(len(condition)) - np.maximum.accumulate(
+    confirmation_samples = round(model.settings.alarm_confirmation_time_s * model.rate_hz)
+    samples_since_false = np.arange(len(condition)) - np.maximum.accumulate(
         np.where(condition, -1, np.arange(len(condition)))
     )
-    return np.asarray(condition & (held_samples > min_held_samples))
+    return np.asarray(condition & (samples_since_false > confirmation_samples))
 
 
 def _latch_until_healthy(
-    is_raised: NDArray[np.bool_], is_health_likelier: NDArray[np.bool_]
+    is_raised: NDArray[np.bool_], is_health_or_no_response_likelier: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """An alarm once raised stands until health is the likelier again."""
     row_indices = np.arange(len(is_raised))
     last_raised_row = np.maximum.accumulate(np.where(is_raised, row_indices, -1))
-    last_healthy_row = np.maximum.accumulate(np.where(is_health_likelier & ~is_raised, row_indices, -1))
+    last_healthy_row = np.maximum.accumulate(
+        np.where(is_health_or_no_response_likelier & ~is_raised, row_indices, -1)
+    )
     return np.asarray((last_raised_row >= 0) & (last_raised_row > last_healthy_row))
 
 
@@ -412,11 +415,11 @@ def _surfaces_at_fault(
     out.
     """
     fault_probability = np.maximum(posterior[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    group_shares_of_fault = [
+    share_of_fault_by_group = [
         posterior[:, bank.is_fault_of_group(group_index)].sum(axis=1) / fault_probability
         for group_index in range(len(model.groups))
     ]
-    group_share_of_fault = np.column_stack(group_shares_of_fault)
+    group_share_of_fault = np.column_stack(share_of_fault_by_group)
     is_group_likely = (group_share_of_fault > _MIN_FAULT_PROBABILITY_SHARE_FOR_NAME) & has_isolation_evidence[
         :, None
     ]

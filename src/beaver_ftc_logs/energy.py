@@ -58,8 +58,8 @@ def withdraw_surfaces_where_engine_may_have_failed(
         is_rising = energy_height_rate_mps[evidence_begin_row:end] > 0.0
         index_since_evidence_begin = np.arange(end - evidence_begin_row)
         last_falling_index, last_rising_index = (
-            np.maximum.accumulate(np.where(one, index_since_evidence_begin, -1))
-            for one in (falls_as_without_power, is_rising)
+            np.maximum.accumulate(np.where(condition, index_since_evidence_begin, -1))
+            for condition in (falls_as_without_power, is_rising)
         )
         may_engine_have_failed = (last_falling_index > last_rising_index)[begin - evidence_begin_row :]
         falling_share = np.cumsum(falls_as_without_power[begin - evidence_begin_row :]) / np.arange(

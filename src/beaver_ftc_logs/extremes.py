@@ -74,20 +74,21 @@ def peaks_between_zeros(statistic: Floats) -> Floats:
 
 def fit_peak_tail(held_out_peaks_and_hours: Sequence[PeaksAndHours]) -> PeakTail | None:
     """The tail of the peaks of all held-out flights; None if there are at most ten peaks."""
-    sorted_peaks = np.sort(
+    descending_peaks = np.sort(
         np.concatenate([peaks_of_flight for peaks_of_flight, _ in held_out_peaks_and_hours])
         if held_out_peaks_and_hours
         else []
     )[::-1]
-    if len(sorted_peaks) <= _MIN_PEAKS:
+    if len(descending_peaks) <= _MIN_PEAKS:
         return None
     n_peaks_over_level = min(
-        max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(sorted_peaks)))), len(sorted_peaks) - 1
+        max(_MIN_PEAKS, int(_PEAKS_PER_ROOT_OF_COUNT * np.sqrt(len(descending_peaks)))),
+        len(descending_peaks) - 1,
     )
-    tail_start_level = float(sorted_peaks[n_peaks_over_level])
+    tail_start_level = float(descending_peaks[n_peaks_over_level])
     return PeakTail(
         level=tail_start_level,
-        excess=(sorted_peaks[:n_peaks_over_level] - tail_start_level).tolist(),
+        excess=(descending_peaks[:n_peaks_over_level] - tail_start_level).tolist(),
         minutes=60.0 * sum(hours for _, hours in held_out_peaks_and_hours),
         dispersion=_excess_overdispersion(
             [

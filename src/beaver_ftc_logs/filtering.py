@@ -52,10 +52,10 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_flight_noise = model.with_noise_model(samples.noise_ma_coefficients)
+    model_with_noise_model = model.with_noise_model(samples.noise_ma_coefficients)
     command_delay_candidates_s = model.settings.command_delay_candidates_s
     bank_runs = [
-        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_flight_noise, bank)
+        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_model, bank)
         for delay_s in command_delay_candidates_s
     ]
     return _average_bank_runs(
@@ -69,8 +69,8 @@ def _posterior_averaged_over_noise_models(
     """The average over the noise models. The bank is run with each up to the last sample at which its weight
     is not negligible: within a second most become far less likely than another, and stay so."""
     whitened_flights_and_models = [
-        (whiten_samples(samples, one.ma_coefficients), model.with_single_noise_model(one))
-        for one in model.noise_models
+        (whiten_samples(samples, noise_model.ma_coefficients), model.with_single_noise_model(noise_model))
+        for noise_model in model.noise_models
     ]
     sample_log_likelihoods_by_model = [
         _noise_model_log_likelihood(
@@ -446,7 +446,7 @@ def _correct_hypotheses(
     n_hypotheses, n_states = state_means.shape
     log_likelihoods = np.empty(n_hypotheses)
     squared_residuals = np.empty(n_hypotheses)
-    zero_mean, zero_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
+    zero_state_mean, zero_state_covariance = np.zeros(n_states), np.zeros((n_states, n_states))
     noise_covariance = noise.covariance * noise_variance_scale
     t_degrees_of_freedom = noise.t_degrees_of_freedom
     for h in range(n_hypotheses):
@@ -459,7 +459,12 @@ def _correct_hypotheses(
         )
         if h == n_hypotheses - 1:
             squared_residuals[h], log_determinant = _update_gaussian(
-                zero_mean, zero_covariance, rates_unexplained_by_past, sensitivity, noise_covariance, noise
+                zero_state_mean,
+                zero_state_covariance,
+                rates_unexplained_by_past,
+                sensitivity,
+                noise_covariance,
+                noise,
             )
         else:
             squared_residuals[h], log_determinant = _update_gaussian(

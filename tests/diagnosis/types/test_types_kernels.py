@@ -641,7 +641,7 @@ def test_a_type_that_no_longer_holds_is_excluded_unless_a_return_explains_it(
         if released_surface_returns_via_actuator
         else held_surface.STATUS_REFUTED
     )
-    judged(held_surface.held_or_returning_set, fdi, surface, STUCK, -0.1, 0.1)
+    judged(held_surface.consistent_held_or_returning_interval, fdi, surface, STUCK, -0.1, 0.1)
     assert surface["feasible_sets"]["excluded"][STUCK] == (not released_surface_returns_via_actuator)
     assert surface["release"]["has_released"][STUCK] == released_surface_returns_via_actuator
     fdi, surface = released(judged=(0.2, 0.3))
@@ -839,7 +839,10 @@ def test_where_the_effectiveness_changes_a_return_has_a_share_of_its_way_as_room
     surface["judged_observation"]["position_low"], surface["judged_observation"]["position_high"] = (
         (-1.0, beyond) if side == "low" else (beyond, 1.0)
     )
-    assert on(held_surface.narrow_return_interval, fdi, surface, held_surface.LATER_RELEASE, STUCK) == inside
+    assert (
+        on(held_surface.narrow_return_position_interval, fdi, surface, held_surface.LATER_RELEASE, STUCK)
+        == inside
+    )
     if inside:  # nearly all that could have been let go is left out; but the ends may not pass
         assert held["return_position_low"][1, STUCK] <= held["return_position_high"][1, STUCK]
         kept = held["return_position_low" if side == "low" else "return_position_high"][1, STUCK]

@@ -67,16 +67,16 @@ def is_release_possible(surface, release_slot, type_index):
 
 
 @kernel
-def reset_releases(surface, type_index):
+def allow_release_before_alarm(surface, type_index):
     """Allow a release before the alarm, from anywhere in the travel."""
     clear_releases(surface, EARLIER_RELEASE, type_index)
     surface.release.return_position_low[LATER_RELEASE, type_index] = surface.actuator.travel_low
     surface.release.return_position_high[LATER_RELEASE, type_index] = surface.actuator.travel_high
-    clear_held_interval(surface, type_index)
+    clear_held_position_interval(surface, type_index)
 
 
 @kernel
-def clear_held_interval(surface, type_index):
+def clear_held_position_interval(surface, type_index):
     """This type does not hold the surface in the judged frame: the empty interval."""
     surface.release.held_position_min[type_index], surface.release.held_position_max[type_index] = (
         np.inf,
@@ -144,10 +144,10 @@ def drop_refuted_releases_and_test_return(config, surface, type_index):
     """Whether a return after this type explains the judged frame; forget the releases that do not."""
     is_explained = release_within_block_explains_block(config, surface, type_index)
     if not is_explained:
-        clear_held_interval(surface, type_index)
+        clear_held_position_interval(surface, type_index)
     for release_slot in (EARLIER_RELEASE, LATER_RELEASE):
         if is_release_possible(surface, release_slot, type_index):
-            if narrow_return_interval(config, surface, release_slot, type_index):
+            if narrow_return_position_interval(config, surface, release_slot, type_index):
                 is_explained = True
             else:
                 clear_releases(surface, release_slot, type_index)
@@ -155,7 +155,7 @@ def drop_refuted_releases_and_test_return(config, surface, type_index):
 
 
 @kernel
-def narrow_return_interval(config, surface, release_slot, type_index):
+def narrow_return_position_interval(config, surface, release_slot, type_index):
     """Whether the judged frame agrees with a return; drop the part of its interval that does not.
 
     The mean over the frame rises with where the return began, and by no more than that.
@@ -188,7 +188,7 @@ def narrow_return_interval(config, surface, release_slot, type_index):
     narrowed_high = release.return_position_high[release_slot, type_index] - max(
         mean_position_from_high - mean_position_tolerance - surface.judged_observation.position_high, 0.0
     )
-    set_return_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
+    set_return_position_interval(release, release_slot, type_index, narrowed_low, narrowed_high)
     return True
 
 
@@ -207,15 +207,16 @@ def promote_later_releases(surface, type_index):
 
 
 @kernel
-def set_return_interval(release, release_slot, type_index, return_low, return_high):
-    """Replace the interval of a return by [return_low, return_high]; rounding may have swapped ends that
-    meet."""
+def set_return_position_interval(
+    release, release_slot, type_index, return_position_low, return_position_high
+):
+    """Replace the interval of the positions of a return, rad; rounding may have swapped ends that meet."""
     (
         release.return_position_low[release_slot, type_index],
         release.return_position_high[release_slot, type_index],
     ) = (
-        min(return_low, return_high),
-        max(return_low, return_high),
+        min(return_position_low, return_position_high),
+        max(return_position_low, return_position_high),
     )
 
 
@@ -242,7 +243,7 @@ def update_held_status(config, surface, type_index, held_position_min, held_posi
 
 
 @kernel
-def held_or_returning_set(config, surface, type_index, held_position_min, held_position_max):
+def consistent_held_or_returning_interval(config, surface, type_index, held_position_min, held_position_max):
     """The parameters that explain the judged frame: all if the surface is held there or returns from there,
     none otherwise."""
     return (
@@ -270,7 +271,7 @@ def add_release(surface, type_index, held_position_min, held_position_max):
     """Add a release from between held_position_min and held_position_max (rad), where a type may hold the
     surface, if the interval is not empty."""
     release = surface.release
-    clear_held_interval(surface, type_index)
+    clear_held_position_interval(surface, type_index)
     if held_position_min <= held_position_max and not release.has_released[type_index]:
         release.held_position_min[type_index], release.held_position_max[type_index] = (
             held_position_min,
@@ -298,7 +299,7 @@ def propagate_returns(config, surface, type_index):
             _, frame_end_position_high, _ = simulate_return_in_frame(
                 config, surface, release.return_position_high[release_slot, type_index]
             )
-            set_return_interval(
+            set_return_position_interval(
                 release, release_slot, type_index, frame_end_position_low, frame_end_position_high
             )
     if (
@@ -331,7 +332,7 @@ def reset_stuck_memory(surface, type_index):
     surface.stuck.feasible_low_before_release[:], surface.stuck.feasible_high_before_release[:] = (
         travel_range(surface)
     )
-    reset_releases(surface, type_index)
+    allow_release_before_alarm(surface, type_index)
 
 
 @kernel
@@ -407,7 +408,9 @@ def stuck_deflection_range(config, surface, type_index, k):
 def consistent_float_interval(config, surface, type_index, k):
     """It is at neutral, or at the stop that is nearest to it."""
     neutral_position = limit_to_travel(surface, 0.0)
-    return held_or_returning_set(config, surface, type_index, neutral_position, neutral_position)
+    return consistent_held_or_returning_interval(
+        config, surface, type_index, neutral_position, neutral_position
+    )
 
 
 @kernel
@@ -471,7 +474,7 @@ STUCK = FaultType(
 )  # fmt: skip
 FLOAT = FaultType(
     name="float", has_constant_parameter=True, sort_rank=3,
-    reset_memory=reset_releases, consistent_interval=consistent_float_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=consistent_float_interval,
     on_possible_release=add_float_release, propagate_release=propagate_returns,
     possible_deflection_range=float_deflection_range,
     accommodation_mode=SUBTRACT_OFFSET, other_accommodation_modes=(GIVE_UP, SCALE_COMMAND),
@@ -520,7 +523,7 @@ def runaway_down_upper_limit(config, surface, frame_index):
 @kernel
 def consistent_hardover_up_interval(config, surface, type_index, k):
     """Interval of a runaway upwards: beyond its travel at the least rate, or at the stop, rad."""
-    return held_or_returning_set(
+    return consistent_held_or_returning_interval(
         config,
         surface,
         type_index,
@@ -532,7 +535,7 @@ def consistent_hardover_up_interval(config, surface, type_index, k):
 @kernel
 def consistent_hardover_down_interval(config, surface, type_index, k):
     """The same downwards."""
-    return held_or_returning_set(
+    return consistent_held_or_returning_interval(
         config,
         surface,
         type_index,
@@ -544,8 +547,12 @@ def consistent_hardover_down_interval(config, surface, type_index, k):
 @kernel
 def add_hardover_up_release(config, surface, type_index, k):
     """It may be released on its way; within a frame of several instants, further on."""
-    start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
-    start_position_low = max(start_position_low, runaway_up_lower_limit(config, surface, observed_frame))
+    start_position_low, start_position_high, observed_frame_index = position_at_frame_start(
+        config, surface, k
+    )
+    start_position_low = max(
+        start_position_low, runaway_up_lower_limit(config, surface, observed_frame_index)
+    )
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_high = surface.actuator.travel_high
     add_release(surface, type_index, start_position_low, start_position_high)
@@ -554,8 +561,12 @@ def add_hardover_up_release(config, surface, type_index, k):
 @kernel
 def add_hardover_down_release(config, surface, type_index, k):
     """The same downwards."""
-    start_position_low, start_position_high, observed_frame = position_at_frame_start(config, surface, k)
-    start_position_high = min(start_position_high, runaway_down_upper_limit(config, surface, observed_frame))
+    start_position_low, start_position_high, observed_frame_index = position_at_frame_start(
+        config, surface, k
+    )
+    start_position_high = min(
+        start_position_high, runaway_down_upper_limit(config, surface, observed_frame_index)
+    )
     if not config.frame_shows_single_instant and start_position_low <= start_position_high:
         start_position_low = surface.actuator.travel_low
     add_release(surface, type_index, start_position_low, start_position_high)
@@ -585,7 +596,7 @@ def lower_stop_deflection_rad(fdi: np.void, s: int, type_index: int) -> float | 
 
 HARDOVER_UP = FaultType(
     name="hardover", description="hardover up", has_constant_parameter=True, sort_rank=4,
-    reset_memory=reset_releases, consistent_interval=consistent_hardover_up_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=consistent_hardover_up_interval,
     on_possible_release=add_hardover_up_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_up_deflection_range,
     stop_direction=1,
@@ -594,7 +605,7 @@ HARDOVER_UP = FaultType(
 )  # fmt: skip
 HARDOVER_DOWN = FaultType(
     name="hardover", description="hardover down", has_constant_parameter=True, sort_rank=5,
-    reset_memory=reset_releases, consistent_interval=consistent_hardover_down_interval,
+    reset_memory=allow_release_before_alarm, consistent_interval=consistent_hardover_down_interval,
     on_possible_release=add_hardover_down_release,
     propagate_release=propagate_returns, possible_deflection_range=hardover_down_deflection_range,
     stop_direction=-1,

@@ -79,11 +79,15 @@ def loss_deflection_range(config, surface, type_index, k):
 def consistent_varying_loss_interval(config, surface, type_index, k):
     """Some effectiveness explains this frame; over a block in which the command changes sign, any mean."""
     effectiveness_low, effectiveness_high = effectiveness_interval_of_judged_frame(surface)
-    command_changed_sign = (
+    healthy_position_changed_sign = (
         config.frames_per_block > 1
         and surface.commands.min_healthy_position[1] < 0.0 < surface.commands.max_healthy_position[1]
     )
-    return EMPTY_SET if effectiveness_low > effectiveness_high and not command_changed_sign else UNLIMITED_SET
+    return (
+        EMPTY_SET
+        if effectiveness_low > effectiveness_high and not healthy_position_changed_sign
+        else UNLIMITED_SET
+    )
 
 
 def loss_theta_estimate(fdi: np.void, s: int, type_index: int) -> float | None:
@@ -266,13 +270,18 @@ def consistent_growing_bias_interval(config, surface, type_index, k):
         max(memory.min_growth_up, judged_offset_low),
         min(memory.min_growth_down, judged_offset_high),
     )
-    has_grown_up, has_grown_down = memory.min_growth_up > 0.0, memory.min_growth_down < 0.0
-    offset_shrinks = (has_grown_up and judged_offset_high < memory.min_growth_up) or (
-        has_grown_down and judged_offset_low > memory.min_growth_down
+    offset_has_been_positive, offset_has_been_negative = (
+        memory.min_growth_up > 0.0,
+        memory.min_growth_down < 0.0,
+    )
+    offset_shrinks = (offset_has_been_positive and judged_offset_high < memory.min_growth_up) or (
+        offset_has_been_negative and judged_offset_low > memory.min_growth_down
     )
     return (
         EMPTY_SET
-        if judged_offset_low > judged_offset_high or (has_grown_up and has_grown_down) or offset_shrinks
+        if judged_offset_low > judged_offset_high
+        or (offset_has_been_positive and offset_has_been_negative)
+        or offset_shrinks
         else UNLIMITED_SET
     )
 

@@ -361,18 +361,18 @@ def take_lead(fdi, kernel, *given):
 def test_a_decision_notes_when_surface_and_type_became_certain():
     fdi = new_case(rudder=(STUCK,), **NOBODY_ELSE)
     fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = NOT_ISOLATED, -1
-    conclude(fdi, verdict.decide_surface_and_type, 3.0)
+    conclude(fdi, verdict.decide_isolation_and_accommodation, 3.0)
     assert fdi["verdict"]["isolated_estimator"] == 4 + RUDDER  # its estimator of a position
     assert fdi["verdict"]["fault_type"] == STUCK
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 3.0)
     leave(fdi["types"]["surface"][RUDDER], VARYING_LOSS)
-    conclude(fdi, verdict.decide_surface_and_type, 4.0)
+    conclude(fdi, verdict.decide_isolation_and_accommodation, 4.0)
     assert fdi["verdict"]["isolated_estimator"] == RUDDER  # its estimator of a loss
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
-    conclude(fdi, verdict.decide_surface_and_type, 5.0)
+    conclude(fdi, verdict.decide_isolation_and_accommodation, 5.0)
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (3.0, 4.0)
     fdi["types"]["surface"]["position_estimator_excluded"][RUDDER] = 1
-    conclude(fdi, verdict.decide_surface_and_type, 6.0)
+    conclude(fdi, verdict.decide_isolation_and_accommodation, 6.0)
     assert fdi["verdict"]["isolated_estimator"] == UNANTICIPATED
     assert (fdi["verdict"]["isolated_at_s"], fdi["verdict"]["type_decided_at_s"]) == (6.0, 6.0)
     assert fdi["verdict"]["fault_type"] == -1
@@ -831,7 +831,7 @@ def test_a_name_notes_when_it_was_given_and_when_its_type():
 def test_a_surface_off_its_command_is_within_its_travel():
     surface = new_case()["types"]["surface"][RUDDER]
     surface["last_observation"]["healthy_position"] = 0.1
-    assert types.set_observed_deflection_error(surface, 0.2, 0.05)
+    assert types.set_position_from_deflection_error(surface, 0.2, 0.05)
     assert (
         surface["last_observation"]["position_low"],
         surface["last_observation"]["position_high"],
@@ -841,14 +841,14 @@ def test_a_surface_off_its_command_is_within_its_travel():
         pytest.approx(0.35),
         1,
     )
-    assert types.set_observed_deflection_error(surface, 0.4, 0.05)
+    assert types.set_position_from_deflection_error(surface, 0.4, 0.05)
     assert surface["last_observation"]["position_high"] == 0.5
-    assert not types.set_observed_deflection_error(surface, 0.5, 0.05)
-    assert types.set_observed_deflection_error(surface, -0.49, 0.05)
+    assert not types.set_position_from_deflection_error(surface, 0.5, 0.05)
+    assert types.set_position_from_deflection_error(surface, -0.49, 0.05)
     assert surface["last_observation"]["position_low"] == -0.4
-    types.set_observed_deflection_error(surface, 0.04, 0.05)
+    types.set_position_from_deflection_error(surface, 0.04, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
-    types.set_observed_deflection_error(surface, 0.05, 0.05)
+    types.set_position_from_deflection_error(surface, 0.05, 0.05)
     assert surface["last_observation"]["is_anomalous"] == 0
 
 
@@ -890,7 +890,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         -1.2 + 0.4,
         0.05,
     )
-    on(pairs.observe_pitch_surfaces, fdi)
+    on(pairs.update_pitch_observations, fdi)
     # the elevator's share is -10 * 0.12 give or take 0.2, the rest 0.4 give or take 0.26, over 2
     assert (
         flap["last_observation"]["position_low"],
@@ -903,7 +903,7 @@ def test_beside_the_first_pitch_fault_the_second_is_where_the_rest_puts_it():
         0.14,
     )
     fdi["bank"]["output"]["innovation"][PITCH] = 9.0
-    on(pairs.observe_pitch_surfaces, fdi)
+    on(pairs.update_pitch_observations, fdi)
     assert flap["status"]["can_be_at_fault_basis"] == DEDUCED_HEALTHY
 
 
@@ -919,7 +919,7 @@ def test_before_that_pitch_shows_a_fault_or_not(innovation, is_anomalous):
         0.03,
         innovation,
     )
-    on(pairs.observe_pitch_surfaces, fdi)
+    on(pairs.update_pitch_observations, fdi)
     assert fdi["types"]["surface"]["last_observation"]["is_anomalous"].tolist() == [
         0,
         is_anomalous,
@@ -1045,7 +1045,7 @@ def decided(alarmed=(1, 0), **left):
 
 def test_one_fault_in_pitch_is_named_and_acted_upon():
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None)
-    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    conclude(fdi, pairs.decide_pair_isolation_and_accommodation, 3.0)
     assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [
         0,
         0,
@@ -1053,7 +1053,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
         0,
     ]  # ailerons and rudder might be it as well
     fdi = decided(elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    conclude(fdi, pairs.decide_pair_isolation_and_accommodation, 3.0)
     assert fdi["types"]["surface"]["status"]["is_isolated"].tolist() == [0, 1, 0, 0]
     assert fdi["verdict"]["isolated_estimator"] == ELEVATOR
     assert (fdi["verdict"]["fault_type"], fdi["verdict"]["isolated_at_s"]) == (CONSTANT_LOSS, 3.0)
@@ -1067,7 +1067,7 @@ def test_one_fault_in_pitch_is_named_and_acted_upon():
 
 def test_without_an_alarm_in_pitch_nobody_is_named_there():
     fdi = decided(alarmed=(0, 1), elevator=(CONSTANT_LOSS,), flap=None, aileron=None, rudder=None)
-    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    conclude(fdi, pairs.decide_pair_isolation_and_accommodation, 3.0)
     assert not fdi["types"]["surface"]["status"]["is_isolated"][ELEVATOR]
     assert not on(pairs.should_be_accommodated, fdi, ELEVATOR)
 
@@ -1255,7 +1255,7 @@ def test_the_first_named_is_the_one_the_verdict_is_about():
         (1, 0, 1, 0),
         (2.0, 0.0, 1.0, 0.0),
     )
-    conclude(fdi, pairs.decide_pair_isolation, 3.0)
+    conclude(fdi, pairs.decide_pair_isolation_and_accommodation, 3.0)
     assert fdi["verdict"]["isolated_at_s"] == 1.0
     assert fdi["isolation"]["estimator"]["surface"][fdi["verdict"]["isolated_estimator"]] == RUDDER
 
@@ -1264,7 +1264,7 @@ def test_the_first_surface_and_its_first_estimator_are_not_nobody():
     fdi = new_case(elevator=None, rudder=None, flap=None, aileron=(CONSTANT_LOSS,))
     fdi["verdict"]["isolated_estimator"], fdi["verdict"]["fault_type"] = NOT_ISOLATED, -1
     for t in (3.0, 4.0):
-        conclude(fdi, verdict.decide_surface_and_type, t)
+        conclude(fdi, verdict.decide_isolation_and_accommodation, t)
         found = fdi["verdict"]
         assert (found["isolated_estimator"], found["fault_type"], found["accommodated_surface"]) == (
             AILERON,

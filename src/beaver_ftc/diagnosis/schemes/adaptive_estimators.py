@@ -288,7 +288,8 @@ def decide_fault_type(fdi, t, isolation_started_earlier):
             types, layout, estimators, filter_bank, bound_record.frame_innovation_bound
         )
         conclusion.record_fault_type_finding(
-            conclusion_record, pairs.decide_pair_isolation(types, conclusion_record, layout, t)
+            conclusion_record,
+            pairs.decide_pair_isolation_and_accommodation(types, conclusion_record, layout, t),
         )
         return
     if isolation_started_earlier or fdi.isolation.config.uses_reach_test:
@@ -296,7 +297,8 @@ def decide_fault_type(fdi, t, isolation_started_earlier):
             types, layout, estimators, filter_bank.output.innovation, bound_record
         )
     conclusion.record_fault_type_finding(
-        conclusion_record, verdict.decide_surface_and_type(types, conclusion_record, layout, estimators, t)
+        conclusion_record,
+        verdict.decide_isolation_and_accommodation(types, conclusion_record, layout, estimators, t),
     )
 
 

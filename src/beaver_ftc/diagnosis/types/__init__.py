@@ -290,7 +290,7 @@ OBSERVATION_RECORD = record(
 
 
 @kernel
-def widen_last_position_to_reach(surface):
+def set_last_position_to_reachable_range(surface):
     """The surface may have been anywhere within reach."""
     surface.last_observation.position_low, surface.last_observation.position_high = (
         surface.actuator.reachable_low,
@@ -372,7 +372,7 @@ def mark_stops_that_can_hide_deflection(surface, position_interval_width):
 
 
 @kernel
-def set_observed_deflection_error(surface, deflection_error, deflection_error_tolerance):
+def set_position_from_deflection_error(surface, deflection_error, deflection_error_tolerance):
     """A surface was off its command by deflection_error +- deflection_error_tolerance (rad). False:
     nowhere within its reach."""
     last_observation, actuator = surface.last_observation, surface.actuator

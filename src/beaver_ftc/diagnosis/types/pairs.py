@@ -28,7 +28,7 @@ from beaver_ftc.diagnosis.types import (
     registry,
     restore_first_pitch_fault_sets,
     set_is_anomalous,
-    set_observed_deflection_error,
+    set_position_from_deflection_error,
     set_position_of_known_fault,
     verdict,
 )
@@ -88,7 +88,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         roll_innovation_tolerance * abs(rudder_yaw_acceleration_per_rad)
         + yaw_innovation_tolerance * abs(rudder_roll_acceleration_per_rad)
     ) / abs_determinant
-    aileron_is_within_reach = set_observed_deflection_error(
+    aileron_is_within_reach = set_position_from_deflection_error(
         types.surface[aileron_index], aileron_deflection_error, aileron_deflection_error_tolerance
     )
     rudder_deflection_error = (
@@ -100,7 +100,7 @@ def locate_roll_and_yaw_surfaces(types, layout, estimators, innovation, innovati
         + roll_innovation_tolerance * abs(aileron_yaw_acceleration_per_rad)
     ) / abs_determinant
     if not (
-        set_observed_deflection_error(
+        set_position_from_deflection_error(
             types.surface[rudder_index], rudder_deflection_error, rudder_deflection_error_tolerance
         )
         and aileron_is_within_reach
@@ -128,7 +128,7 @@ def constant_parameter_types_deflection_range(config, surface, k):
 
 
 @kernel
-def observe_pitch_surfaces(types, layout, estimators, innovation, innovation_bound):
+def update_pitch_observations(types, layout, estimators, innovation, innovation_bound):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
     first_fault_surface_index = types.pair.first_pitch_fault_surface
@@ -163,7 +163,7 @@ def locate_second_pitch_surface(types, layout, estimators, innovation, innovatio
     acceleration_tolerance += (
         innovation_bound[PITCH] + first_effect.error_bound[PITCH] + second_effect.error_bound[PITCH]
     )
-    if not set_observed_deflection_error(
+    if not set_position_from_deflection_error(
         types.surface[second_surface_index],
         (innovation[PITCH] - first_fault_acceleration) / second_regressor,
         acceleration_tolerance / abs(second_regressor),
@@ -180,7 +180,7 @@ def observe_and_judge_frame_for_pairs(types, layout, estimators, filter_bank, in
         types, layout, estimators, filter_bank.output.innovation, innovation_bound
     )
     locate_roll_and_yaw_surfaces(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
-    observe_pitch_surfaces(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
+    update_pitch_observations(types, layout, estimators, filter_bank.output.innovation, innovation_bound)
     registry.judge_previous_frame(types)
 
 
@@ -275,10 +275,12 @@ def begin_second_pitch_fault(types, layout):
 @kernel
 def alternative_types_would_have_shown(config, surface):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    may_be_growing_bias = verdict.can_be_another_type(
+    may_be_command_independent_type = verdict.can_be_another_type(
         surface, verdict.sole_remaining_constant_parameter_type(surface), False
     )
-    type_is_undecided = may_be_growing_bias or verdict.remaining_type_can_hide_at_rest(config, surface)
+    type_is_undecided = may_be_command_independent_type or verdict.remaining_type_can_hide_at_rest(
+        config, surface
+    )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
         anomaly_spans_half_cycle and verdict.types_would_have_shown(config, surface) and not type_is_undecided
@@ -332,7 +334,7 @@ def decide_pitch_isolation(types, layout, t):
             second_surface, second_shows_fault, verdict.fault_type_on_surface(types.config, second_surface), t
         )
         return
-    sole_surface_index = find_sole_pitch_surface_at_fault(types, layout)
+    sole_surface_index = find_and_store_sole_pitch_fault(types, layout)
     for surface_index, surface in enumerate(types.surface):
         if layout.group[surface_index] == PITCH_GROUP:
             set_isolation_status(
@@ -344,7 +346,7 @@ def decide_pitch_isolation(types, layout, t):
 
 
 @kernel
-def find_sole_pitch_surface_at_fault(types, layout):
+def find_and_store_sole_pitch_fault(types, layout):
     """The surface of pitch at fault if a constant explains everything on it, or NO_SURFACE."""
     s = (
         verdict.find_surface_at_fault(types, layout)
@@ -359,7 +361,7 @@ def find_sole_pitch_surface_at_fault(types, layout):
 
 
 @kernel
-def decide_pair_isolation(types, conclusion, layout, t):
+def decide_pair_isolation_and_accommodation(types, conclusion, layout, t):
     """Name surfaces and types plane by plane; t s. Returns the finding for
     `conclusion.record_fault_type_finding`: its isolated estimator is of the one named first, the law acts on
     all. conclusion: that of the frame before."""
@@ -419,8 +421,8 @@ def should_be_accommodated(types, layout, s):
         or not types.pair.group_has_alarm[PITCH_GROUP]
     ):
         return False
-    most_likely_surface_index = verdict.sole_possible_surface(types.surface, True)
-    return s == (most_likely_surface_index if most_likely_surface_index >= 0 else layout.main[PITCH])
+    sole_possible_surface_index = verdict.sole_possible_surface(types.surface, True)
+    return s == (sole_possible_surface_index if sole_possible_surface_index >= 0 else layout.main[PITCH])
 
 
 @kernel

@@ -45,9 +45,9 @@ from beaver_ftc.diagnosis.types import (
     reset_feasible_sets,
     set_feasible_set,
     set_is_anomalous,
+    set_last_position_to_reachable_range,
     shift_observations,
     table,
-    widen_last_position_to_reach,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -392,7 +392,7 @@ def restart_fault_types_of_surface(surface):
     """Nothing is known of this surface yet."""
     reset_feasible_sets(surface)
     set_parameter_range_each(surface)
-    widen_last_position_to_reach(surface)
+    set_last_position_to_reachable_range(surface)
     surface.evidence.first_anomalous_frame = -1
     surface.evidence.n_anomalous_frames = surface.evidence.n_rest_frames = (
         surface.evidence.n_anomalous_frames_since_stop_could_hide
@@ -472,14 +472,14 @@ def count_anomalous_frame(surface):
 @kernel
 def narrow_feasible_sets(config, surface, k):
     """Test every type of one surface with the judged frame, in which something was wrong."""
-    evidence, judged_observation = surface.evidence, surface.judged_observation
+    anomaly_counts, judged_observation = surface.evidence, surface.judged_observation
     if judged_observation.position_low > judged_observation.position_high:
         return
-    if evidence.first_anomalous_frame < 0:
+    if anomaly_counts.first_anomalous_frame < 0:
         (
-            evidence.first_anomalous_frame,
-            evidence.first_anomalous_position_low,
-            evidence.first_anomalous_position_high,
+            anomaly_counts.first_anomalous_frame,
+            anomaly_counts.first_anomalous_position_low,
+            anomaly_counts.first_anomalous_position_high,
         ) = (
             k,
             judged_observation.position_low,

@@ -263,19 +263,19 @@ def fault_type_on_surface(config, surface):
         return TYPE_UNDECIDED
     if config.has_surface_term_errors:
         return sole_remaining_type_once_it_shows_itself(surface)
-    types_have_had_time = types_would_have_shown(config, surface)
+    types_have_had_time_to_show = types_would_have_shown(config, surface)
     if any_constant_parameter_type_remains(surface):
         remaining_type = sole_remaining_constant_parameter_type(surface)
         return (
             remaining_type
-            if types_have_had_time and not can_be_another_type(surface, remaining_type, True)
+            if types_have_had_time_to_show and not can_be_another_type(surface, remaining_type, True)
             else TYPE_UNDECIDED
         )
-    return varying_parameter_fault_type_on_surface(surface, types_have_had_time)
+    return varying_parameter_fault_type_on_surface(surface, types_have_had_time_to_show)
 
 
 @kernel
-def varying_parameter_fault_type_on_surface(surface, types_have_had_time):
+def varying_parameter_fault_type_on_surface(surface, types_have_had_time_to_show):
     """The same when no constant explains it: the one type left that need not show itself; else the one that
     has."""
     remaining_type = sole_remaining_varying_parameter_type(surface, False)
@@ -284,7 +284,7 @@ def varying_parameter_fault_type_on_surface(surface, types_have_had_time):
         return (
             remaining_type if remaining_type >= 0 and has_shown(surface, remaining_type) else TYPE_UNDECIDED
         )
-    if remaining_type < 0 or not types_have_had_time:
+    if remaining_type < 0 or not types_have_had_time_to_show:
         return TYPE_UNDECIDED
     for type_index in range(N_CONSTANT_PARAMETER_TYPES, N_TYPES):
         if type_remains(surface, type_index) and CAN_LOOK_LIKE[type_index, remaining_type]:
@@ -306,7 +306,7 @@ def sole_remaining_varying_parameter_type(surface, must_show_itself):
 
 
 @kernel
-def decide_surface_and_type(types, conclusion, layout, estimators, t):
+def decide_isolation_and_accommodation(types, conclusion, layout, estimators, t):
     """The finding on the surface and, when it is certain, on the type, for
     `conclusion.record_fault_type_finding`.
 
@@ -551,11 +551,11 @@ def _findings_assuming_one_fault(fdi: np.void, surface_names: Sequence[str]) -> 
             "candidates": tuple(_remaining_candidates(fdi, range(len(surface_names)), surface_names)),
         }
     if isolated_estimator == UNANTICIPATED:
-        unanticipated = "unanticipated"
+        unanticipated_label = "unanticipated"
         return {
             **_NO_FINDINGS,
-            "isolated": unanticipated,
-            "isolation_type": unanticipated,
+            "isolated": unanticipated_label,
+            "isolation_type": unanticipated_label,
             "isolation_time_s": isolated_at_s,
         }
     s = int(fdi["isolation"]["estimator"][isolated_estimator]["surface"])
@@ -623,10 +623,10 @@ def _remaining_type_names(fdi: np.void, s: int) -> list[str]:
         type_index for type_index in type_indices if type_index < registry.N_CONSTANT_PARAMETER_TYPES
     ]
     if constant_parameter_type_indices and not fdi["types"]["config"]["has_surface_term_errors"]:
-        evidence = surface["evidence"]
+        anomaly_counts = surface["evidence"]
         slowest_half_cycle_frames = fdi["types"]["config"]["slowest_half_cycle_frames"]
         anomaly_is_shorter_than_half_cycle = (
-            evidence["n_anomalous_frames"] - evidence["n_rest_frames"] < slowest_half_cycle_frames
+            anomaly_counts["n_anomalous_frames"] - anomaly_counts["n_rest_frames"] < slowest_half_cycle_frames
         )
         type_indices = [
             type_index

@@ -180,10 +180,10 @@ def fill_error_map(
         [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
     error_map["travel_low"] = mapped_travel_share_of_surface * [
-        travel.min_rad for travel in aircraft.travel.values()
+        surface_travel.min_rad for surface_travel in aircraft.travel.values()
     ]
     error_map["travel_high"] = mapped_travel_share_of_surface * [
-        travel.max_rad for travel in aircraft.travel.values()
+        surface_travel.max_rad for surface_travel in aircraft.travel.values()
     ]
     for box_index, box in enumerate(declared_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
@@ -313,7 +313,7 @@ def product_error_bound(coefficient, tolerance, signal_magnitude, max_signal_mag
 
 
 @kernel
-def inertia_times_moment_error_bound(declared_errors, axis, coefficient, tolerance):
+def acceleration_error_bound_by_moment(declared_errors, axis, coefficient, tolerance):
     """Bound the error of an inertia coefficient times the moment about an axis, rad/s2."""
     moment_term_magnitude_sum = declared_errors.moment_term_magnitude_sum[axis]
     return product_error_bound(
@@ -325,7 +325,7 @@ def inertia_times_moment_error_bound(declared_errors, axis, coefficient, toleran
 
 
 @kernel
-def inertia_times_rates_error_bound(declared_errors, i, j, coefficient, tolerance):
+def acceleration_error_bound_by_rate_product(declared_errors, i, j, coefficient, tolerance):
     """Bound the error of an inertia coefficient times the rates i and j, rad/s2."""
     rate_magnitudes, max_rate_magnitudes = declared_errors.magnitude_x, declared_errors.max_magnitude_x
     return product_error_bound(
@@ -430,24 +430,32 @@ def add_declared_error_bound(declared_errors, design, x, y, u, eta_bar):
     monomials(design.moments, declared_errors.signal_magnitude, declared_errors.max_monomial_magnitude)
     fill_moment_magnitudes_and_error_bounds(declared_errors, design)
     inertia_coefficient_tolerance = declared_errors.inertia_coefficient_tolerance
-    eta_bar[0] += inertia_times_moment_error_bound(
+    eta_bar[0] += acceleration_error_bound_by_moment(
         declared_errors, 0, design.Pl, inertia_coefficient_tolerance[2]
-    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Pn, inertia_coefficient_tolerance[3])
-    eta_bar[0] += inertia_times_rates_error_bound(
+    ) + acceleration_error_bound_by_moment(declared_errors, 2, design.Pn, inertia_coefficient_tolerance[3])
+    eta_bar[0] += acceleration_error_bound_by_rate_product(
         declared_errors, 0, 1, design.Ppq, inertia_coefficient_tolerance[0]
-    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Pqr, inertia_coefficient_tolerance[1])
-    eta_bar[1] += inertia_times_moment_error_bound(
+    ) + acceleration_error_bound_by_rate_product(
+        declared_errors, 1, 2, design.Pqr, inertia_coefficient_tolerance[1]
+    )
+    eta_bar[1] += acceleration_error_bound_by_moment(
         declared_errors, 1, design.Qm, inertia_coefficient_tolerance[7]
-    ) + inertia_times_rates_error_bound(declared_errors, 0, 2, design.Qpr, inertia_coefficient_tolerance[5])
-    eta_bar[1] += inertia_times_rates_error_bound(
+    ) + acceleration_error_bound_by_rate_product(
+        declared_errors, 0, 2, design.Qpr, inertia_coefficient_tolerance[5]
+    )
+    eta_bar[1] += acceleration_error_bound_by_rate_product(
         declared_errors, 0, 0, design.Qpp, inertia_coefficient_tolerance[4]
-    ) + inertia_times_rates_error_bound(declared_errors, 2, 2, design.Qrr, inertia_coefficient_tolerance[6])
-    eta_bar[2] += inertia_times_moment_error_bound(
+    ) + acceleration_error_bound_by_rate_product(
+        declared_errors, 2, 2, design.Qrr, inertia_coefficient_tolerance[6]
+    )
+    eta_bar[2] += acceleration_error_bound_by_moment(
         declared_errors, 0, design.Rl, inertia_coefficient_tolerance[10]
-    ) + inertia_times_moment_error_bound(declared_errors, 2, design.Rn, inertia_coefficient_tolerance[11])
-    eta_bar[2] += inertia_times_rates_error_bound(
+    ) + acceleration_error_bound_by_moment(declared_errors, 2, design.Rn, inertia_coefficient_tolerance[11])
+    eta_bar[2] += acceleration_error_bound_by_rate_product(
         declared_errors, 0, 1, design.Rpq, inertia_coefficient_tolerance[8]
-    ) + inertia_times_rates_error_bound(declared_errors, 1, 2, design.Rqr, inertia_coefficient_tolerance[9])
+    ) + acceleration_error_bound_by_rate_product(
+        declared_errors, 1, 2, design.Rqr, inertia_coefficient_tolerance[9]
+    )
 
 
 @kernel
@@ -597,44 +605,45 @@ def add_published_bound(
 
     Published: inertia_i |cross term_i| + constant_i [Zhang2005, sec. VII]. JSBSim integrates rates against
     inertial space and reports them against the Earth: the difference turns with the body, at no more than
-    earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by `max_rate_coupling_by_axis`.
+    earth_rate_rad_s |x| on any axis, and the inertia coupling multiplies it by `inertia_coupling_factors`.
     """
     p, q, r = x[0], x[1], x[2]
     sum_of_rate_magnitudes = abs(p) + abs(q) + abs(r)
-    max_roll_coupling, max_pitch_coupling, max_yaw_coupling = max_rate_coupling_by_axis(design)
+    roll_coupling_factor, pitch_coupling_factor, yaw_coupling_factor = inertia_coupling_factors(design)
     eta_bar[0] += (
         inertia_coupling_error_share[0] * abs(design.Pqr * q * r)
         + constant_error_bound[0]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_roll_coupling)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, roll_coupling_factor)
     )
     eta_bar[1] += (
         inertia_coupling_error_share[1] * abs(design.Qpr * p * r)
         + constant_error_bound[1]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_pitch_coupling)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, pitch_coupling_factor)
     )
     eta_bar[2] += (
         inertia_coupling_error_share[2] * abs(design.Rpq * p * q)
         + constant_error_bound[2]
-        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_yaw_coupling)
+        + earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, yaw_coupling_factor)
     )
 
 
 @kernel
-def max_rate_coupling_by_axis(design):
+def inertia_coupling_factors(design):
     """The largest factor by which the inertia coupling multiplies a product of two rates, on each axis; at
     least 1."""
-    roll_coupling, yaw_coupling = abs(design.Ppq) + abs(design.Pqr), abs(design.Rpq) + abs(design.Rqr)
-    pitch_coupling = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
-    return max(roll_coupling, 1.0), max(pitch_coupling, 1.0), max(yaw_coupling, 1.0)
+    roll_coupling_factor = abs(design.Ppq) + abs(design.Pqr)
+    yaw_coupling_factor = abs(design.Rpq) + abs(design.Rqr)
+    pitch_coupling_factor = abs(design.Qpr) + 2.0 * max(abs(design.Qpp), abs(design.Qrr))
+    return max(roll_coupling_factor, 1.0), max(pitch_coupling_factor, 1.0), max(yaw_coupling_factor, 1.0)
 
 
 @kernel
-def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, max_rate_coupling):
+def earth_rotation_and_rounding_bound(earth_rate_rad_s, sum_of_rate_magnitudes, coupling_factor):
     """Bound the angular acceleration on an axis by the Earth's rotation and by rounding, rad/s2;
     sum_of_rate_magnitudes: |p| + |q| + |r|, rad/s."""
     return (
         earth_rate_rad_s
-        * ((1.0 + max_rate_coupling) * sum_of_rate_magnitudes + max_rate_coupling * earth_rate_rad_s)
+        * ((1.0 + coupling_factor) * sum_of_rate_magnitudes + coupling_factor * earth_rate_rad_s)
         + ROUNDING_RAD_S2
     )
 
@@ -766,14 +775,14 @@ def fill_declared_errors(
     declared_errors["signal_error_bound_at_zero"] = sensor_errors.each("worst")
     declared_errors["signal_error_bound_per_unit"] = sensor_errors.each("slope")
     declared_errors["constant_gyro_error_bound"] = sensor_errors.each("steady", AXES)
-    error_bounds = (
+    non_sensor_error_bounds = (
         declared_errors["coefficient_tolerance"],
         declared_errors["inertia_coefficient_tolerance"],
         declared_errors["deflection_error_bound"],
         declared_errors["air_rotation_bound"],
     )
     declared_errors["has_declared_errors"] = (
-        any(np.any(error_bound) for error_bound in error_bounds) or not sensor_errors.is_ideal
+        any(np.any(error_bounds) for error_bounds in non_sensor_error_bounds) or not sensor_errors.is_ideal
     )
 
 
@@ -802,14 +811,16 @@ def fill_declared_engine_instrument_errors(
     )
 
 
-def detection_poles_for_noise(sensors: SensorErrors, constant_error_bound_rad_s2: float) -> tuple[float, ...]:
+def detection_poles_for_noise(
+    sensor_errors: SensorErrors, constant_error_bound_rad_s2: float
+) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of POLE_DESIGN_DELAYS_S, despite gyro
     noise.
 
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta_bar / lam + 2 nbar. The excess
     of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
     """
-    gyro_error_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensors.each("noise", AXES).max())
+    gyro_error_change_bound = 2 * NOISE_LIMIT_SIGMA * float(sensor_errors.each("noise", AXES).max())
     return (
         tuple(
             _detection_pole_per_s(delay_s, gyro_error_change_bound, constant_error_bound_rad_s2)
@@ -844,7 +855,7 @@ def declared_errors_for_plugin(
 
     aircraft, sensor_errors = declared.aircraft, declared.sensors
     reading_noise_std, reading_bias, reading_resolution = (
-        sensor_errors.each(quantity) for quantity in ("noise", "steady", "resolution")
+        sensor_errors.each(error_kind) for error_kind in ("noise", "steady", "resolution")
     )
     coefficient_errors = declared.coefficients.absolute(aircraft.moments, design["moments"]["value"][0])
     gust_rotation_std_rad_s, gust_correlation_time_s = declared.air.rotation(
@@ -925,13 +936,13 @@ def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps
     """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
     airspeed and attitude. An error of pitch attitude or heading turns the flow as much as an error of a
     vane."""
-    max_share_of_speed_and_bank_noise = 0.3  # attitudes and incidences of up to 17 deg
+    max_attitude_and_flow_angle_rad = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
     vane_and_attitude_noise_std = [
         hypot(sensor_errors[vane].random, sensor_errors[attitude_angle].random)
         for vane, attitude_angle in vane_attitude_pairs
     ]
-    return np.array(vane_and_attitude_noise_std) + max_share_of_speed_and_bank_noise * (
+    return np.array(vane_and_attitude_noise_std) + max_attitude_and_flow_angle_rad * (
         sensor_errors["V"].random / airspeed_mps + sensor_errors["phi"].random
     )
 

@@ -120,7 +120,7 @@ def axis_of_largest_effect(regressor):
 
 
 @kernel
-def widen_tolerance_by_surface_term_errors(fie, bound_record, innovation, n_substeps):
+def widen_position_effect_error_bound(fie, bound_record, innovation, n_substeps):
     """Widen the tolerance of a position by the errors of the surface's own terms at that position.
 
     eta_bar contains these errors at the commanded position. They grow with the distance from neutral. How far
@@ -343,12 +343,12 @@ def list_isolation_estimators(fault_class: str, aircraft: Aircraft) -> tuple[Est
     loss_entries = tuple((name, LOSS, surface_index_by_name[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
         return loss_entries
-    further_loss_entries = tuple(
+    stand_in_loss_entries = tuple(
         (name, LOSS, s) for name in aircraft.stand_ins for s in [surface_index_by_name[name]]
     )
     return (
         *loss_entries,
-        *further_loss_entries,
+        *stand_in_loss_entries,
         *((f"{name}_position", POSITION, s) for name, s in surface_index_by_name.items()),
     )
 
@@ -392,8 +392,10 @@ def configure_isolation(
             fie["ignored_axes"] = (1, 0, 1) if aircraft.dominant_axis[surface_index] == PITCH else (0, 1, 0)
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
-    weakly_excluded = WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED if config.weighs_chance and aircraft.damage else 0
-    isolation["estimator"]["weakly_excluded"] = weakly_excluded
+    initial_weak_exclusion = (
+        WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED if config.weighs_chance and aircraft.damage else 0
+    )
+    isolation["estimator"]["weakly_excluded"] = initial_weak_exclusion
     isolation["config"]["isolation_hold_off_s"] = (
         ISOLATION_HOLD_OFF_IF_DAMAGE_DECLARED_S if aircraft.damage else 0.0
     )
@@ -446,9 +448,7 @@ def update_fault_effect_and_reach(
     if (
         bound_record.has_surface_term_errors or bound_record.error_map.one_surface_may_be_anywhere
     ) and fie.hypothesis_kind == POSITION:
-        widen_tolerance_by_surface_term_errors(
-            fie, bound_record, filter_bank.output.innovation, config.n_substeps
-        )
+        widen_position_effect_error_bound(fie, bound_record, filter_bank.output.innovation, config.n_substeps)
     if isolation.config.uses_reach_test:
         advance_reachable_residuals(filter_bank, fie, config.dt)
 

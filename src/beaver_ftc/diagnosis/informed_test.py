@@ -58,8 +58,10 @@ class WhiteningFilter:
         self.F[range(3, 9), range(3, 9)] = decay_factors
         self.dt = dt
         self.R = np.diag(declared.rate_variance(MIN_GYRO_NOISE_STD_RAD_S))
-        model_error_variance = (dt * declared.model_rad_s2) ** 2
-        Q = np.diag(np.concatenate((model_error_variance, (1.0 - decay_factors**2) * stationary_std**2)))
+        rate_variance_by_model_error = (dt * declared.model_rad_s2) ** 2
+        Q = np.diag(
+            np.concatenate((rate_variance_by_model_error, (1.0 - decay_factors**2) * stationary_std**2))
+        )
         P = np.diag(np.concatenate((np.diagonal(self.R), stationary_std**2)))
         for _ in range(_KALMAN_SETTLING_FRAMES):
             P = self._updated_covariance(P)
@@ -74,12 +76,12 @@ class WhiteningFilter:
     def whitened_response(self, added_acceleration: np.ndarray) -> np.ndarray:
         """Compute the effect of added_acceleration (n, 3, ...) rad/s2 on the innovations, scaled to variance
         one."""
-        estimation_error_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
+        prediction_error_transition = self.F @ (np.eye(9) - self.K @ np.eye(3, 9))
         whitener = np.linalg.cholesky(np.linalg.inv(self.S)).T
         prediction_error_response = np.zeros((9, *added_acceleration.shape[2:]))
         whitened = np.empty_like(added_acceleration)
         for k, acceleration in enumerate(added_acceleration):
-            prediction_error_response = estimation_error_transition @ prediction_error_response
+            prediction_error_response = prediction_error_transition @ prediction_error_response
             prediction_error_response[:3] += self.dt * acceleration
             whitened[k] = whitener @ prediction_error_response[:3]
         return whitened
@@ -160,7 +162,8 @@ def unit_term_acceleration(
 ) -> np.ndarray:
     """Compute the acceleration by a coefficient of one, (frames, 3) rad/s2; deflection_rad: of its
     surface."""
-    V, geometry, inertia = log_columns["airspeed_mps"], aircraft.geometry, inertia_coefficients(aircraft.mass)
+    V, geometry = log_columns["airspeed_mps"], aircraft.geometry
+    inertia_coefficient = inertia_coefficients(aircraft.mass)
     value_by_factor: dict[str | None, Any] = {
         **{name: log_columns[name] for name in aircraft.signals},
         "alpha": log_columns["alpha_rad"], "beta": log_columns["beta_rad"],
@@ -168,14 +171,14 @@ def unit_term_acceleration(
         "qh": log_columns["q_rad_s"] * geometry.chord_m / V,
         "rh": log_columns["r_rad_s"] * geometry.span_m / (2.0 * V), term.surface: deflection_rad,
     }  # fmt: skip
-    force_per_coefficient = (
+    unit_term_force = (
         log_columns["qdyn_pa"]
         * geometry.wing_area_m2
         * prod(value_by_factor[factor] for factor in term.factors)
     )
     acceleration_per_force = {
-        "Cl": (inertia.Pl * geometry.span_m, 0.0, inertia.Rl * geometry.span_m),
-        "Cm": (0.0, inertia.Qm * geometry.chord_m, 0.0),
-        "Cn": (inertia.Pn * geometry.span_m, 0.0, inertia.Rn * geometry.span_m),
+        "Cl": (inertia_coefficient.Pl * geometry.span_m, 0.0, inertia_coefficient.Rl * geometry.span_m),
+        "Cm": (0.0, inertia_coefficient.Qm * geometry.chord_m, 0.0),
+        "Cn": (inertia_coefficient.Pn * geometry.span_m, 0.0, inertia_coefficient.Rn * geometry.span_m),
     }[term.coefficient]
-    return np.multiply.outer(force_per_coefficient, acceleration_per_force)
+    return np.multiply.outer(unit_term_force, acceleration_per_force)

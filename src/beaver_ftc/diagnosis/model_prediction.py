@@ -116,9 +116,9 @@ def add_instant_to_sums(prediction, bound_record, layout, diagnoses_all_types):
                 )
     if diagnoses_all_types:
         for s, axis in enumerate(layout.dominant_axis):
-            dominant_axis_effectiveness = G[axis, s]
-            sums.G_min[s] = min(sums.G_min[s], dominant_axis_effectiveness)
-            sums.G_max[s] = max(sums.G_max[s], dominant_axis_effectiveness)
+            G_on_dominant_axis = G[axis, s]
+            sums.G_min[s] = min(sums.G_min[s], G_on_dominant_axis)
+            sums.G_max[s] = max(sums.G_max[s], G_on_dominant_axis)
             sums.u_min[s], sums.u_max[s] = min(sums.u_min[s], u[s]), max(sums.u_max[s], u[s])
 
 

@@ -98,7 +98,7 @@ def test_the_gusts_effect():
             record, wing_span=14.0, gust_axes_in_body=np.eye(3), air_rotation_in_level_axes=(0.0, 0.02, -0.03)
         )
         fill(record, **dict.fromkeys((*filled, "scratch"), before))
-        gusts.fill_gust_effect(record, design(), X, Y, U)
+        gusts.fill_gust_effect_and_specific_force(record, design(), X, Y, U)
         found.append([holder(record, name)[name].tolist() for name in filled])
     assert found[0] == found[1]
 

@@ -246,7 +246,7 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     fill_table(record["memory"]["force_table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
     gusts.start_gust_estimate(record, Y, np.array([0.3, 0.2, 1.0]))
     record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
-    gusts.fill_gust_effect(record, design[0], X, Y, U)
+    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
     rotation = to_earth((0.3, 0.2, 0.0)).inv().apply([0.0, 0.02, -0.03])
     assert record["memory"]["air_rotation_in_body_axes"] == pytest.approx(rotation)
 
@@ -258,7 +258,7 @@ def test_what_a_gust_does_is_what_the_opposite_rates_would():
     step = 1e-6
     expected = (acceleration(X - step * rotation) - acceleration(X + step * rotation)) / (2.0 * step)
     assert record["output"]["angular_acceleration_by_gust"] == pytest.approx(expected, rel=1e-6)
-    gusts.fill_gust_effect(record, design[0], X, Y, U)
+    gusts.fill_gust_effect_and_specific_force(record, design[0], X, Y, U)
     gusts.begin_gust_sums(record, 45.0, 0.01)
     record["output"]["angular_acceleration_by_gust"] = 0.0
     assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(expected, rel=1e-6)

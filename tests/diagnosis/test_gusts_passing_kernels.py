@@ -167,7 +167,9 @@ def test_what_is_declared_of_drift_and_gusts_says_how_long_the_sum_lasts():
         record["output"]["accounts_for_gusts"] = record["output"]["is_gust_measured"] = record["output"][
             "uses_accelerometers"
         ] = 1
-        gusts.configure_speed_error(record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0)
+        gusts.configure_gust_velocity_and_speed_error(
+            record, declared_in(Bounds(turbulence=turbulence), load()), 6.6, 45.0
+        )
         sigma, V_L = HIGH[turbulence] * FT, 45.0 / (1750.0 * FT)
         b = (
             2.0 * record["config"]["gust_velocity_decay_rate"] ** 3 * sigma**2 / V_L

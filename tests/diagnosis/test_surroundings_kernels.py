@@ -97,10 +97,10 @@ def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     record, design = new_air(wing_area_per_mass=0.01), design_record().view(np.recarray)[0]
     gusts.start_gust_estimate(record, Y, np.zeros(3))
     record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
-    gusts.fill_gust_effect(record, design, X, Y, U)
+    gusts.fill_gust_effect_and_specific_force(record, design, X, Y, U)
     first = record["output"]["angular_acceleration_by_gust"].copy()
     gusts.begin_gust_sums(record, V, 0.01)
-    gusts.add_instant_to_gust(record, design, X, Y, U, np.zeros(3), 0.01)
+    gusts.update_gust_and_sums(record, design, X, Y, U, np.zeros(3), 0.01)
     assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(
         first + record["output"]["angular_acceleration_by_gust"]
     )
@@ -144,7 +144,7 @@ def test_axes_that_turn_move_what_is_not_seen_besides(swings):
     for instants, leap in ((2, 2), (0, 2), (1, 1), (0, 1), (0, 0), (0, 0)):
         for _ in range(instants):
             gusts.add_acceleration_variance_by_axes_turn(record, V, DT)
-        gusts.fill_frame_mean_acceleration_by_gust(record, 1.0)
+        gusts.fill_frame_mean_and_variance_by_gust(record, 1.0)
         assert record["output"]["acceleration_variance_by_axes_turn"] == pytest.approx(leap * once, rel=1e-12)
 
 
@@ -518,7 +518,7 @@ def test_the_estimate_is_that_of_whoever_counts():
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_the_gusts_mean_is_a_share_of_what_was_summed(share):
     record = new_air(angular_acceleration_by_gust_sum=(0.4, -0.8, 1.2))
-    gusts.fill_frame_mean_acceleration_by_gust(record, share)
+    gusts.fill_frame_mean_and_variance_by_gust(record, share)
     assert record["output"]["mean_angular_acceleration_by_gust"] == pytest.approx(
         share * np.array([0.4, -0.8, 1.2])
     )

@@ -434,7 +434,7 @@ def update_gust_estimate(gust, y, attitude, dt, frame_index):
 
 
 @kernel
-def fill_gust_effect(gust, design, x, y, u):
+def fill_gust_effect_and_specific_force(gust, design, x, y, u):
     """Fill `angular_acceleration_by_gust` (3,) rad/s2, the effect of the gust from now on, and
     `specific_force`, m/s2.
 
@@ -477,13 +477,13 @@ def begin_gust_sums(gust, V, dt):
 
 
 @kernel
-def add_instant_to_gust(gust, design, x, y, u, attitude, dt):
+def update_gust_and_sums(gust, design, x, y, u, attitude, dt):
     """Update gust and sums for an instant inside a frame, dt s after the instant before.
 
-    Arguments as in `fill_gust_effect`; attitude (3,) rad.
+    Arguments as in `fill_gust_effect_and_specific_force`; attitude (3,) rad.
     """
     update_gust_rotation_rates(gust, y, attitude, dt)
-    fill_gust_effect(gust, design, x, y, u)
+    fill_gust_effect_and_specific_force(gust, design, x, y, u)
     for i in range(3):
         gust.memory.angular_acceleration_by_gust_sum[i] += gust.output.angular_acceleration_by_gust[i]
     add_acceleration_variance_by_axes_turn(gust, y[AIRSPEED], dt)
@@ -635,7 +635,7 @@ def add_acceleration_variance_by_axes_turn(gust, V, dt):
 
 
 @kernel
-def fill_frame_mean_acceleration_by_gust(gust, frame_share_per_instant):
+def fill_frame_mean_and_variance_by_gust(gust, frame_share_per_instant):
     """Fill `mean_angular_acceleration_by_gust` and `acceleration_variance_by_axes_turn` for the elapsed
     frame.
 
@@ -757,7 +757,7 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
 
 
 def add_gust_estimate_noise(
-    statistical: np.void,
+    statistical_detector: np.void,
     sensor_errors: SensorErrors,
     design: np.void,
     y: np.ndarray,
@@ -770,28 +770,33 @@ def add_gust_estimate_noise(
     that of the forces as well. y, u: in trim.
     """
     flow_angle_noise_std = flow_angle_in_level_axes_noise_std(sensor_errors, y[AIRSPEED])
-    span_m = float(statistical["gust"]["config"]["wing_span"])
-    if statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]:
+    span_m = float(statistical_detector["gust"]["config"]["wing_span"])
+    if (
+        statistical_detector["forces"]["in_use"]
+        or statistical_detector["gust"]["output"]["uses_accelerometers"]
+    ):
         flow_angle_noise_std += (
             ADAMS_BASHFORTH_NOISE_GAIN * sensor_errors.each("random", ("az", "ay")) * dt_s / y[AIRSPEED]
         )
-    if statistical["forces"]["in_use"]:
-        force_records_normal_first = statistical["forces"]["component"][
+    if statistical_detector["forces"]["in_use"]:
+        force_records_normal_first = statistical_detector["forces"]["component"][
             ::-1
         ]  # normal to the body, and across
         flow_angle_noise_std_by_forces = np.sqrt(
             force_records_normal_first["accelerometer_innovation_variance"]
         ) / np.abs(force_records_normal_first["axis_and_force_innovation_per_vane_error"][:, 1])
-        statistical["forces"]["angular_acceleration_by_gust_noise_std"] = (
+        statistical_detector["forces"]["angular_acceleration_by_gust_noise_std"] = (
             angular_acceleration_by_gust_noise_std(flow_angle_noise_std_by_forces, design, y, u, span_m)
         )
     for field_name in ("acceleration_variance_without_air_data", "acceleration_variance_by_input_noise"):
-        statistical["noise"][field_name] += (
+        statistical_detector["noise"][field_name] += (
             angular_acceleration_by_gust_noise_std(flow_angle_noise_std, design, y, u, span_m) ** 2
         )
 
 
-def configure_speed_error(gust: np.void, declared: Declared, alarm_level: float, airspeed_mps: float) -> None:
+def configure_gust_velocity_and_speed_error(
+    gust: np.void, declared: Declared, alarm_level: float, airspeed_mps: float
+) -> None:
     """Fill the decay rate of the gust velocity and the error variance of the speed; airspeed_mps: in trim.
 
     alarm_level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of

@@ -76,7 +76,7 @@ from beaver_ftc.diagnosis.gusts import (
     UNMEASURED_SHARE_BY_FORCE_ERROR,
     add_gust_estimate_noise,
     configure_gust_estimate,
-    configure_speed_error,
+    configure_gust_velocity_and_speed_error,
 )
 from beaver_ftc.diagnosis.state import LOSS, SIDE_FORCE, WEAKLY_EXCLUDED_AS_DAMAGE_IS_DECLARED
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
@@ -222,7 +222,7 @@ def configure_statistical_detector(
         aircraft, *(parity_directions_of(aircraft, uses_forces) if uses_parity_views else ())
     )
     test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
-    configure_speed_error(gust, declared, float(test_config["alarm_level"]), airspeed_mps)
+    configure_gust_velocity_and_speed_error(gust, declared, float(test_config["alarm_level"]), airspeed_mps)
     test_config["isolation_llr_margin"] = derive_isolation_llr_margin(
         statistical_settings.misnaming, rate_hz, aircraft
     )
@@ -934,7 +934,7 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
     """
     x, y = measured.x, measured.y
     if gust.output.accounts_for_gusts:
-        gusts.fill_gust_effect(gust, design, x, y, u)
+        gusts.fill_gust_effect_and_specific_force(gust, design, x, y, u)
     if test_config.uses_regressors:
         for block in blocks:
             block.regressor[:] = 0.0
@@ -980,7 +980,7 @@ def add_instant_to_gust_and_regressors(
 ):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
     if gust.output.accounts_for_gusts:
-        gusts.add_instant_to_gust(gust, design, measured.x, measured.y, u, measured.attitude, dt)
+        gusts.update_gust_and_sums(gust, design, measured.x, measured.y, u, measured.attitude, dt)
     if test_config.uses_regressors:
         add_regressors(
             test_config.frame_share_per_instant,

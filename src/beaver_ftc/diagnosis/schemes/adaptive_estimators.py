@@ -370,9 +370,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     inertial_gust = statistical_detector.inertial_gust
     frame_means = prediction.frame_means
     innovation, dt = fdi.bank.output.innovation, fdi.config.dt
-    gusts.fill_frame_mean_acceleration_by_gust(gust, prediction.frame_share_per_instant)
+    gusts.fill_frame_mean_and_variance_by_gust(gust, prediction.frame_share_per_instant)
     if inertial_gust.output.accounts_for_gusts:
-        gusts.fill_frame_mean_acceleration_by_gust(inertial_gust, prediction.frame_share_per_instant)
+        gusts.fill_frame_mean_and_variance_by_gust(inertial_gust, prediction.frame_share_per_instant)
     fill_surface_effects_with_previous_G(frame_means)
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
@@ -486,7 +486,7 @@ def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, predicti
         gusts.store_accelerometer_reading(inertial_gust, measured.force)
         gusts.set_gust_rotation_intensity(inertial_gust, measured.altitude)
         gusts.update_gust_estimate(inertial_gust, forces_record.y_without_vanes, measured.attitude, dt, k)
-        gusts.fill_gust_effect(
+        gusts.fill_gust_effect_and_specific_force(
             inertial_gust, prediction.design, measured.x, forces_record.y_without_vanes, prediction.u
         )
         gusts.begin_gust_sums(inertial_gust, forces_record.y_without_vanes[AIRSPEED], dt)

@@ -24,7 +24,7 @@ def new_network(**fields):
 @pytest.mark.parametrize("beta", [-0.5, 0.07, 0.3, 0.4])
 def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     out = np.zeros(N_BASIS_FUNCTIONS)
-    detection_filters.fill_basis_functions(alpha, beta, out)
+    detection_filters.fill_normalised_gaussians(alpha, beta, out)
     parts = []
     for place, centres in ((alpha, ALPHA_CENTRES_RAD), (beta, BETA_CENTRES_RAD)):
         inside = np.clip(place, centres[0], centres[-1])

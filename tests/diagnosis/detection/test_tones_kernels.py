@@ -121,7 +121,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = parity.tone_whitening_gain(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
+    found = parity.whitened_unit_tone_amplitude(K_x, K_d, keep, np.cos(angle), np.sin(angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
@@ -131,7 +131,9 @@ def test_room_is_what_a_bounded_uncertainty_adds_summed_as_the_tone_is(view, ton
         view["uncertainty_bound"] = bound
         listen(view, tone_config, np.zeros(EVERY))
     angle = TONE_FREQUENCIES_RAD_S * DT
-    passed = np.array([parity.tone_whitening_gain(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle])
+    passed = np.array(
+        [parity.whitened_unit_tone_amplitude(0.3, 0.8, 1.0, np.cos(a), np.sin(a), DT) for a in angle]
+    )
     age_s = EVERY * DT * np.arange(len(bounds))[::-1]
     faded = EVERY * np.exp(-age_s / TONE_MEMORY_S) * bounds
     beat = np.abs(np.exp(np.multiply.outer(2j * TONE_FREQUENCIES_RAD_S, age_s)) @ faded)

@@ -390,7 +390,7 @@ def fill_gaussians_and_sum_squares(grid_position, n_gaussians, first_index, out)
 
 
 @kernel
-def fill_basis_functions(alpha, beta, out):
+def fill_normalised_gaussians(alpha, beta, out):
     """Fill out (N_BASIS_FUNCTIONS,) with the normalised radial basis functions at (alpha, beta), rad.
 
     Each width equals the spacing of its centres; outside the grid the nearest edge answers.
@@ -422,7 +422,7 @@ def apply_dead_zone(residual, threshold):
 @kernel
 def evaluate_network(network, alpha, beta):
     """Fill network.output (3,) rad/s2 for the present alpha and beta."""
-    fill_basis_functions(alpha, beta, network.memory.basis_values)
+    fill_normalised_gaussians(alpha, beta, network.memory.basis_values)
     for i in range(3):
         fhat_i = 0.0
         for j in range(N_BASIS_FUNCTIONS):

@@ -94,7 +94,8 @@ TONE_MEMORY_S = 2.5
 TONE_FREQUENCIES_RAD_S = np.linspace(1.0, 13.0, N_TONE_FREQUENCIES)
 TONE_UPDATE_INTERVAL_S = 0.04
 # Share of the alarm level reserved for noise in addition to a bounded uncertainty. It is reserved without
-# noise too, because `tone_whitening_gain` assumes constant gains, and the gains vary with a varying bound.
+# noise too, because `whitened_unit_tone_amplitude` assumes constant gains, and the gains vary with a varying
+# bound.
 TONE_NOISE_SHARE_OF_ALARM_LEVEL = 0.5
 # The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
 MAX_AIRSPEED_FACTOR_FROM_TRIM, MAX_VANE_ANGLE_RAD = 2.0, 0.5
@@ -199,7 +200,9 @@ def advance_resonators(tone_config, resonator_state, input_sum):
 
 
 @kernel
-def tone_whitening_gain(rate_gain, drift_gain, drift_decay_factor, cos_phase_change, sin_phase_change, dt):
+def whitened_unit_tone_amplitude(
+    rate_gain, drift_gain, drift_decay_factor, cos_phase_change, sin_phase_change, dt
+):
     """Amplitude, rad/s, of the whitened response to a tone of amplitude 1 rad/s2, at constant filter gains.
 
     cos_phase_change, sin_phase_change: of the change of the tone's phase per frame, of dt s.
@@ -232,7 +235,7 @@ def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normal
     for frequency_index in range(tone_tests.max_correlation_by_uncertainty.size):
         cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
         sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
-        filtered_bound_since_update = normalised_uncertainty_bound_sum * tone_whitening_gain(
+        filtered_bound_since_update = normalised_uncertainty_bound_sum * whitened_unit_tone_amplitude(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
         double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]

@@ -3,7 +3,7 @@
 from tools.docs.pages import ROOT
 from tools.docs.tables import benchmark, robustness
 
-from beaver_ftc.diagnosis.rivals import tuned_parameters, tuned_values
+from beaver_ftc.diagnosis.rivals import load_tuned_values, tuned_values
 from beaver_ftc.plugins import DETECTORS
 from beaver_ftc.studies.compare.trial import LAW, SCHEME, STATISTICAL, Entry
 
@@ -66,7 +66,7 @@ def test_the_tables_have_the_statistical_detector_and_every_passive_law():
 
 
 def test_the_page_names_the_rate_of_false_alarms_that_the_search_chose():
-    chosen = tuned_values(tuned_parameters(), "errors", DETECTORS, STATISTICAL)
+    chosen = tuned_values(load_tuned_values(), "errors", DETECTORS, STATISTICAL)
     page = (ROOT / "docs/results/benchmark.md").read_text(encoding="utf-8")
     named = f"{chosen['fdi.statistical.false_alarms_per_h']:.0f} false alarms per hour"
     assert page.count(named) == 2  # in the answer, and where false alarms are explained

@@ -83,7 +83,7 @@ def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
     assert pytest.approx(np.diag(rates)) == detector.R
     assert detector.theta_walk_variance == pytest.approx(0.3**2 * DT)
     assert detector.averaging_decay == pytest.approx(exp(-DT / 0.25))
-    assert (detector.mean_innovation_square, detector.detected) == (3.0, False)
+    assert (detector.mean_normalised_innovation_square, detector.detected) == (3.0, False)
     assert started().n_states == N_STATES_WITHOUT_GUSTS
 
 
@@ -112,14 +112,14 @@ def test_a_step_is_an_update_with_theta_kept_within_what_a_surface_can_be():
         verdict = detector.step(seen(x), np.zeros(4))
         assert verdict.statistic == pytest.approx(of_it / 10.0)
         assert detector.z == pytest.approx(z)
-        assert detector.mean_innovation_square == pytest.approx(square)
+        assert detector.mean_normalised_innovation_square == pytest.approx(square)
     assert np.abs(z[3:6]).max() == 1.0
     assert of_it > 1e6
 
 
 def named(theta, variance=(0.01, 0.01, 0.01), square=3.0, statistic=2.0, **options):
     detector = started(**{"misfit": 3.0, **options})
-    detector.z[3:6], detector.mean_innovation_square = theta, square
+    detector.z[3:6], detector.mean_normalised_innovation_square = theta, square
     detector.P[range(3, 6), range(3, 6)] = variance
     return detector, detector.verdict(seen(), statistic)
 

@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
     TUNED_FILE,
     TUNED_FILE_KEY_BY_PLUGIN_GROUP,
-    tuned_parameters,
+    load_tuned_values,
     tuned_values,
 )
 from beaver_ftc.documents.errors import BadInput
@@ -79,7 +79,7 @@ def test_everybody_is_tuned_with_the_same_budget_on_every_grade():
         assert row["trials"] <= SHIPPED["trials"] * searches
         assert row["trials"] >= SHIPPED["trials"] - len(row["ranges"])
         assert row["values"] == tuned_values(
-            tuned_parameters(), row["grade"], GROUPS[row["kind"]], row["name"]
+            load_tuned_values(), row["grade"], GROUPS[row["kind"]], row["name"]
         )
 
 
@@ -92,7 +92,9 @@ def test_rivals_fly_with_what_was_chosen_for_their_grade():
     ):
         given["fdi"] = {"scheme": "augmented-ekf", **given.get("fdi", {})}
         flown = Loop(scenario(duration_s=1, **given)).plugin_frame.detector.options
-        assert tuned_values(tuned_parameters(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
+        assert (
+            tuned_values(load_tuned_values(), of_grade, DETECTORS, "augmented-ekf").items() <= flown.items()
+        )
 
 
 @pytest.mark.parametrize(("cost", "kept"), [(0.96, True), (0.94, False)])
@@ -108,7 +110,7 @@ def test_a_method_keeps_its_values_unless_others_gain(monkeypatch, cost, kept):
 
 
 def test_a_method_starts_with_what_ships_or_its_defaults():
-    assert Method(LAWS, "lqr", "exact").start() == tuned_values(tuned_parameters(), "exact", LAWS, "lqr")
+    assert Method(LAWS, "lqr", "exact").start() == tuned_values(load_tuned_values(), "exact", LAWS, "lqr")
     ours = Method(DETECTORS, STATISTICAL, "nowhere").start()
     assert ours == {"fdi.statistical.false_alarms_per_h": 1e-3, "fdi.statistical.misnaming": 1e-4}
     assert Method(LAWS, "zhang2005", "nowhere").start()["network_gain"] == 40.0

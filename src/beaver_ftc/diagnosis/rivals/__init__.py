@@ -34,8 +34,8 @@ TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method 
 
 
 @cache
-def tuned_parameters() -> TunedValuesByGrade:
-    """Return the parameters that `beaver-ftc compare --tune` chose, as shipped."""
+def load_tuned_values() -> TunedValuesByGrade:
+    """The values that `beaver-ftc compare --tune` chose, as shipped."""
     tuned_values_by_grade: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
     return tuned_values_by_grade
 
@@ -70,13 +70,14 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
             raise BadInput(
                 f"{name}: options.{option_name}: unknown option{suggestion(option_name, defaults)}"
             )
-    declared = context.declared
+    declared_uncertainty = context.declared
     grade = flight_grade(
-        declared.noisy, not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
+        declared_uncertainty.noisy,
+        not declared_uncertainty.bandwidth_rad_s.any() and not declared_uncertainty.rate_limit_rad_s.any(),
     )
     tuned_options = {
         option_name: option_value
         for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
-        for option_name, option_value in tuned_values(tuned_parameters(), grade, plugin_group, name).items()
+        for option_name, option_value in tuned_values(load_tuned_values(), grade, plugin_group, name).items()
     }
     return {**defaults, **tuned_options, **context.options}

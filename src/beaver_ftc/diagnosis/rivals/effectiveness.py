@@ -57,7 +57,7 @@ class EffectivenessFilter:
         self.R = np.diag(measured_rate_variance)
         self.theta_walk_variance = self.options["drift_per_s"] ** 2 * context.dt_s
         self.averaging_decay = exp(-context.dt_s / self.options["misfit_s"])
-        self.mean_innovation_square, self.detected, self.is_first_frame = 3.0, False, True
+        self.mean_normalised_innovation_square, self.detected, self.is_first_frame = 3.0, False, True
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Predict over the elapsed frame, update with the measured rates, decide."""
@@ -69,27 +69,30 @@ class EffectivenessFilter:
         nu = measured.x - self.z[:3]
         self.z, self.P, S = update_state(self.z, self.P, nu, self.R)
         self.z[3:N_STATES_WITHOUT_GUSTS] = np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 1.0)
-        innovation_square = float(nu @ np.linalg.solve(S, nu))
-        self.mean_innovation_square = self.averaging_decay * self.mean_innovation_square + (
-            1.0 - self.averaging_decay
-        ) * min(innovation_square, 1e6)
-        return self.verdict(measured, self.statistic(innovation_square))
+        normalised_innovation_square = float(nu @ np.linalg.solve(S, nu))
+        self.mean_normalised_innovation_square = (
+            self.averaging_decay * self.mean_normalised_innovation_square
+            + (1.0 - self.averaging_decay) * min(normalised_innovation_square, 1e6)
+        )
+        return self.verdict(measured, self.statistic(normalised_innovation_square))
 
     def propagate(self, measured: Measured) -> None:
         """Predict z and P over the elapsed frame."""
         raise NotImplementedError
 
-    def statistic(self, innovation_square: float) -> float:
-        """The decision statistic, 1 at the alarm; innovation_square is the normalised innovation squared."""
+    def statistic(self, normalised_innovation_square: float) -> float:
+        """The decision statistic, 1 at the alarm, by nu' S^-1 nu."""
         raise NotImplementedError
 
     def process_noise_variances(self, measured: Measured) -> np.ndarray:
         """Q (n,), the diagonal: of the rates from the declared bound, of theta a random walk, of the air."""
         unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
-        rate_noise_variance = (self.context.dt_s * self.options["noise"] * unexplained_acceleration) ** 2
+        rate_process_noise_variance = (
+            self.context.dt_s * self.options["noise"] * unexplained_acceleration
+        ) ** 2
         return np.concatenate(
             (
-                rate_noise_variance,
+                rate_process_noise_variance,
                 np.full(3, self.theta_walk_variance),
                 self.gust_states.process_noise_variance,
             )
@@ -109,7 +112,7 @@ class EffectivenessFilter:
         effectiveness[self.leading_surface_indices] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
         most_significant_axis = int(np.argmax(self.wald_statistics()))
         if (
-            self.mean_innovation_square > 3.0 * self.options["misfit"]
+            self.mean_normalised_innovation_square > 3.0 * self.options["misfit"]
             or self.z[3 + most_significant_axis] > 0.0
         ):
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
@@ -161,7 +164,7 @@ class AugmentedEkf(EffectivenessFilter):
         )
         return F
 
-    def statistic(self, innovation_square: float) -> float:
+    def statistic(self, normalised_innovation_square: float) -> float:
         """The largest theta^2 / variance over the alarm level."""
         return float(self.wald_statistics().max() / self.options["alarm"])
 
@@ -211,8 +214,10 @@ class AugmentedUkf(EffectivenessFilter):
             propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
         return propagated_points
 
-    def statistic(self, innovation_square: float) -> float:
-        """g = max(0, g + (innovation_square - 3 allowance)) over the alarm level; 3 is what a healthy flight
-        expects."""
-        self.cusum = max(0.0, self.cusum + min(innovation_square, 1e6) - 3.0 * self.options["allowance"])
+    def statistic(self, normalised_innovation_square: float) -> float:
+        """g = max(0, g + (normalised_innovation_square - 3 allowance)) over the alarm level; 3 is what a
+        healthy flight expects."""
+        self.cusum = max(
+            0.0, self.cusum + min(normalised_innovation_square, 1e6) - 3.0 * self.options["allowance"]
+        )
         return self.cusum / self.options["alarm"]

@@ -108,9 +108,9 @@ class ConstantThresholdObserver:
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Filter the innovation, compare, and from the alarm on ask whose effect it is."""
         if self.previous_rates is not None:
-            innovation = measured.x - self.previous_rates - self.dt_s * measured.acceleration
-            self.eps = self.decay_factor * self.eps + innovation
-            self.residual_since_alarm = self.decay_factor * self.residual_since_alarm + innovation
+            rate_innovation = measured.x - self.previous_rates - self.dt_s * measured.acceleration
+            self.eps = self.decay_factor * self.eps + rate_innovation
+            self.residual_since_alarm = self.decay_factor * self.residual_since_alarm + rate_innovation
             self.filtered_effects = (
                 self.decay_factor * self.filtered_effects
                 + self.dt_s * measured.contribution[:, self.leading_surface_indices]

@@ -39,8 +39,10 @@ class RecursiveLeastSquaresFit:
         prediction_error = y - float(self.weights @ phi)
         self.weights = self.weights + gain * prediction_error
         P = (self.P - np.outer(gain, Pphi)) / self._forgetting_factor
-        max_variance = float(P.diagonal().max())
-        self.P = P if max_variance <= self._prior_variance else P * (self._prior_variance / max_variance)
+        largest_variance = float(P.diagonal().max())
+        self.P = (
+            P if largest_variance <= self._prior_variance else P * (self._prior_variance / largest_variance)
+        )
         return prediction_error
 
 

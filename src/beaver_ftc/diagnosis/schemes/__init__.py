@@ -31,16 +31,20 @@ from beaver_ftc.scenario.schema import Scenario
 
 
 @sized
-def diagnosis_dtype(n_surfaces: int, record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
-    """The stages of the diagnosis of an aircraft with n surfaces; record_size: rooms of its record."""
+def diagnosis_dtype(
+    n_surfaces: int, statistical_record_size: StatisticalRecordSize = USUAL_RECORD_SIZE
+) -> np.dtype:
+    """The stages of the diagnosis of an aircraft with n surfaces; statistical_record_size: rooms of the
+    statistical detector's record."""
     return record(
         config=state.SHARED_CONFIG_RECORD,
-        bound=bound_dtype(n_surfaces, record_size.n_model_error_bound_boxes),
+        bound=bound_dtype(n_surfaces, statistical_record_size.n_model_error_bound_boxes),
         bank=filters.BANK_RECORD,
         fdae=filters.FDAE_RECORD,
         verdict=conclusions.conclusion_dtype(n_surfaces), layout=state.layout_dtype(n_surfaces),
         isolation=isolation.isolation_dtype(n_surfaces),
-        types=registry.fault_types_dtype(n_surfaces), statistical=statistical.statistical_dtype(record_size),
+        types=registry.fault_types_dtype(n_surfaces),
+        statistical=statistical.statistical_dtype(statistical_record_size),
         sensor_monitor=SENSOR_MONITOR_RECORD, published=published.PUBLISHED_RECORD,
         engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n_surfaces),
@@ -56,7 +60,7 @@ def configure_diagnosis(fdi: np.void, prediction: np.void, scenario: Scenario, t
     state.configure_layout(fdi["layout"], estimator_entries, aircraft)
     isolation.configure_isolation(fdi["isolation"], scenario, estimator_entries, travel)
     if config.pairs:
-        _refuse_unavailable_pairs(scenario)
+        _refuse_unavailable_fault_pairs(scenario)
     declared = Declared.of(scenario)
     bounds.configure_uncertainty_bound(fdi["bound"], scenario, declared, prediction["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
@@ -88,7 +92,7 @@ def carry_over_to_restarted_diagnosis(fdi: np.void, previous_fdi: np.void, in_fl
     fdi["sensor_monitor"]["memory"]["substep"] = 0
 
 
-def _refuse_unavailable_pairs(scenario: Scenario) -> None:
+def _refuse_unavailable_fault_pairs(scenario: Scenario) -> None:
     """Raises BadInput where a change in flight declares errors with which pairs are not available."""
     if refusal := pairs_refused(Declared.of(scenario).sensors.declared, scenario.airframe):
         raise BadInput(f"{scenario.name}: fdi.pairs: {refusal}, allowed: false")

@@ -343,9 +343,9 @@ ISOLATION_VARIANTS = {
 }
 PUBLISHED_WORST_CASE_VARIANT_INDEX = 0  # the place of the published class without statistics
 
-begin_isolation_variant = one_of([row.begin for row in ISOLATION_VARIANTS.values()])
-record_commands_in_variant = one_of([row.record_commands for row in ISOLATION_VARIANTS.values()])
-isolate_by_variant = one_of([row.isolate for row in ISOLATION_VARIANTS.values()])
+begin_isolation_variant = one_of([variant.begin for variant in ISOLATION_VARIANTS.values()])
+record_commands_in_variant = one_of([variant.record_commands for variant in ISOLATION_VARIANTS.values()])
+isolate_by_variant = one_of([variant.isolate for variant in ISOLATION_VARIANTS.values()])
 
 
 def isolation_variant_index(config: FdiConfig) -> int:

@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
     TunedValuesByGrade,
     flight_grade,
-    tuned_parameters,
+    load_tuned_values,
     tuned_values,
 )
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
@@ -187,7 +187,7 @@ def fly_case(
 
     chosen: values of schemes and laws; those that ship without it. trade_off: whether it is asked for.
     """
-    chosen = tuned_parameters() if chosen is None else chosen
+    chosen = load_tuned_values() if chosen is None else chosen
     trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
     if not trade_off:
         return trial

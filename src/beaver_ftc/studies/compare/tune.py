@@ -18,7 +18,7 @@ from typing import Any
 from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
     TUNED_FILE_KEY_BY_PLUGIN_GROUP,
-    tuned_parameters,
+    load_tuned_values,
     tuned_values,
 )
 from beaver_ftc.documents.errors import BadInput
@@ -64,7 +64,7 @@ class Method:
 
     def start(self) -> Values:
         """The values it starts with: those it ships with, its defaults, or the middle of their ranges."""
-        shipped = tuned_values(tuned_parameters(), self.grade, self.group, self.name)
+        shipped = tuned_values(load_tuned_values(), self.grade, self.group, self.name)
         return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
 
     def _default(self, key: str, of: Range) -> float:

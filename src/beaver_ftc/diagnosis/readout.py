@@ -43,14 +43,14 @@ class FaultTypesConfig(NamedTuple):
 
     frame_shows_single_instant: a frame, or block, shows one instant. n_substeps: JSBSim frames in a frame.
     released_surface_returns_via_actuator: a released surface returns by its actuator.
-    slowest_half_cycle_frames: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
+    slowest_half_cycle_blocks: blocks in half of the slowest oscillation. frames_per_block: frames in a block,
     1 where every frame is examined by itself; block_duration_s: its duration.
     """
 
     frame_shows_single_instant: bool
     n_substeps: int
     released_surface_returns_via_actuator: bool
-    slowest_half_cycle_frames: int
+    slowest_half_cycle_blocks: int
     frames_per_block: int
     block_duration_s: float
     dt_s: float
@@ -81,15 +81,16 @@ class DeclaredBounds(NamedTuple):
     """The declared uncertainty, by axis (3,).
 
     eta_bar_rad_s2: bound on the model's error over the frame; changing_gyro_error_bound_rad_s: bound on the
-    changing part of a gyro's error. inertia_coupling_error_share; constant_error_bound_rad_s2;
-    earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest + gyro_error_bound_per_rate |rate|, of
-    the first what does not change, constant_gyro_error_bound; zero where none is declared.
+    changing part of a gyro's error. inertia_coupling_error_share, constant_part_of_error_bound_rad_s2: terms
+    of eta_bar. earth_rate_rad_s. Of gyros: error at most gyro_error_bound_at_rest +
+    gyro_error_bound_per_rate |rate|, of the first what does not change, constant_gyro_error_bound; zero where
+    none is declared.
     """
 
     eta_bar_rad_s2: np.ndarray
     changing_gyro_error_bound_rad_s: np.ndarray
     inertia_coupling_error_share: np.ndarray
-    constant_error_bound_rad_s2: np.ndarray
+    constant_part_of_error_bound_rad_s2: np.ndarray
     earth_rate_rad_s: float
     gyro_error_bound_at_rest_rad_s: np.ndarray
     constant_gyro_error_bound_rad_s: np.ndarray
@@ -116,14 +117,14 @@ class MappedModelError(NamedTuple):
 class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    kind: of `likelihood`; surface, axis: which. raises_alarm: whether it may raise the alarm. score: largest
-    normalised evidence over all onsets, standard deviations, like the alarm level.
+    kind: of `likelihood`; surface, axis: which. may_raise_alarm: whether its score counts for the alarm.
+    score: largest normalised evidence over all onsets, standard deviations, like the alarm level.
     """
 
     kind: int
     surface: int
     axis: int
-    raises_alarm: bool
+    may_raise_alarm: bool
     score: float
 
 
@@ -141,13 +142,13 @@ class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
     axis_indices: of its states. drift_correlation_length_m: of the drift, m; 0 for none.
-    drift_intensity_scale: factor on the variance of a gust seen roughly. regressor_tolerance (regressors,):
+    gust_drift_intensity_factor: on the variance of a gust seen roughly. regressor_tolerance (regressors,):
     of the constants that are not known, 0 for one not used.
     """
 
     axis_indices: tuple[int, ...]
     drift_correlation_length_m: float
-    drift_intensity_scale: float
+    gust_drift_intensity_factor: float
     regressor_tolerance: np.ndarray
     hypotheses: tuple[StatisticalHypothesis, ...]
     onset_tests: OnsetTests
@@ -284,7 +285,7 @@ class DiagnosisReadout:
             eta_bar_rad_s2=bound_record["eta_bar"].copy(),
             changing_gyro_error_bound_rad_s=bound_record["changing_gyro_error_bound"].copy(),
             inertia_coupling_error_share=bound_record["inertia_coupling_error_share"].copy(),
-            constant_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
+            constant_part_of_error_bound_rad_s2=bound_record["constant_error_bound"].copy(),
             earth_rate_rad_s=float(bound_record["earth_rate_rad_s"]),
             gyro_error_bound_at_rest_rad_s=gyro_error_bound_at_rest,
             constant_gyro_error_bound_rad_s=constant_gyro_error_bound,

@@ -82,7 +82,7 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
     """Column, and largest share of the alarm level, of each hypothesis that raises alarms."""
     found: dict[str, float] = {}
     for hypothesis in (
-        each for block in diagnosis.statistical_blocks for each in block.hypotheses if each.raises_alarm
+        each for block in diagnosis.statistical_blocks for each in block.hypotheses if each.may_raise_alarm
     ):
         column = _share_column(hypothesis, surfaces)
         share = hypothesis.score / diagnosis.statistical_alarm_level
@@ -165,7 +165,7 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
     best, found = -1.0, (0, 0, 0)
     for b, block in enumerate(blocks):
         for h, hypothesis in enumerate(block.hypotheses):
-            if hypothesis.raises_alarm and hypothesis.score > best:
+            if hypothesis.may_raise_alarm and hypothesis.score > best:
                 best, found = hypothesis.score, (b, h, int(np.argmax(block.onset_tests.score[h])))
     return found
 
@@ -198,7 +198,8 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     if diagnosis.gust.accounts_for_gusts:
         its["air"] = tape.filters["air"][here][1:][:, axes]
         drift += (
-            block.drift_intensity_scale * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
+            block.gust_drift_intensity_factor
+            * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
         )
     onset_tests = block.onset_tests
     sense, explained = onset_tests.supporting_correlation_sign[h, slot], {

@@ -13,8 +13,10 @@ from telling import numbers
 SURFACES, LOSS = ("left", "right", "flap"), STEP_HYPOTHESIS + 1
 
 
-def hypothesis(score, kind=LOSS, surface=0, axis=0, raises_alarm=True):
-    return SimpleNamespace(score=score, kind=kind, surface=surface, axis=axis, raises_alarm=raises_alarm)
+def hypothesis(score, kind=LOSS, surface=0, axis=0, may_raise_alarm=True):
+    return SimpleNamespace(
+        score=score, kind=kind, surface=surface, axis=axis, may_raise_alarm=may_raise_alarm
+    )
 
 
 def block(*hypotheses, slots=()):
@@ -28,7 +30,7 @@ BLOCKS = (
     block(hypothesis(6.0, surface=1), hypothesis(9.0, surface=2), slots=(1, 3)),
     block(
         hypothesis(7.0, STEP_HYPOTHESIS, axis=2), hypothesis(12.0, surface=2),
-        hypothesis(50.0, raises_alarm=False), slots=(3, 2, 0),
+        hypothesis(50.0, may_raise_alarm=False), slots=(3, 2, 0),
     ),
     block(hypothesis(11.0, surface=2), slots=(1,)),
 )  # fmt: skip

@@ -29,7 +29,7 @@ _FAILURE_TOPIC_PREFIX = "failure_status-"
 TopicTable = dict[str, Floats]
 
 
-def _travel_share_of_pulse_width(pulse_width_us: Floats) -> Floats:
+def _half_travel_share_of_pulse_width(pulse_width_us: Floats) -> Floats:
     """Pulse width about its neutral, as a share of the half range of 400 us."""
     return (pulse_width_us - 1500.0) / 400.0
 
@@ -37,7 +37,7 @@ def _travel_share_of_pulse_width(pulse_width_us: Floats) -> Floats:
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
     "": np.asarray,
     "deg": np.deg2rad,
-    "us": _travel_share_of_pulse_width,
+    "us": _half_travel_share_of_pulse_width,
 }
 
 
@@ -55,17 +55,19 @@ def read(path: Path) -> RecordedFlight:
     """The flight in a folder of topics. Raises BadInput if it has none of the gyro."""
     if not path.is_dir():
         raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
-    topics = dict(_read_topic_tables(path))
-    if _GYRO_TOPIC not in topics:
+    table_by_topic = dict(_read_topic_tables(path))
+    if _GYRO_TOPIC not in table_by_topic:
         raise BadInput(f"{path}: no {_GYRO_TOPIC} topic, allowed: a processed folder of the ALFA data set")
-    kept_rows_and_note_by_topic = {
-        topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in topics.items()
+    kept_row_indices_and_note_by_topic = {
+        topic: rows_with_increasing_time(topic, table[_TIME_FIELD]) for topic, table in table_by_topic.items()
     }
-    origin_ns = float(topics[_GYRO_TOPIC][_TIME_FIELD][kept_rows_and_note_by_topic[_GYRO_TOPIC][0][0]])
-    columns = dict(_read_columns(topics, kept_rows_and_note_by_topic, origin_ns))
+    origin_ns = float(
+        table_by_topic[_GYRO_TOPIC][_TIME_FIELD][kept_row_indices_and_note_by_topic[_GYRO_TOPIC][0][0]]
+    )
+    columns = dict(_read_columns(table_by_topic, kept_row_indices_and_note_by_topic, origin_ns))
     _add_commanded_less_measured_attitude(columns)
     _add_airspeed_from_wind(columns)
-    failures = sorted(_failure_events(topics, origin_ns), key=lambda failure: failure.t_s)
+    failures = sorted(_failure_events(table_by_topic, origin_ns), key=lambda failure: failure.t_s)
     return RecordedFlight(path.name, columns, tuple(failures))
 
 
@@ -80,15 +82,18 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 
 
 def _read_columns(
-    topics: dict[str, TopicTable],
-    kept_rows_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
+    table_by_topic: dict[str, TopicTable],
+    kept_row_indices_and_note_by_topic: dict[str, tuple[NDArray[np.int64], str]],
     origin_ns: float,
 ) -> Iterator[tuple[str, Column]]:
     for name, (topic, field, unit) in _load_column_sources_and_failure_names()["columns"].items():
-        if field in topics.get(topic, {}):
-            kept_rows, note = kept_rows_and_note_by_topic[topic]
-            t_s = (topics[topic][_TIME_FIELD][kept_rows] - origin_ns) * _S_PER_NS
-            yield name, Column(t_s, _CONVERSION_OF_UNIT[unit](topics[topic][field])[kept_rows], note)
+        if field in table_by_topic.get(topic, {}):
+            kept_row_indices, note = kept_row_indices_and_note_by_topic[topic]
+            t_s = (table_by_topic[topic][_TIME_FIELD][kept_row_indices] - origin_ns) * _S_PER_NS
+            yield (
+                name,
+                Column(t_s, _CONVERSION_OF_UNIT[unit](table_by_topic[topic][field])[kept_row_indices], note),
+            )
 
 
 def _add_commanded_less_measured_attitude(columns: dict[str, Column]) -> None:
@@ -116,8 +121,8 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
     columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(airspeed_north_mps, airspeed_east_mps))
 
 
-def _failure_events(topics: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
-    for topic, table in topics.items():
+def _failure_events(table_by_topic: dict[str, TopicTable], origin_ns: float) -> Iterator[LoggedFailure]:
+    for topic, table in table_by_topic.items():
         if topic.startswith(_FAILURE_TOPIC_PREFIX):
             failed_part = topic.removeprefix(_FAILURE_TOPIC_PREFIX)
             stamps = table[_TIME_FIELD]

@@ -61,9 +61,9 @@ def read_parts(
         path, None if columns is None else {time_column, *columns}, rows_per_part
     )
     if time_column not in all_columns:
-        allowed_text = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
+        allowed_table_phrase = f"a table with {TIME_COLUMN} in seconds, or its `time` in the vehicle file"
         raise BadInput(
-            f"{path}: no column {time_column}, allowed: {allowed_text}; it has "
+            f"{path}: no column {time_column}, allowed: {allowed_table_phrase}; it has "
             f"{nearest_names_text(time_column, all_columns)}"
         )
     for part_number, (cells, column_remarks, has_more) in enumerate(parts, 1):
@@ -190,7 +190,7 @@ def _join_blocks_into_parts(
     with _refuse_unreadable(path):
         for block in blocks:
             held_blocks.append(block)
-            n_held_rows = sum(one.n_rows for one in held_blocks)
+            n_held_rows = sum(held_block.n_rows for held_block in held_blocks)
             if rows_per_part is None and n_held_rows > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
             while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:

@@ -56,13 +56,13 @@ def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
     """Blocks that follow one another as one; they are used up."""
     first_block = blocks[0]
     column_names = list(first_block.numbers)
-    numbers = {name: np.concatenate([one.numbers.pop(name) for one in blocks]) for name in column_names}
-    joined_cells = TableCells(numbers, sum(one.n_rows for one in blocks), first_block.n_rows_before)
-    for one in blocks:
-        joined_cells.broken_lines += one.broken_lines
-        for name, (n_cells, row, cell) in one.text_cell_summaries.items():
+    numbers = {name: np.concatenate([block.numbers.pop(name) for block in blocks]) for name in column_names}
+    joined_cells = TableCells(numbers, sum(block.n_rows for block in blocks), first_block.n_rows_before)
+    for block in blocks:
+        joined_cells.broken_lines += block.broken_lines
+        for name, (n_text_cells, row, cell) in block.text_cell_summaries.items():
             earlier_summary = joined_cells.text_cell_summaries.get(name, (0, row, cell))
-            joined_cells.text_cell_summaries[name] = (earlier_summary[0] + n_cells, *earlier_summary[1:])
+            joined_cells.text_cell_summaries[name] = (earlier_summary[0] + n_text_cells, *earlier_summary[1:])
     return joined_cells
 
 
@@ -92,11 +92,11 @@ def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout 
         rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
         if not rows_below and line_index == 0 and len(header_cells) > 1:
             return TableLayout(line_index, tuple(header_cells), delimiter, ".")  # a table of no rows
-        has_as_many_cells = [len(row) == len(header_cells) for row in rows_below]
+        has_as_many_cells_as_header = [len(row) == len(header_cells) for row in rows_below]
         if (
             len(header_cells) < 2
             or any(_is_number_cell(name) for name in header_cells)
-            or not any(has_as_many_cells)
+            or not any(has_as_many_cells_as_header)
         ):
             continue
         number_cells = [
@@ -156,7 +156,7 @@ def read_cells(path: Path, layout: TableLayout, wanted_columns: Sequence[str]) -
         for block in blocks:
             cells = TableCells({}, block.num_rows, n_rows_read)
             cells.numbers = {
-                name: _column_as_numbers(block[name], layout.decimal_mark, name, cells)
+                name: _convert_column_and_record_text(block[name], layout.decimal_mark, name, cells)
                 for name in wanted_columns
             }
             cells.broken_lines, broken_lines[:] = broken_lines[:], []
@@ -197,7 +197,9 @@ def _all_text_conversion(names: Sequence[str], wanted_columns: Sequence[str]) ->
     )
 
 
-def _column_as_numbers(cells: Any, decimal_mark: str, column_name: str, table_cells: TableCells) -> Floats:
+def _convert_column_and_record_text(
+    cells: Any, decimal_mark: str, column_name: str, table_cells: TableCells
+) -> Floats:
     """A block's column as numbers; text in it is counted."""
     import pyarrow as pa
     from pyarrow import compute
@@ -229,9 +231,9 @@ def _record_text_cells(column_name: str, cells: Any, is_number_or_null: Any, tab
 def text_cell_and_layout_remarks(layout: TableLayout, table_cells: TableCells) -> Iterator[tuple[str, str]]:
     """Yield for each column a line on its cells of text, where it holds numbers too; under an empty name what
     is unusual about the whole."""
-    for name, (n_cells, first_text_row, first_cell) in table_cells.text_cell_summaries.items():
+    for name, (n_text_cells, first_text_row, first_cell) in table_cells.text_cell_summaries.items():
         if np.isfinite(table_cells.numbers[name]).any():
-            count_text = "1 cell holds" if n_cells == 1 else f"{n_cells} cells hold"
+            count_text = "1 cell holds" if n_text_cells == 1 else f"{n_text_cells} cells hold"
             yield (
                 name,
                 f"{name}: {count_text} no number, the first in row {first_text_row}: {first_cell[:30]!r}",

@@ -99,12 +99,14 @@ def _load_data_set(path: Path) -> FlightDataSet | None:
 
 def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> FlightDataSet:
     recordings = tuple(read_for_vehicle(path, vehicle) for path in paths)
-    return FlightDataSet(name, vehicle, recordings, tuple(resample(one, vehicle) for one in recordings))
+    return FlightDataSet(
+        name, vehicle, recordings, tuple(resample(recording, vehicle) for recording in recordings)
+    )
 
 
 def run_benchmark(folder: Path) -> Document:
     """The document of the benchmark: a part a data set, a row a method."""
-    return {"sets": [_compare_methods(one) for one in load_data_sets(folder)]}
+    return {"sets": [_compare_methods(data_set) for data_set in load_data_sets(folder)]}
 
 
 def result_files(document: Document) -> Files:
@@ -126,15 +128,19 @@ def _compare_methods(data_set: FlightDataSet) -> Document:
         model = add_fitted_ranges_and_alarm_threshold(
             fitted_flights, fit_model(fitted_flights, data_set.vehicle, shared_settings)
         )
-        recording = next(one for one in data_set.recordings if one.name == held_out.samples.name)
+        recording = next(
+            recording for recording in data_set.recordings if recording.name == held_out.samples.name
+        )
         flight_entries += [
             {"left_out": held_out_name, "method": method, **_score_against_log(held_out, rows, model)}
             for method, rows in _diagnosis_rows_of_methods(recording, held_out, model)
         ]
     has_labels = "classes" in flight_entries[0]
     summarize = summarize_label_scores if has_labels else summarize_failure_scores
-    methods = dict.fromkeys(one["method"] for one in flight_entries)
-    entries_of_method = {name: [one for one in flight_entries if one["method"] == name] for name in methods}
+    methods = dict.fromkeys(entry["method"] for entry in flight_entries)
+    entries_of_method = {
+        name: [entry for entry in flight_entries if entry["method"] == name] for name in methods
+    }
     return {
         "set": data_set.name,
         "vehicle": data_set.vehicle.name,
@@ -191,22 +197,23 @@ def labels_in_usable_span(held_out: FlightWithUsableRows) -> np.ndarray:
 def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
     """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
     after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
-    failed_flights = [one for one in flight_scores if one["failure"]]
-    engine_failures = [one for one in failed_flights if ENGINE in one["failure"]]
-    surface_failures = [one for one in failed_flights if ENGINE not in one["failure"]]
-    detected_failures = [one for one in surface_failures if one["detected"]]
-    false_alarm_flights = [one for one in flight_scores if one["false_alarms"]]
-    healthy_flights = [one for one in flight_scores if one["failure"] is None]
-    quiet_flights = [one for one in healthy_flights if not one["false_alarms"]]
-    healthy_hours = sum(one["healthy_s"] for one in flight_scores) / 3600.0
-    false_alarm_rate = poisson(sum(one["false_alarms"] for one in flight_scores), healthy_hours)
-    n_right = len(detected_failures) + len(quiet_flights)
+    failed_flights = [score for score in flight_scores if score["failure"]]
+    engine_failures = [score for score in failed_flights if ENGINE in score["failure"]]
+    surface_failures = [score for score in failed_flights if ENGINE not in score["failure"]]
+    detected_surface_failures = [score for score in surface_failures if score["detected"]]
+    false_alarm_flights = [score for score in flight_scores if score["false_alarms"]]
+    healthy_flights = [score for score in flight_scores if score["failure"] is None]
+    quiet_flights = [score for score in healthy_flights if not score["false_alarms"]]
+    healthy_hours = sum(score["healthy_s"] for score in flight_scores) / 3600.0
+    false_alarm_rate = poisson(sum(score["false_alarms"] for score in flight_scores), healthy_hours)
+    n_correct_flights = len(detected_surface_failures) + len(quiet_flights)
     return {
         "surface_failures": len(surface_failures),
-        "found": len(detected_failures),
-        "precision": len(detected_failures) / max(len(detected_failures) + len(false_alarm_flights), 1),
-        "recall": len(detected_failures) / max(len(surface_failures), 1),
-        "accuracy": n_right / max(len(surface_failures) + len(healthy_flights), 1),
+        "found": len(detected_surface_failures),
+        "precision": len(detected_surface_failures)
+        / max(len(detected_surface_failures) + len(false_alarm_flights), 1),
+        "recall": len(detected_surface_failures) / max(len(surface_failures), 1),
+        "accuracy": n_correct_flights / max(len(surface_failures) + len(healthy_flights), 1),
         "healthy_flights": len(healthy_flights),
         "healthy_flights_with_an_alarm": len(healthy_flights) - len(quiet_flights),
         "false_alarms_per_hour": {
@@ -215,11 +222,11 @@ def summarize_failure_scores(flight_scores: Sequence[Document]) -> Document:
             "high": false_alarm_rate.high,
         },
         "healthy_hours": healthy_hours,
-        "wrong_group": sum(one["right_group"] is False for one in detected_failures),
+        "wrong_group": sum(score["right_group"] is False for score in detected_surface_failures),
         "delay_s": {
             surface_kind: _summarize_delays(surface_failures, surface_kind) for surface_kind in SURFACE_KINDS
         },
-        "engine_failures_with_an_alarm": sum(one["detected"] for one in engine_failures),
+        "engine_failures_with_an_alarm": sum(score["detected"] for score in engine_failures),
     }
 
 
@@ -227,15 +234,15 @@ def _summarize_delays(surface_failures: Sequence[Document], surface_kind: str) -
     """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
     counts: an aileron before a rudder."""
     failures_of_kind = [
-        one
-        for one in surface_failures
+        failure_score
+        for failure_score in surface_failures
         if min(
             _KIND_OF_SURFACE.get(failed_surface, failed_surface)
-            for failed_surface in one["failure"].split("+")
+            for failed_surface in failure_score["failure"].split("+")
         )
         == surface_kind
     ]
-    delays_s = [one["delay_s"] for one in failures_of_kind if one["detected"]]
+    delays_s = [failure_score["delay_s"] for failure_score in failures_of_kind if failure_score["detected"]]
     return {
         "failures": len(failures_of_kind),
         "found": len(delays_s),
@@ -246,12 +253,12 @@ def _summarize_delays(surface_failures: Sequence[Document], surface_kind: str) -
 
 def summarize_label_scores(part_scores: Sequence[Document]) -> Document:
     """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
-    part_scores = [one for one in part_scores if one["rows"]]
+    part_scores = [part_score for part_score in part_scores if part_score["rows"]]
     if not part_scores:
         return {**dict.fromkeys(LABEL_SCORE_TITLES), "rows": 0}
-    row_counts = np.array([one["rows"] for one in part_scores], dtype=float)
+    row_counts = np.array([part_score["rows"] for part_score in part_scores], dtype=float)
     means = {
-        key: float(np.average([one[key] for one in part_scores], weights=row_counts))
+        key: float(np.average([part_score[key] for part_score in part_scores], weights=row_counts))
         for key in LABEL_SCORE_TITLES
     }
     return means | {"rows": int(row_counts.sum())}
@@ -263,12 +270,12 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
         return _tables_of_other_days(document["other_days"])
     titled_tables = []
     for data_set in document["sets"]:
-        header, cells_of_row = (
+        header, format_row = (
             (LABEL_TABLE_HEADER, _label_score_cells)
             if data_set["scored_by"] == "labels"
             else (FAILURE_TABLE_HEADER, _failure_score_cells)
         )
-        rows = [cells_of_row(row) for row in (*data_set["rows"], *data_set["published"])]
+        rows = [format_row(row) for row in (*data_set["rows"], *data_set["published"])]
         titled_tables.append((f"{data_set['set']}: left out, {data_set['left_out']}", (header, rows)))
     return titled_tables
 
@@ -394,23 +401,23 @@ def _method_titles(data_set: Document) -> list[str]:
 def _draw_failure_delays(axis: Any, data_set: Document) -> None:
     """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
     methods = _method_titles(data_set)
-    failure_of_flight = {one["left_out"]: one["failure"] for one in data_set["flights"]}
+    failure_of_flight = {entry["left_out"]: entry["failure"] for entry in data_set["flights"]}
     distinct_surface_failures = [
         failure for failure in dict.fromkeys(failure_of_flight.values()) if failure and ENGINE not in failure
     ]
     for i, surface_failure in enumerate(distinct_surface_failures):
         entries_of_failure = [
-            one
-            for one in data_set["flights"]
-            if one["failure"] == surface_failure and one["method"] in methods
+            entry
+            for entry in data_set["flights"]
+            if entry["failure"] == surface_failure and entry["method"] in methods
         ]
         delays_s = [
-            _MAX_SHOWN_DELAY_S + 1.0 if one["delay_s"] is None else one["delay_s"]
-            for one in entries_of_failure
+            _MAX_SHOWN_DELAY_S + 1.0 if entry["delay_s"] is None else entry["delay_s"]
+            for entry in entries_of_failure
         ]
         mark_heights = [
-            methods.index(one["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
-            for one in entries_of_failure
+            methods.index(entry["method"]) + 0.7 * ((i + 0.5) / len(distinct_surface_failures) - 0.5)
+            for entry in entries_of_failure
         ]
         label = surface_failure.replace("_", " ").replace("+", " + ")
         axis.plot(

@@ -138,7 +138,7 @@ def apply_day_changes(
     trim_rates = _running_mean(samples.rates, round(_TRIM_RUNNING_MEAN_S / samples.dt_s))
     rates = trim_rates + day.motion_scale * (samples.rates - trim_rates)
     extra_noise_sd_ratio = np.sqrt(max(day.noise_ratio**2 - min(day.motion_scale, 1.0) ** 2, 0.0))
-    rates = rates + extra_noise_sd_ratio * _rates_under_noise(
+    rates = rates + extra_noise_sd_ratio * _rate_response_to_noise(
         rng, lagged_rate_coefficients, noise_covariance, len(rates)
     )
     return replace(samples, commands=commands, rates=rates)
@@ -166,7 +166,7 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], correlatio
     return np.asarray(lfilter([1.0], [1.0, -retention], white_noise, axis=0))
 
 
-def _rates_under_noise(
+def _rate_response_to_noise(
     rng: np.random.Generator, lagged_rate_coefficients: Floats, noise_covariance: Floats, n_samples: int
 ) -> Floats:
     """Return the rates (n, 3), rad/s, under white moments of the model's noise."""
@@ -232,8 +232,8 @@ def _score_days(
                 day, held_out.samples, lagged_rate_coefficients, noise_covariance
             )
             labels = benchmark.labels_in_usable_span(held_out)
-            for detector_name, method_scores in scores_by_detector.items():
-                method_scores.append(
+            for detector_name, part_scores in scores_by_detector.items():
+                part_scores.append(
                     scoring.score_against_labels(
                         diagnose_with_detector(detector_name, altered_samples, model), labels
                     )

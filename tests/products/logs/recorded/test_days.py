@@ -107,7 +107,7 @@ def response_to_noise():
 def test_air_by_its_recursion():
     """Past samples of the rates alone, newest first; what signals do is no air."""
     past = np.vstack([PAST, [[9.0, 9.0, 9.0]]])  # a signal's row
-    found = other_days._rates_under_noise(np.random.default_rng(3), past, NOISE, 40)
+    found = other_days._rate_response_to_noise(np.random.default_rng(3), past, NOISE, 40)
     moments = np.random.default_rng(3).standard_normal((40, 3)) @ np.linalg.cholesky(NOISE).T
     one = two = np.zeros(3)
     for k in range(40):

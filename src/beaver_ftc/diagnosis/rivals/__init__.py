@@ -40,12 +40,12 @@ def load_tuned_values() -> TunedValuesByGrade:
     return tuned_values_by_grade
 
 
-def flight_grade(has_errors: bool, ideal_actuators: bool) -> str:
+def flight_grade(has_errors: bool, has_ideal_actuators: bool) -> str:
     """Return the grade of a flight: with declared errors of sensors or air, with actuators that lag, or with
     neither."""
     if has_errors:
         return DECLARED_ERRORS_GRADE
-    return EXACT_GRADE if ideal_actuators else LAGGING_ACTUATORS_GRADE
+    return EXACT_GRADE if has_ideal_actuators else LAGGING_ACTUATORS_GRADE
 
 
 def tuned_values(

@@ -526,7 +526,7 @@ def account(frame):
         account_authority(sums.authority, control.axes)
     else:
         filters.update_max_residual_over_threshold(frame.fdi.bank)
-        statistical.update_max_alarm_score(frame.fdi.statistical.alarm)
+        statistical.update_max_alarm_score_so_far(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)
     note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)

@@ -64,7 +64,7 @@ def test_the_closest_approach_of_every_filter_is_kept():
         0.4,
     )
     filters.update_max_residual_over_threshold(fdi["bank"])
-    statistical.update_max_alarm_score(alarm)
+    statistical.update_max_alarm_score_so_far(alarm)
     assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert alarm["max_score_over_alarm_level_so_far"] == 0.4
     silent = new_fdi()

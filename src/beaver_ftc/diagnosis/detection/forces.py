@@ -260,11 +260,16 @@ def force_terms(aircraft: Aircraft, force_index: int) -> list[Term]:
 
 
 def configure_forces(
-    fdi: np.void, declared: Declared, trim: TrimState, acceleration_slopes_by_y: np.ndarray, dt_s: float
+    fdi: np.void,
+    declared: Declared,
+    trim: TrimState,
+    acceleration_slopes_by_air_data: np.ndarray,
+    dt_s: float,
 ) -> None:
     """Fill the record of forces that are `known` from what is declared.
 
-    acceleration_slopes_by_y (3, y.size): the slopes of the angular accelerations with y. dt_s: of a frame.
+    acceleration_slopes_by_air_data (3, y.size): the slopes of the angular accelerations with y. dt_s: of a
+    frame.
     """
     y = trim[1]
     statistical_record = fdi["statistical"]
@@ -294,10 +299,10 @@ def configure_forces(
         scaled_force_slopes = scaled_force_slopes_with_slipstream[:-1]
         scaled_force_per_slipstream = scaled_force_slopes_with_slipstream[-1]
         force_record["axis_and_force_innovation_per_vane_error"] = (
-            -acceleration_slopes_by_y[axis, vane_index],
+            -acceleration_slopes_by_air_data[axis, vane_index],
             -scaled_force_slopes[vane_index],
         )
-        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_y[0, vane_index]
+        force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index]
         force_record["innovation_per_air_rotation"] = scaled_force_slopes[3:]
         total_scaled_force_slopes = scaled_force_slopes.copy()
         total_scaled_force_slopes[AIRSPEED] += scaled_force_per_slipstream * slipstream_per_airspeed

@@ -255,8 +255,8 @@ def configure_statistical_detector(
             dt_s,
         )
         if uses_forces:
-            acceleration_slopes_by_y = jacobian(design, *trim)[3]
-            configure_forces(fdi, declared, trim, acceleration_slopes_by_y, dt_s)
+            acceleration_slopes_by_air_data = jacobian(design, *trim)[3]
+            configure_forces(fdi, declared, trim, acceleration_slopes_by_air_data, dt_s)
             gust["output"][
                 "uses_accelerometers"
             ] = not declared.monitors_sensors  # the monitor may find them broken
@@ -394,12 +394,12 @@ def _configure_drift_and_model_noise(
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
         max_constant_part_of_uncertainty_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
     )
-    _, G, acceleration_slopes_by_x, acceleration_slopes_by_y = jacobian(design, *trim)
+    _, G, acceleration_slopes_by_rates, acceleration_slopes_by_air_data = jacobian(design, *trim)
     statistical["noise"]["acceleration_variance_without_air_data"] = (
-        acceleration_slopes_by_x**2 @ reading_noise_std[:3] ** 2
+        acceleration_slopes_by_rates**2 @ reading_noise_std[:3] ** 2
     )
     acceleration_variance_by_air_data = (
-        acceleration_slopes_by_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
+        acceleration_slopes_by_air_data[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
     )  # later as `add_reading_regressors_and_model_noise` says
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
@@ -513,9 +513,11 @@ def fill_signal_change_per_reading(
         slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
             y, declared_errors.power_error_kw_per_density_ratio
         )
-        slipstream_per_other_reading = slipstream_per_pressure if reading_index == QDYN else slipstream_per_kw
+        slipstream_per_pressure_or_kw = (
+            slipstream_per_pressure if reading_index == QDYN else slipstream_per_kw
+        )
         signal_change_per_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
-            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_other_reading
+            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_pressure_or_kw
         )
 
 
@@ -747,7 +749,7 @@ def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_er
 
 
 @kernel
-def update_max_alarm_score(alarm):
+def update_max_alarm_score_so_far(alarm):
     """Keep the largest score over the alarm level so far."""
     alarm.max_score_over_alarm_level_so_far = max(
         alarm.max_score_over_alarm_level_so_far, alarm.score_over_alarm_level
@@ -1081,12 +1083,12 @@ def add_coefficient_regressors(frame_share_per_instant, coefficient_regressor, b
     for lateral_block in blocks[LATERAL_BLOCK:]:
         n_roll_terms, first_term_index = moment_table.surface_to[0], moment_table.free_from[2]
         for j in range(n_roll_terms):
-            roll_moment_per_coefficient = lateral_moment_per_coefficient * coefficient_regressor[j]
-            lateral_block.regressor[j, 0] += design.Pl * roll_moment_per_coefficient
-            lateral_block.regressor[j, 1] += design.Rl * roll_moment_per_coefficient
+            roll_moment_per_term_coefficient = lateral_moment_per_coefficient * coefficient_regressor[j]
+            lateral_block.regressor[j, 0] += design.Pl * roll_moment_per_term_coefficient
+            lateral_block.regressor[j, 1] += design.Rl * roll_moment_per_term_coefficient
         for j in range(moment_table.surface_to[2] - first_term_index):
-            yaw_moment_per_coefficient = (
+            yaw_moment_per_term_coefficient = (
                 lateral_moment_per_coefficient * coefficient_regressor[first_term_index + j]
             )
-            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment_per_coefficient
-            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment_per_coefficient
+            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment_per_term_coefficient
+            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment_per_term_coefficient

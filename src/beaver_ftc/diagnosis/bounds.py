@@ -163,21 +163,21 @@ def fill_error_map(
 ) -> None:
     """Write the map of the aircraft, if it has one. one_surface_may_be_anywhere: a faulty surface may be
     anywhere in its travel; several_surfaces_may_be_anywhere: more than one may."""
-    declared_error_map = aircraft.file.model_error_map
-    if declared_error_map is None:
+    model_error_map = aircraft.file.model_error_map
+    if model_error_map is None:
         return
-    n_travel_levels, n_time_rows = len(declared_error_map.travel_share), len(declared_error_map.until_s)
+    n_travel_levels, n_time_rows = len(model_error_map.travel_share), len(model_error_map.until_s)
     error_map["one_surface_may_be_anywhere"] = one_surface_may_be_anywhere
     error_map["several_surfaces_may_be_anywhere"] = several_surfaces_may_be_anywhere
-    error_map["n_boxes"] = len(declared_error_map.boxes)
+    error_map["n_boxes"] = len(model_error_map.boxes)
     error_map["n_travel_levels"], error_map["n_time_rows"] = (
         n_travel_levels,
         n_time_rows,
     )
-    error_map["until_s"][:n_time_rows] = declared_error_map.until_s
-    error_map["travel_share_by_level"][:n_travel_levels] = declared_error_map.travel_share
+    error_map["until_s"][:n_time_rows] = model_error_map.until_s
+    error_map["travel_share_by_level"][:n_travel_levels] = model_error_map.travel_share
     mapped_travel_share_of_surface = np.array(
-        [declared_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
+        [model_error_map.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces]
     )
     error_map["travel_low"] = mapped_travel_share_of_surface * [
         surface_travel.min_rad for surface_travel in aircraft.travel.values()
@@ -185,7 +185,7 @@ def fill_error_map(
     error_map["travel_high"] = mapped_travel_share_of_surface * [
         surface_travel.max_rad for surface_travel in aircraft.travel.values()
     ]
-    for box_index, box in enumerate(declared_error_map.boxes):
+    for box_index, box in enumerate(model_error_map.boxes):
         box_limits = np.array(box.ends(aircraft.signals))
         error_map["box_low"][box_index, : len(box_limits)] = box_limits[:, 0]
         error_map["box_high"][box_index, : len(box_limits)] = box_limits[:, 1]

@@ -27,7 +27,7 @@ else:
     __getattr__, __dir__ = lazily(__name__)
 
 
-THRUST_SIGNAL, YAWING_MOMENT_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
+THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME = "thrust", "engines_n"  # signals: CT and Cn
 MAX_CENTRE_OF_MASS_OFFSET_M = 0.05
 
 # n_engines: engines, 0 where they are not monitored. thrust_index, yawing_moment_index: places of the signals
@@ -59,11 +59,11 @@ def mean_thrust_arm_over_span(aircraft: Aircraft) -> float:
 
 def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
-    declared_error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
+    model_error_map, signal_names = aircraft.file.model_error_map, list(aircraft.signals)
     if (
-        declared_error_map is None
-        or not declared_error_map.knows_engines
-        or not {THRUST_SIGNAL, YAWING_MOMENT_SIGNAL} <= set(signals)
+        model_error_map is None
+        or not model_error_map.knows_engines
+        or not {THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME} <= set(signal_names)
     ):
         return
     config["n_engines"], config["mean_thrust_arm_over_span"] = (
@@ -71,7 +71,7 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
         mean_thrust_arm_over_span(aircraft),
     )
     config["thrust_index"], config["yawing_moment_index"] = (
-        DPT + signals.index(name) for name in (THRUST_SIGNAL, YAWING_MOMENT_SIGNAL)
+        DPT + signal_names.index(name) for name in (THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME)
     )
     config["yawing_moment_tolerance_per_thrust"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
 

@@ -185,7 +185,7 @@ def update_error_change_bounds(redundancy, initial_errors):
         test_index = index_of_test_showing_error_change(i)
         error_bound_at_start = initial_errors.error_bound_at_start[i]
         change_bound = (
-            max_effect_of_any_error(redundancy, test_index, SLOWEST_POLE_INDEX)
+            max_error_effect_allowed_by_residual(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
             * initial_errors.filtered_max_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
         )
@@ -406,18 +406,18 @@ def filter_effects_per_unit_error(redundancy, initial_errors):
 
 
 @kernel
-def max_effect_of_any_error(redundancy, test_index, pole_index):
+def max_error_effect_allowed_by_residual(redundancy, test_index, pole_index):
     """Bound the effect of any error on a test through a filter: r + B, in the unit of the residual."""
     test = redundancy.test[test_index]
     return abs(test.filtered_residual[pole_index]) + test.filtered_bound[pole_index]
 
 
 @kernel
-def max_current_error_effect(redundancy, initial_errors, hypothesis_index, test_index, pole_index):
+def max_error_effect_if_constant(redundancy, initial_errors, hypothesis_index, test_index, pole_index):
     """Bound the effect that the present error of a hypothesis, had it been constant, would have on a test
     through a filter: r + B + 2 d W_tm. The error was up to d larger or smaller while the filter summed it."""
     return (
-        max_effect_of_any_error(redundancy, test_index, pole_index)
+        max_error_effect_allowed_by_residual(redundancy, test_index, pole_index)
         + 2.0
         * initial_errors.error_change_bound[hypothesis_index]
         * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, pole_index]
@@ -437,26 +437,31 @@ def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect
 
 @kernel
 def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis_index, pole_index):
-    """The bound of `max_current_error_effect` on the velocity, m/s, in any direction."""
+    """The bound of `max_error_effect_if_constant` on the velocity, m/s, in any direction."""
     V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     max_flow_angle_effect = np.hypot(
-        max_current_error_effect(redundancy, initial_errors, hypothesis_index, ALPHA_FLOW_TEST, pole_index),
-        max_current_error_effect(redundancy, initial_errors, hypothesis_index, BETA_FLOW_TEST, pole_index),
+        max_error_effect_if_constant(
+            redundancy, initial_errors, hypothesis_index, ALPHA_FLOW_TEST, pole_index
+        ),
+        max_error_effect_if_constant(
+            redundancy, initial_errors, hypothesis_index, BETA_FLOW_TEST, pole_index
+        ),
     )
     return np.hypot(
-        max_current_error_effect(redundancy, initial_errors, hypothesis_index, SPEED_TEST, pole_index),
+        max_error_effect_if_constant(redundancy, initial_errors, hypothesis_index, SPEED_TEST, pole_index),
         V * max_flow_angle_effect,
     )
 
 
 @kernel
 def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_index, pole_index):
-    """The bound of `max_current_error_effect` on the rotation about the body's second and third axes, rad."""
+    """The bound of `max_error_effect_if_constant` on the rotation about the body's second and third axes,
+    rad."""
     return np.hypot(
-        max_current_error_effect(
+        max_error_effect_if_constant(
             redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 1, pole_index
         ),
-        max_current_error_effect(
+        max_error_effect_if_constant(
             redundancy, initial_errors, hypothesis_index, FIRST_TURN_TEST + 2, pole_index
         ),
     )
@@ -492,7 +497,7 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             filtered_signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX],
         )
         max_rotation_effect = np.hypot(
-            max_current_error_effect(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
+            max_error_effect_if_constant(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, THETA_HYPOTHESIS, m),
         )
         tighten_error_bound(
@@ -520,13 +525,15 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
-        max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
+        max_error_effect_if_constant(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
         filtered_signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX],
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
-        max_current_error_effect(redundancy, initial_errors, ALPHA_HYPOTHESIS, BETA_FLOW_TEST, pole_index),
+        max_error_effect_if_constant(
+            redundancy, initial_errors, ALPHA_HYPOTHESIS, BETA_FLOW_TEST, pole_index
+        ),
         min_effect_per_unit_error,
     )
     min_effect_per_unit_error = (
@@ -537,7 +544,9 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     tighten_error_bound(
         initial_errors,
         BETA_HYPOTHESIS,
-        max_current_error_effect(redundancy, initial_errors, BETA_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index),
+        max_error_effect_if_constant(
+            redundancy, initial_errors, BETA_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
+        ),
         min_effect_per_unit_error,
     )
 
@@ -555,7 +564,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         initial_errors,
         AIRSPEED_HYPOTHESIS,
         max_reading_over_truth
-        * max_current_error_effect(
+        * max_error_effect_if_constant(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
         abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX]),
@@ -564,7 +573,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         initial_errors,
         AIRSPEED_HYPOTHESIS,
         max_reading_over_truth
-        * max_current_error_effect(
+        * max_error_effect_if_constant(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
         abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX]),
@@ -572,13 +581,15 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     max_error_change_effect_on_density = (
         2.0
         * max_reading_over_truth
-        * max_effect_of_any_error(redundancy, SPEED_TEST, pole_index)
+        * max_error_effect_allowed_by_residual(redundancy, SPEED_TEST, pole_index)
         / max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
     )
     tighten_error_bound(
         initial_errors,
         AIRSPEED_HYPOTHESIS,
-        max_current_error_effect(redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index)
+        max_error_effect_if_constant(
+            redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index
+        )
         + max_error_change_effect_on_density,
         abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX]),
     )

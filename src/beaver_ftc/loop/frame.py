@@ -351,7 +351,7 @@ def monitor_sensors(frame):
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
         sensor_monitor.set_expected_manifold_pressure(monitor, engine.command[0])
-    sensor_monitor.monitor_sensors(
+    sensor_monitor.check_sensors_and_replace_readings(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )
     if monitor.output.alarmed and not (before or monitor.output.keeps_surface_conclusion):

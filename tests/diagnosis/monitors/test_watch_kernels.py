@@ -476,7 +476,7 @@ def test_a_first_error_of_a_gyro_need_not_be_in_the_filter(first, say):
     monitor = new_watch(start_stage=1, substep=0, apparent_gyro_error=(first, -first, 2.0 * first))
     for substep in (0, 1, 2, 3):
         monitor["memory"]["substep"] = substep
-        watching.advance_start_stage_and_widen_W_bound(monitor)
+        watching.advance_start_stage_and_widen_gyro_error_bound(monitor)
     assert monitor["memory"]["start_stage"] == 2
     assert monitor["memory"]["gyro_error_estimate_bound"].tolist() == [first, first, 2.0 * first], (
         "once, at the first look of the frame"
@@ -550,10 +550,10 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test["filtered_bound"][FIRST_TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
     test["residual"][FIRST_TURN_TEST + 1] = size * limit + H * 0.5
-    watching.rule_out_gyros_if_W_and_attitude_differ(monitor)
+    watching.rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
-    watching.rule_out_gyros_if_W_and_attitude_differ(monitor)
+    watching.rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx(size * limit * kept)
     assert monitor["memory"]["filtered_turn_difference_bound"][1] == pytest.approx(
@@ -658,7 +658,7 @@ def looked(monitor, fdi, **signal):
     for name, value in signal.items():
         measured["signal"][{"phi": PHI, "altitude": ALTITUDE, "p": 0}[name]] += value
     prediction = np.zeros(1, prediction_dtype(4)).view(np.recarray)[0]
-    on(watching.monitor_sensors, fdi, monitor, prediction, measured, 3.0)
+    on(watching.check_sensors_and_replace_readings, fdi, monitor, prediction, measured, 3.0)
     return measured
 
 

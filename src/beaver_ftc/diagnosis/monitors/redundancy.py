@@ -52,8 +52,10 @@ CLIMB_TEST = 10
 RPM_TEST = 11
 MANIFOLD_PRESSURE_TEST = 12
 N_TESTS_WITH_EQUATION = 13  # tests with an equation; then those of sensors that should equal another reading
-DUPLICATE_SENSORS = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
-N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_SENSORS)
+DUPLICATE_SENSOR_INDEX_AND_COUNTERPART = tuple(
+    (SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None
+)
+N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_SENSOR_INDEX_AND_COUNTERPART)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
 TEST_INDEX_BY_NAME = {
     "roll": FIRST_TURN_TEST, "pitch": FIRST_TURN_TEST + 1, "yaw": FIRST_TURN_TEST + 2,
@@ -64,18 +66,21 @@ TEST_INDEX_BY_NAME = {
 # Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
-DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSORS], np.int64)
+DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART], np.int64)
 DUPLICATED_READING_INDEX = np.array(
-    [SENSORS.index(counterpart.reading) for _, counterpart in DUPLICATE_SENSORS], np.int64
+    [SENSORS.index(counterpart.reading) for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART],
+    np.int64,
 )
 DUPLICATED_READING_TEST_INDEX = np.array(
     [
         TEST_INDEX_BY_NAME[ROWS[SENSORS.index(counterpart.reading)].test]
-        for _, counterpart in DUPLICATE_SENSORS
+        for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART
     ],
     np.int64,
 )
-DUPLICATE_TOLERANCE = np.array([counterpart.within for _, counterpart in DUPLICATE_SENSORS], float)
+DUPLICATE_TOLERANCE = np.array(
+    [counterpart.within for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART], float
+)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
@@ -172,7 +177,7 @@ MONITOR_MEMORY_RECORD = record(
     gyro_error_estimate=3, gyro_error_estimate_bound=3, previous_gyro_error_estimate_bound=3,
     previous_gyro_error_estimate=3,
     # a sensor with the reading that it should equal
-    has_duplicate_agreed=(int, max(len(DUPLICATE_SENSORS), 1)),
+    has_duplicate_agreed=(int, max(len(DUPLICATE_SENSOR_INDEX_AND_COUNTERPART), 1)),
     # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
     # beyond it no gyro can be broken
     gyros_excluded=int, filtered_turn_difference=(3, N_POLES), filtered_turn_difference_bound=(3, N_POLES),
@@ -350,7 +355,7 @@ MIN_READING_SHARE_LEFT_BY_ERROR = 0.01
 READING_ROUNDING_SHARE = 1e-10  # of a reading: the part of each bound that covers rounding
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
-INTEGRATION_WEIGHT, PREVIOUS_INTEGRATION_WEIGHT = 1.5, 0.5
+INTEGRATION_WEIGHT, SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
 POSITION_INTEGRATION_ERROR_FACTOR = 4.0 / 3.0
@@ -384,13 +389,13 @@ def advance_quaternion(quaternion, rates, duration_s, out):
 
 
 @kernel
-def small_rotation_angle(from_quaternion, to_quaternion, component):
+def small_rotation_angle(from_quaternion, to_quaternion, quaternion_component):
     """Component (1, 2, 3) in body axes of the small rotation from one attitude (4,) to the other, rad."""
     q_from = from_quaternion
     q_to = to_quaternion
-    i = component
-    j = component % 3 + 1
-    k = (component + 1) % 3 + 1
+    i = quaternion_component
+    j = quaternion_component % 3 + 1
+    k = (quaternion_component + 1) % 3 + 1
     half_angle = q_from[0] * q_to[i] - q_from[i] * q_to[0] - q_from[j] * q_to[k] + q_from[k] * q_to[j]
     scalar_part = q_from[0] * q_to[0] + q_from[1] * q_to[1] + q_from[2] * q_to[2] + q_from[3] * q_to[3]
     return 2.0 * half_angle if scalar_part >= 0.0 else -2.0 * half_angle
@@ -447,7 +452,7 @@ def fill_reading_error_bounds(redundancy, readings):
 @kernel
 def store_sample(redundancy, readings, specific_force):
     """Store this sample for the next one; readings (N_SENSORS,) SI, specific_force (3,) m/s2."""
-    memory, gravity = redundancy.memory, redundancy.config.gravity_m_s2
+    memory, gravity_m_s2 = redundancy.memory, redundancy.config.gravity_m_s2
     memory.previous_reading[:], memory.error_bound_two_samples_ago[:] = readings, memory.previous_error_bound
     memory.previous_error_bound[:] = memory.reading_error_bound
     fill_quaternion(readings[PHI], readings[THETA], readings[PSI], memory.previous_quaternion)
@@ -455,9 +460,9 @@ def store_sample(redundancy, readings, specific_force):
     memory.body_velocity[0] = V * np.cos(alpha) * np.cos(beta)
     memory.body_velocity[1], memory.body_velocity[2] = V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     theta, phi = readings[THETA], readings[PHI]
-    memory.body_acceleration[0] = specific_force[0] - gravity * np.sin(theta)
-    memory.body_acceleration[1] = specific_force[1] + gravity * np.cos(theta) * np.sin(phi)
-    memory.body_acceleration[2] = specific_force[2] + gravity * np.cos(theta) * np.cos(phi)
+    memory.body_acceleration[0] = specific_force[0] - gravity_m_s2 * np.sin(theta)
+    memory.body_acceleration[1] = specific_force[1] + gravity_m_s2 * np.cos(theta) * np.sin(phi)
+    memory.body_acceleration[2] = specific_force[2] + gravity_m_s2 * np.cos(theta) * np.cos(phi)
 
 
 @kernel
@@ -502,7 +507,7 @@ def predict_readings(redundancy):
     for i in range(3):
         scratch_vector[i] = (
             INTEGRATION_WEIGHT * memory.body_acceleration[i]
-            - PREVIOUS_INTEGRATION_WEIGHT * memory.previous_body_acceleration[i]
+            - SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * memory.previous_body_acceleration[i]
         )
     memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
@@ -553,7 +558,7 @@ def extrapolated_error_bound(redundancy, sensor):
     constant error counts once."""
     return (
         INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[sensor]
-        + PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
+        + SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
         - redundancy.config.constant_error_bound[sensor]
     )
 
@@ -568,9 +573,9 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
     """
     config, memory = redundancy.config, redundancy.memory
     tilt_error_bound = extrapolated_error_bound(redundancy, PHI) + extrapolated_error_bound(redundancy, THETA)
-    gravity = config.gravity_m_s2
+    gravity_m_s2 = config.gravity_m_s2
     squared_force_error_bound_sum = 0.0
-    constant_acceleration_error_bound = gravity * (
+    constant_acceleration_error_bound = gravity_m_s2 * (
         config.constant_error_bound[PHI] + config.constant_error_bound[THETA]
     )
     for i in range(AX, AX + 3):
@@ -578,12 +583,14 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
         constant_acceleration_error_bound += config.constant_error_bound[i]
     axis_turning_error_bound = config.sample_time_s * (
         max_turn_rate * constant_acceleration_error_bound
-        + PREVIOUS_INTEGRATION_WEIGHT * gyro_error_bound_sum * memory.previous_acceleration_magnitude
+        + SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT
+        * gyro_error_bound_sum
+        * memory.previous_acceleration_magnitude
     )
     return (
         EARTH_ACCELERATION_BOUND_M_S2
         + memory.first_acceleration_error_bound
-        + gravity * tilt_error_bound
+        + gravity_m_s2 * tilt_error_bound
         + np.sqrt(squared_force_error_bound_sum)
         + axis_turning_error_bound
     )
@@ -888,7 +895,9 @@ def start_redundancy_tests(redundancy, readings, specific_force):
     memory.acceleration_magnitude = memory.earlier_acceleration_magnitudes[0] = (
         vector_length(memory.body_acceleration) + MIN_FAULTY_FORCE_JUMP_M_S2
     )
-    memory.first_acceleration_error_bound = PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
+    memory.first_acceleration_error_bound = (
+        SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
+    )
     bound_residuals(redundancy, readings)
     for test_index in range(RPM_TEST):
         restart_test(redundancy.test[test_index])

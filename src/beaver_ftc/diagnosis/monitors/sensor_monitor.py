@@ -340,18 +340,24 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
     spurious_velocity_along_flow = flow_residual_sum_since_alarm[0]
-    spurious_velocity_down = V * np.cos(beta) * flow_residual_sum_since_alarm[1]
-    spurious_velocity_sideways = V * flow_residual_sum_since_alarm[2]
+    spurious_velocity_across_flow_down = V * np.cos(beta) * flow_residual_sum_since_alarm[1]
+    spurious_velocity_across_flow_sideways = V * flow_residual_sum_since_alarm[2]
     spurious_velocity = memory.spurious_velocity
     largest_component_magnitude = 0.0
-    spurious_velocity_ahead = (
-        np.cos(beta) * spurious_velocity_along_flow - np.sin(beta) * spurious_velocity_sideways
+    spurious_velocity_along_projected_flow = (
+        np.cos(beta) * spurious_velocity_along_flow - np.sin(beta) * spurious_velocity_across_flow_sideways
     )
-    spurious_velocity[0] = np.cos(alpha) * spurious_velocity_ahead - np.sin(alpha) * spurious_velocity_down
+    spurious_velocity[0] = (
+        np.cos(alpha) * spurious_velocity_along_projected_flow
+        - np.sin(alpha) * spurious_velocity_across_flow_down
+    )
     spurious_velocity[1] = (
-        np.sin(beta) * spurious_velocity_along_flow + np.cos(beta) * spurious_velocity_sideways
+        np.sin(beta) * spurious_velocity_along_flow + np.cos(beta) * spurious_velocity_across_flow_sideways
     )
-    spurious_velocity[2] = np.sin(alpha) * spurious_velocity_ahead + np.cos(alpha) * spurious_velocity_down
+    spurious_velocity[2] = (
+        np.sin(alpha) * spurious_velocity_along_projected_flow
+        + np.cos(alpha) * spurious_velocity_across_flow_down
+    )
     spurious_velocity_bound_if_healthy = flow_bound_sum_since_alarm[0] + V * (
         flow_bound_sum_since_alarm[1] + flow_bound_sum_since_alarm[2]
     )  # m/s, of sound sensors
@@ -385,7 +391,7 @@ MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier w
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
-FIRST_REPLACED_RATE_POLE_INDEX = 1
+INITIAL_RATE_ESTIMATE_POLE_INDEX = 1
 
 # Gyro or attitude (judge_gyro_errors)
 RATE_DAMPING_RELATIVE_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
@@ -407,7 +413,9 @@ FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 
 @kernel
-def monitor_sensors(monitor, prediction, measured, surface_conclusion, filter_bank, bound_record, dt, t):
+def check_sensors_and_replace_readings(
+    monitor, prediction, measured, surface_conclusion, filter_bank, bound_record, dt, t
+):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
     filter_bank: detection filters, with the innovation of the elapsed frame, of dt s; bound_record: with the
@@ -434,17 +442,19 @@ def monitor_sensors(monitor, prediction, measured, surface_conclusion, filter_ba
         memory.previous_substep_gyro_error_peak[:] = memory.substep_gyro_error_peak
         memory.substep_gyro_error_peak[:] = 0.0
     for i in range(3):
-        apparent_gyro_error = -redundancy.test[FIRST_TURN_TEST + i].residual / redundancy.config.sample_time_s
+        gyro_error_by_attitude = (
+            -redundancy.test[FIRST_TURN_TEST + i].residual / redundancy.config.sample_time_s
+        )
         if memory.substep == 0:
-            memory.apparent_gyro_error[i] = apparent_gyro_error
+            memory.apparent_gyro_error[i] = gyro_error_by_attitude
         else:
             memory.substep_gyro_error_peak[i] = max(
-                memory.substep_gyro_error_peak[i], abs(apparent_gyro_error)
+                memory.substep_gyro_error_peak[i], abs(gyro_error_by_attitude)
             )
     if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
-        advance_start_stage_and_widen_W_bound(monitor)
+        advance_start_stage_and_widen_gyro_error_bound(monitor)
     if monitor.config.attitude_is_noisy:
-        rule_out_gyros_if_W_and_attitude_differ(monitor)
+        rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
     raise_alarm_and_isolate_broken_sensor(
         monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t
     )
@@ -474,7 +484,7 @@ def begin_monitor(monitor, measured, t):
 
 
 @kernel
-def advance_start_stage_and_widen_W_bound(monitor):
+def advance_start_stage_and_widen_gyro_error_bound(monitor):
     """Widen the bound on W by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error."""
     memory = monitor.memory
@@ -487,25 +497,28 @@ def advance_start_stage_and_widen_W_bound(monitor):
 
 @kernel
 def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
-    """Advance W (3,) rad/s and its bound by the frame of dt s with innovation and eta_bar (3,) rad/s2."""
+    """Advance W (3,) rad/s, the gyro error if the dynamics are right, and its bound by the frame of dt s with
+    innovation and eta_bar (3,) rad/s2."""
     memory, D = monitor.memory, monitor.config.rate_damping_per_s
-    W = memory.gyro_error_estimate
-    W_bound = memory.gyro_error_estimate_bound
-    previous_W = memory.previous_gyro_error_estimate
-    previous_W_bound = memory.previous_gyro_error_estimate_bound
-    previous_W_bound[:] = W_bound
-    previous_W[:] = W
+    gyro_error = memory.gyro_error_estimate
+    gyro_error_bound = memory.gyro_error_estimate_bound
+    previous_gyro_error = memory.previous_gyro_error_estimate
+    previous_gyro_error_bound = memory.previous_gyro_error_estimate_bound
+    previous_gyro_error_bound[:] = gyro_error_bound
+    previous_gyro_error[:] = gyro_error
     for i in range(3):
-        damping_acceleration, W_bound_growth_by_damping = 0.0, 0.0
+        damping_deceleration, bound_growth_by_damping = 0.0, 0.0
         for j in range(3):
-            damping_acceleration += D[i, j] * previous_W[j]
-            W_bound_growth_by_damping += (-D[i, j] if i == j else abs(D[i, j])) * previous_W_bound[j]
-        W[i] += dt * (innovation[i] - damping_acceleration)
-        W_bound[i] = max(previous_W_bound[i] + dt * (eta_bar[i] + W_bound_growth_by_damping), 0.0)
+            damping_deceleration += D[i, j] * previous_gyro_error[j]
+            bound_growth_by_damping += (-D[i, j] if i == j else abs(D[i, j])) * previous_gyro_error_bound[j]
+        gyro_error[i] += dt * (innovation[i] - damping_deceleration)
+        gyro_error_bound[i] = max(
+            previous_gyro_error_bound[i] + dt * (eta_bar[i] + bound_growth_by_damping), 0.0
+        )
 
 
 @kernel
-def rule_out_gyros_if_W_and_attitude_differ(monitor):
+def rule_out_gyros_if_dynamics_and_attitude_differ(monitor):
     """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
     Where the attitude is noisy, a surface is isolated only after that.
@@ -513,7 +526,7 @@ def rule_out_gyros_if_W_and_attitude_differ(monitor):
     memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
         test = monitor.redundancy.test[FIRST_TURN_TEST + i]
-        W_error_bound = memory.gyro_error_estimate_bound[i] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(
+        estimate_error_bound = memory.gyro_error_estimate_bound[i] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(
             memory.gyro_error_estimate[i]
         )
         for m, decay in enumerate(config.filter_decay):
@@ -523,7 +536,7 @@ def rule_out_gyros_if_W_and_attitude_differ(monitor):
                 + config.sample_time_s * memory.gyro_error_estimate[i]
             )
             memory.filtered_turn_difference_bound[i, m] = advance_residual_bound(
-                memory.filtered_turn_difference_bound[i, m], W_error_bound, decay, config.sample_time_s
+                memory.filtered_turn_difference_bound[i, m], estimate_error_bound, decay, config.sample_time_s
             )
             if (
                 abs(memory.filtered_turn_difference[i, m])
@@ -621,13 +634,13 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
     for i in range(3):
         if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
-        apparent_gyro_error = memory.apparent_gyro_error[i]
-        previous_apparent_gyro_error = memory.previous_apparent_gyro_error[i]
-        jump_acceleration = (apparent_gyro_error - previous_apparent_gyro_error) / dt  # rad/s2
+        gyro_error_by_attitude = memory.apparent_gyro_error[i]
+        previous_gyro_error_by_attitude = memory.previous_apparent_gyro_error[i]
+        jump_acceleration = (gyro_error_by_attitude - previous_gyro_error_by_attitude) / dt  # rad/s2
         jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
-            abs(apparent_gyro_error), abs(previous_apparent_gyro_error)
+            abs(gyro_error_by_attitude), abs(previous_gyro_error_by_attitude)
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
-        apparent_error_noise_bound = (  # of apparent_gyro_error, rad/s, by the attitude's noise
+        attitude_rate_noise_bound = (  # of gyro_error_by_attitude, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
             * monitor.redundancy.test[FIRST_TURN_TEST + i].bound_per_sample
             / monitor.redundancy.config.sample_time_s
@@ -640,26 +653,26 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
         )
         transient_peak = memory.earlier_substep_gyro_error_peak[i]
         remaining_peak = max(
-            abs(previous_apparent_gyro_error),
+            abs(previous_gyro_error_by_attitude),
             memory.previous_substep_gyro_error_peak[i],
-            abs(apparent_gyro_error),
+            abs(gyro_error_by_attitude),
         )
         is_transient = (
             remaining_peak < MAX_REMAINING_TRANSIENT_SHARE * transient_peak
-            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * apparent_error_noise_bound
+            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * attitude_rate_noise_bound
         )
         innovation_fits_gyro_jump = (
             abs(innovation[i] - jump_acceleration)
-            <= innovation_bound + jump_acceleration_tolerance + apparent_error_noise_bound / dt
+            <= innovation_bound + jump_acceleration_tolerance + attitude_rate_noise_bound / dt
         )
-        W_may_follow_error = (
-            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(apparent_gyro_error)
+        dynamics_may_follow_gyro_error = (
+            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(gyro_error_by_attitude)
             <= memory.gyro_error_estimate_bound[i]
             + abs(memory.gyro_error_estimate[i])
-            + apparent_error_noise_bound
+            + attitude_rate_noise_bound
         )
         if not innovation_fits_gyro_jump or (
-            not dynamics_show_error and (is_transient or not W_may_follow_error)
+            not dynamics_show_error and (is_transient or not dynamics_may_follow_gyro_error)
         ):
             memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
         elif dynamics_show_error:
@@ -850,12 +863,12 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
             if acts_fully_on_flow
             else flow_test_record.filtered_bound[m]
         )
-        max_hidden_turn = (
+        max_flow_effect_of_hidden_error = (
             MAX_HIDDEN_ERROR_PER_TEST_BOUND
             * (1.0 if acts_fully_on_flow else share_of_gyro_error_acting_on_flow)
             * turn_test.filtered_bound[m]
         )
-        if abs(flow_test_record.filtered_residual[m]) > max_hidden_turn + flow_residual_bound:
+        if abs(flow_test_record.filtered_residual[m]) > max_flow_effect_of_hidden_error + flow_residual_bound:
             return False
     # q does not act on the sideslip
     return acts_fully_on_flow or gyro_index == 0 or flow_test_index == ALPHA_FLOW_TEST
@@ -1070,8 +1083,8 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
         angle_correction = (
             config.sample_time_s
-            * FILTER_POLES_PER_S[FIRST_REPLACED_RATE_POLE_INDEX]
-            * test.filtered_residual[FIRST_REPLACED_RATE_POLE_INDEX]
+            * FILTER_POLES_PER_S[INITIAL_RATE_ESTIMATE_POLE_INDEX]
+            * test.filtered_residual[INITIAL_RATE_ESTIMATE_POLE_INDEX]
         )
     monitor.memory.is_rate_replaced[axis] = 1
     corrected_previous_rate = memory.previous_reading[axis] + angle_correction / config.sample_time_s

@@ -15,7 +15,7 @@ from beaver_ftc_logs.recording import Column, Floats
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, KIND_AND_SI_FACTOR_OF_UNIT, RATE, nearest_unit
 
 _INTEGRATION_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _UNIT_RATIO_TOLERANCE = 20, 0.7, 1.3
+_MIN_MANY_WINDOWS, _MIN_AGREEING_CORRELATION, _MAX_UNIT_RATIO = 20, 0.7, 1.3
 _HIGH_CORRELATION, _EXACT_CORRELATION = 0.95, 0.99
 _MAX_SLOPE_FACTOR, _MAX_SLOPE_FACTOR_OF_FEW_WINDOWS = 1.5, 1.8
 _LOW_CORRELATION, _LOW_CORRELATION_OF_FEW_WINDOWS = 0.4, 0.2
@@ -112,7 +112,9 @@ def _fit_angle_to_rate(
     rate_term_integrals = np.vstack(
         [
             np.zeros(len(rate_terms)),
-            np.cumsum([step_without_gaps * _means_of_neighbours(one) for one in rate_terms], axis=1).T,
+            np.cumsum(
+                [step_without_gaps * _means_of_neighbours(rate_term) for rate_term in rate_terms], axis=1
+            ).T,
         ]
     )
     window_samples = max(round(_INTEGRATION_WINDOW_S / max(float(np.median(step_s)), 1e-9)), 1)
@@ -171,15 +173,17 @@ _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
 def find_attitude_mistake(
-    rate_column_by_name: Mapping[str, Column],
+    rate_by_column_name: Mapping[str, Column],
     named_angles: Sequence[NamedColumn | None],
     possible_rate_columns: Mapping[str, Column],
 ) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. possible_rate_columns: what may
     have taken the place of a rate."""
-    rate_columns = list(rate_column_by_name.values())
-    for axis, (rate_name, named_angle) in enumerate(zip(rate_column_by_name, named_angles, strict=True)):
+    rate_columns = list(rate_by_column_name.values())
+    for axis, (rate_column_name, named_angle) in enumerate(
+        zip(rate_by_column_name, named_angles, strict=True)
+    ):
         if named_angle is None:
             continue
         if axis == 1 and (remark := pitch_angle_unit_remark(named_angle[1], named_angle[0])):
@@ -187,17 +191,23 @@ def find_attitude_mistake(
         fit = _fit_angle_of_axis(rate_columns, named_angles, axis)
         if fit is None:
             continue
-        for candidate_name, candidate_column in {**rate_column_by_name, **possible_rate_columns}.items():
+        for candidate_column_name, candidate_column in {
+            **rate_by_column_name,
+            **possible_rate_columns,
+        }.items():
             candidate_fit = _fit_angle_of_axis(
                 [*rate_columns[:axis], candidate_column, *rate_columns[axis + 1 :]], named_angles, axis
             )
             if candidate_fit is not None and abs(
                 candidate_fit.correlation
-            ) > _min_correlation_to_replace_rate(fit, candidate_name in rate_column_by_name):
+            ) > _min_correlation_to_replace_rate(fit, candidate_column_name in rate_by_column_name):
                 return _exchanged_column_text(
-                    named_angle[0], (rate_name, fit), (candidate_name, candidate_fit), _RATE_TITLES[axis]
+                    named_angle[0],
+                    (rate_column_name, fit),
+                    (candidate_column_name, candidate_fit),
+                    _RATE_TITLES[axis],
                 )
-        if remark := angle_rate_remark(fit, rate_name, named_angle[0]):
+        if remark := angle_rate_remark(fit, rate_column_name, named_angle[0]):
             return remark
     return None
 
@@ -222,7 +232,9 @@ def _fit_angle_of_axis(
     rate_columns: list[Column], named_angles: Sequence[NamedColumn | None], axis: int
 ) -> AngleRateFit | None:
     """How the angle of a place follows the rates; None where too little moves, or it is not known."""
-    (roll_column, pitch_column, yaw_column) = (None if one is None else one[1] for one in named_angles)
+    (roll_column, pitch_column, yaw_column) = (
+        None if named_angle is None else named_angle[1] for named_angle in named_angles
+    )
     if roll_column is None or (angle_column := (roll_column, pitch_column, yaw_column)[axis]) is None:
         return None
     if axis == 2:
@@ -235,21 +247,21 @@ def _fit_angle_of_axis(
 
 
 def _exchanged_column_text(
-    angle_column: str,
-    named_rate: tuple[str, AngleRateFit],
-    better_column: tuple[str, AngleRateFit],
+    angle_column_name: str,
+    rate_name_and_fit: tuple[str, AngleRateFit],
+    better_name_and_fit: tuple[str, AngleRateFit],
     rate_title: str,
 ) -> str:
-    (rate_name, rate_fit), (better_name, better_fit) = named_rate, better_column
+    (rate_column_name, rate_fit), (better_column_name, better_fit) = rate_name_and_fit, better_name_and_fit
     return (
-        f"{angle_column} does not follow {rate_name} (correlation {rate_fit.correlation:.2f}) but "
-        f"{better_name} ({better_fit.correlation:.2f}): {better_name} is the {rate_title}"
+        f"{angle_column_name} does not follow {rate_column_name} (correlation {rate_fit.correlation:.2f}) "
+        f"but {better_column_name} ({better_fit.correlation:.2f}): {better_column_name} is the {rate_title}"
     )
 
 
-def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) -> str | None:
+def angle_rate_remark(fit: AngleRateFit, rate_column_name: str, angle_column_name: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
-    nothing is. rate_column, angle_column: their columns.
+    nothing is. rate_column_name, angle_column_name: their columns.
 
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
@@ -258,26 +270,28 @@ def angle_rate_remark(fit: AngleRateFit, rate_column: str, angle_column: str) ->
     is_near_one = 1.0 / max_slope_factor < slope_magnitude < max_slope_factor
     if abs(fit.correlation) < _MIN_AGREEING_CORRELATION or (is_near_one and fit.slope > 0.0):
         return None
-    slope_text = f"the change of {angle_column} is {fit.slope:.4g} times the integral of {rate_column}"
+    slope_text = (
+        f"the change of {angle_column_name} is {fit.slope:.4g} times the integral of {rate_column_name}"
+    )
     if is_near_one:
         return f"{slope_text}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ROLL_YAW_RAD and (
-        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _UNIT_RATIO_TOLERANCE)
+        unit := nearest_unit(ANGLE, 1.0 / slope_magnitude, _MAX_UNIT_RATIO)
     ):
         return (
-            f"{slope_text}: {angle_column} is in {unit}, a factor of "
+            f"{slope_text}: {angle_column_name} is in {unit}, a factor of "
             f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         )
     if fit.max_rate_magnitude > _IMPLAUSIBLE_RATE_RAD_S and (
-        unit := nearest_unit(RATE, slope_magnitude, _UNIT_RATIO_TOLERANCE)
+        unit := nearest_unit(RATE, slope_magnitude, _MAX_UNIT_RATIO)
     ):
         return (
-            f"{slope_text}: {rate_column} is in {unit}, a factor of "
+            f"{slope_text}: {rate_column_name} is in {unit}, a factor of "
             f"{KIND_AND_SI_FACTOR_OF_UNIT[unit][1]:.4g} fits"
         )
     return (
-        f"{slope_text}: a factor of {slope_magnitude:.4g} on {rate_column} fits, or of "
-        f"{1.0 / slope_magnitude:.4g} on {angle_column}"
+        f"{slope_text}: a factor of {slope_magnitude:.4g} on {rate_column_name} fits, or of "
+        f"{1.0 / slope_magnitude:.4g} on {angle_column_name}"
     )
 
 
@@ -288,7 +302,11 @@ def pitch_angle_unit_remark(pitch_column: Column, column_name: str) -> str | Non
     if max_pitch <= _MAX_PITCH_RAD:
         return None
     unit = next(
-        (one for one in ("deg", "cdeg") if max_pitch * KIND_AND_SI_FACTOR_OF_UNIT[one][1] <= _MAX_PITCH_RAD),
+        (
+            candidate_unit
+            for candidate_unit in ("deg", "cdeg")
+            if max_pitch * KIND_AND_SI_FACTOR_OF_UNIT[candidate_unit][1] <= _MAX_PITCH_RAD
+        ),
         None,
     )
     fitting_unit_text = (

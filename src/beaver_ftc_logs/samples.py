@@ -281,8 +281,8 @@ def _sampled_energy_height_rate_mps(
 def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     columns, attitude, mistake = recording.columns, vehicle.attitude, None
-    rate_column_by_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
-    if attitude and not signals.is_clipped(next(iter(rate_column_by_name.values())).values).any():
+    rate_by_column_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
+    if attitude and not signals.is_clipped(next(iter(rate_by_column_name.values())).values).any():
         angle_quantities = [attitude.roll, attitude.pitch, attitude.yaw]
         named_angles = [
             (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
@@ -296,7 +296,7 @@ def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> No
         possible_rate_columns = {
             name: columns[name] for name in dict.fromkeys(possible_rate_column_names) if name in columns
         }
-        mistake = physics.find_attitude_mistake(rate_column_by_name, named_angles, possible_rate_columns)
+        mistake = physics.find_attitude_mistake(rate_by_column_name, named_angles, possible_rate_columns)
     z_acceleration_column = vehicle.acceleration and recording.columns.get(vehicle.acceleration.column)
     if not mistake and vehicle.acceleration and z_acceleration_column:
         mistake = physics.gravity_remark(z_acceleration_column, vehicle.acceleration.column)

@@ -103,7 +103,7 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
     """One event; name and effectiveness as they stood for most of it."""
     names, n_rows_of_name = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     main_name = str(names[n_rows_of_name.argmax()])
-    mentioned_surfaces = surfaces if main_name in (UNKNOWN_SURFACE, ENGINE) else main_name.split("+")
+    reported_surfaces = surfaces if main_name in (UNKNOWN_SURFACE, ENGINE) else main_name.split("+")
     effectiveness_arrays = {
         "estimate": rows.effectiveness,
         "low": rows.effectiveness_low,
@@ -119,26 +119,26 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
         "effectiveness": {
             name: {key: float(median[i]) for key, median in medians.items()}
             for i, name in enumerate(surfaces)
-            if name in mentioned_surfaces
+            if name in reported_surfaces
         },
     }
 
 
-def lasting_events(events: list[Document]) -> list[Document]:
+def lasting_or_else_all_events(events: list[Document]) -> list[Document]:
     """The events that are not brief; all of them where every one is."""
     return [event for event in events if not event["brief"]] or events
 
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    shown_events, n_events = lasting_events(verdict["events"]), len(verdict["events"])
+    shown_events, n_events = lasting_or_else_all_events(verdict["events"]), len(verdict["events"])
     summary_text = (
         f"{len(shown_events)} event{'s' if len(shown_events) > 1 else ''}"
         if shown_events
         else _no_event_text(verdict)
     )
     lines = [
-        f"{verdict['flight']}: {summary_text} in {duration_in_words(verdict)}",
+        f"{verdict['flight']}: {summary_text} in {diagnosed_duration_text(verdict)}",
         *map(_event_text, shown_events),
     ]
     lines += credibility_text_lines(verdict)
@@ -165,14 +165,16 @@ def credibility_text_lines(verdict: Document) -> list[str]:
     credibility = verdict["credible"]
     if credibility["share"] >= 1.0:
         return []
-    reason_lines = [f"  {one['says']}: {one['share']:.1%} of the rows" for one in credibility["reasons"]]
+    reason_lines = [
+        f"  {reason['says']}: {reason['share']:.1%} of the rows" for reason in credibility["reasons"]
+    ]
     return [
         f"  credible in {credibility['share']:.1%} of the rows; in the others nothing is said, because",
         *reason_lines,
     ]
 
 
-def duration_in_words(verdict: Document) -> str:
+def diagnosed_duration_text(verdict: Document) -> str:
     """How much flight was diagnosed, in words: a gap in the log is no flight."""
     if not (n_gaps := verdict["gaps"]):
         return f"{verdict['duration_s']:.0f} s"
@@ -276,12 +278,12 @@ def _log_odds_needed_for_alarm(model: Model, bank: HypothesisBank, group_index: 
     settings, transition_shares = model.settings, bank.transition_share[bank.is_fault_of_group(group_index)]
     if not len(transition_shares):
         return float("inf")
-    change_probability_per_sample = (
+    transition_probability_per_sample = (
         settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(transition_shares))
     )
     return float(
         np.log(settings.fault_probability_for_alarm / (1.0 - settings.fault_probability_for_alarm))
-        - np.log(change_probability_per_sample)
+        - np.log(transition_probability_per_sample)
     )
 
 
@@ -330,10 +332,10 @@ def isolability_sentences(isolability: dict[str, Any]) -> list[str]:
         )
     for pair in isolability["alike"]:
         if not pair["separable"]:
-            first_names, second_names = (" and ".join(names) for names in pair["surfaces"])
+            first_surfaces_text, second_surfaces_text = (" and ".join(names) for names in pair["surfaces"])
             sentences.append(
-                f"In this flight the effects of {first_names} and of {second_names} were nearly "
-                f"proportional (cosine {pair['cosine']:.2f}): one may be named for the other."
+                f"In this flight the effects of {first_surfaces_text} and of {second_surfaces_text} were "
+                f"nearly proportional (cosine {pair['cosine']:.2f}): one may be named for the other."
             )
     return sentences
 

@@ -15,7 +15,7 @@ from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import as_json, result_folder
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import DiagnosisRows
-from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_in_words, lasting_events
+from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, diagnosed_duration_text, lasting_or_else_all_events
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 _MAX_PLOTTED_POINTS = 6000
 IDENTIFICATION_PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
-_PREDICTION_WINDOW_S = 40.0
+_PREDICTION_FIGURE_SPAN_S = 40.0
 _MAX_SHOWN_FLIGHTS = 3
 
 
@@ -69,8 +69,8 @@ def _render_flight_page(
     model."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
-        duration_in_words=duration_in_words(verdict),
-        events=lasting_events(verdict["events"]),
+        diagnosed_duration_text=diagnosed_duration_text(verdict),
+        events=lasting_or_else_all_events(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
         words=wording,
         picture=_encode_png(flight_figure(samples, surfaces, rows, wording["bounds"])),
@@ -116,11 +116,11 @@ def flight_figure(
     return figure
 
 
-def _label_axis(axis: Any, label: str, **grid: Any) -> None:
+def _label_axis(axis: Any, label: str, **grid_options: Any) -> None:
     """Axis label, ticks and grid."""
     axis.set_ylabel(label, fontsize=8)
     axis.tick_params(labelsize=8)
-    axis.grid(color="#dddddd", linewidth=0.5, **grid)
+    axis.grid(color="#dddddd", linewidth=0.5, **grid_options)
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
@@ -293,11 +293,11 @@ def _prediction_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], m
     subfigures = figure.subfigures(n_subfigures, squeeze=False)[:, 0]
     for subfigure, (fold_model, held_out, name) in zip(subfigures, folds, strict=False):
         axes = subfigure.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _rates_and_residual_in_liveliest_window(
-            fold_model, held_out, round(_PREDICTION_WINDOW_S * model.rate_hz)
+        t_s, measured_rates, residual = _rates_and_residual_in_liveliest_window(
+            fold_model, held_out, round(_PREDICTION_FIGURE_SPAN_S * model.rate_hz)
         )
         for i, axis in enumerate(axes):
-            residual_deg_s, rate_deg_s = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
+            residual_deg_s, rate_deg_s = np.rad2deg(residual[:, i]), np.rad2deg(measured_rates[:, i])
             axis.plot(t_s, rate_deg_s, color="#888888", linewidth=2.2, label="measured")
             axis.plot(t_s, rate_deg_s - residual_deg_s, color=SERIES[0], linewidth=0.9, label="predicted")
             axis.plot(t_s, residual_deg_s, color=SERIES[1], linewidth=0.7, label="residual")
@@ -321,14 +321,16 @@ def _rates_and_residual_in_liveliest_window(
     return held_out.samples.t_s[window_rows], rates_or_nan[window_rows], residual_or_nan[window_rows]
 
 
-def _first_row_of_liveliest_window(rates: Floats, rows: NDArray[np.int64], window_samples: int) -> int:
+def _first_row_of_liveliest_window(
+    measured_rates: Floats, rows: NDArray[np.int64], window_samples: int
+) -> int:
     """First sample of the window in which the rates known moved most."""
-    squared_rate_norms = np.zeros(len(rates))
-    squared_rate_norms[rows] = (rates[rows] ** 2).sum(axis=1)
+    squared_rate_norms = np.zeros(len(measured_rates))
+    squared_rate_norms[rows] = (measured_rates[rows] ** 2).sum(axis=1)
     cumulated_squares = np.concatenate([[0.0], np.cumsum(squared_rate_norms)])
     return (
         int(np.argmax(cumulated_squares[window_samples:] - cumulated_squares[:-window_samples]))
-        if len(rates) > window_samples
+        if len(measured_rates) > window_samples
         else 0
     )
 

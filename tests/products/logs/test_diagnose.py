@@ -123,9 +123,9 @@ def test_a_verdict_says_what_a_still_flight_cannot_show(wing, wing_folder, wing_
 
 
 def test_events_are_as_few_as_the_faults(rows, wing):
-    from beaver_ftc_logs.findings import fault_events, lasting_events
+    from beaver_ftc_logs.findings import fault_events, lasting_or_else_all_events
 
-    events = lasting_events(fault_events(rows, list(wing.surfaces)))
+    events = lasting_or_else_all_events(fault_events(rows, list(wing.surfaces)))
     named = [event["named"] for event in events if event["to_s"] - event["from_s"] > 20]
     assert named == ["left", "right"]
     assert len(events) <= 5

@@ -9,11 +9,11 @@ import pytest
 from beaver_ftc_logs import findings
 from beaver_ftc_logs.findings import (
     as_text,
-    duration_in_words,
+    diagnosed_duration_text,
     fault_events,
     isolability_document,
     isolability_sentences,
-    lasting_events,
+    lasting_or_else_all_events,
     verdict_document,
 )
 from beaver_ftc_logs.regression import unexplained_rates_and_responses
@@ -52,7 +52,9 @@ def test_an_event_says_what_stood_for_most_of_it():
 def test_three_seconds_are_not_brief(count, brief):
     events = fault_events(small.rows([(4, *SOUND), (count, *HALF), (4, *SOUND)]), NAMES)
     assert [event["brief"] for event in events] == [brief]
-    assert lasting_events(events) == events  # where every one is brief they are all there is to say
+    assert (
+        lasting_or_else_all_events(events) == events
+    )  # where every one is brief they are all there is to say
 
 
 def test_what_is_estimated_in_health_parts_no_event():
@@ -114,7 +116,7 @@ def test_the_text_of_a_verdict(changed):
         VERDICT | {"credible": {"share": 0.0, "reasons": [{"says": "a rate is clipped", "share": 1.0}]}},
     ]
     assert not changed([as_text(case).splitlines() for case in cases])
-    assert [duration_in_words(case) for case in cases[:3]] == [
+    assert [diagnosed_duration_text(case) for case in cases[:3]] == [
         "61 s", "42 s, 1 gap in the log left out", "42 s, 2 gaps in the log left out",
     ]  # fmt: skip
 

@@ -74,11 +74,11 @@ class HypothesisBank(NamedTuple):
 def build_hypothesis_bank(model: Model) -> HypothesisBank:
     """The hypotheses of a model. A group whose effect is unknown has none, unless all effects are unknown."""
     n_groups, settings = len(model.groups), model.settings
-    has_known_effect = is_group_effect_known(model)
+    group_has_known_effect = is_group_effect_known(model)
     indices_of_groups_with_hypotheses = [
         group_index
         for group_index in range(n_groups)
-        if has_known_effect[group_index] or not any(has_known_effect)
+        if group_has_known_effect[group_index] or not any(group_has_known_effect)
     ]
     hypothesis_rows: list[HypothesisRow] = [(np.ones(n_groups), HEALTHY, settings.repair_share, np.zeros(3))]
     n_surfaces_with_hypotheses = sum(
@@ -251,7 +251,7 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)
     random_walk_variance[:3] = residual_variance * np.array(settings.trim_random_walk_sd) ** 2
     max_deviation_in_sd = np.array(
-        [settings.max_trim_deviation_sd] * 3 + [settings.max_gain_deviation_sd] * (1 + n_groups)
+        [settings.max_trim_deviation_in_sd] * 3 + [settings.max_gain_deviation_in_sd] * (1 + n_groups)
     )
     initial_mean = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n_groups)
     return TrimAndGainStateModel(

@@ -65,7 +65,7 @@ def identify(
         identify,
         scale_by_dynamic_pressure_if_better,
     )
-    from beaver_ftc_logs.model import as_text
+    from beaver_ftc_logs.model import model_file_text
     from beaver_ftc_logs.pages import refuse_to_replace_foreign_file, render_identification
     from beaver_ftc_logs.samples import load_flights_for_fit
     from beaver_ftc_logs.vehicle import load_vehicle, with_false_alarm_rate
@@ -80,7 +80,7 @@ def identify(
     )
     model = identify(loaded_flights, loaded_vehicle)
     page_html = render_identification(loaded_flights, model)
-    for path, text in ((out, as_text(model)), (page_path, page_html)):
+    for path, text in ((out, model_file_text(model)), (page_path, page_html)):
         with clear_disk_errors(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_whole(path, text.encode("utf-8"))

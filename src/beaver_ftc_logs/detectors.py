@@ -206,8 +206,8 @@ def diagnose_by_freeze_rule(
 class LinearRateModel:
     """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
 
-    def __init__(self, past_coefficients: Floats, dt_s: float) -> None:
-        self._transposed_jacobian = (past_coefficients[:3] - np.eye(3)) / dt_s
+    def __init__(self, lagged_rate_and_signal_coefficients: Floats, dt_s: float) -> None:
+        self._transposed_jacobian = (lagged_rate_and_signal_coefficients[:3] - np.eye(3)) / dt_s
 
     def f(self, x: Floats, y: Floats) -> Floats:
         """Angular acceleration rad/s2 by the rates alone."""

@@ -53,10 +53,10 @@ def hypothesis_posterior(
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
     model_with_noise_model = model.with_noise_model(samples.noise_ma_coefficients)
-    command_delay_candidates_s = model.settings.command_delay_candidates_s
+    command_delay_offset_candidates_s = model.settings.command_delay_offset_candidates_s
     bank_runs = [
         _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_model, bank)
-        for delay_s in command_delay_candidates_s
+        for delay_s in command_delay_offset_candidates_s
     ]
     return _average_bank_runs(
         list(_model_probabilities_with_forgetting([run[3] for run in bank_runs], model.rate_hz)), bank_runs

@@ -80,7 +80,7 @@ Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and wit
 _MAX_WINDOW_COVARIANCE_INFLATION = 200.0
 """Largest noise factor of a window of ten seconds: of few flights one can be far from all others (1,550 of
 seed 205, else 5)."""
-_COMMAND_DELAY_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
+_COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES = (-0.4, 0.0, 0.4)
 """Delays beside the model's that a flight may have, in samples."""
 _RANK_TOLERANCE = 1e-9
 _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
@@ -145,9 +145,9 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
     labels = samples.labels[:, is_surface_labelled]
     is_usable &= np.isfinite(labels).all(axis=1)
     for begin, end in constant_stretches(labels):
-        is_short = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
+        is_short_stretch = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
         n_margin_samples = round(UNFITTED_LABEL_CHANGE_MARGIN_S / samples.dt_s)
-        is_usable[begin : end if is_short else begin + n_margin_samples] = False
+        is_usable[begin : end if is_short_stretch else begin + n_margin_samples] = False
         is_usable[max(end - n_margin_samples, begin) : end] = False
     return is_usable
 
@@ -396,7 +396,9 @@ def _fit_noise_model(
     """A noise model with an AR predictor of the residual, by least squares where samples follow one another,
     and the remaining noise; without a predictor where too few do."""
     residual_runs = [
-        residual[begin:end] for rows, residual in rows_and_residuals for begin, end in _consecutive_runs(rows)
+        residual[begin:end]
+        for rows, residual in rows_and_residuals
+        for begin, end in _runs_of_consecutive_rows(rows)
     ]
     target_residuals = [run[AUTOREGRESSIVE_ORDER:] for run in residual_runs]
     if sum(map(len, target_residuals)) < 10 * 3 * AUTOREGRESSIVE_ORDER:
@@ -424,7 +426,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         sum(usable_flight.is_usable.sum() * usable_flight.samples.dt_s for usable_flight in usable_flights)
         / 3600.0
     )
-    n_effectiveness_changes, n_repairs, effectiveness_levels_by_group = 0, 0, {}
+    n_effectiveness_changes, n_repairs, fault_levels_by_group = 0, 0, {}
     surface_names = list(model.vehicle.surfaces)
     for group in model.groups:
         surface_index = surface_names.index(group[0])
@@ -433,7 +435,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
             if len(group) == 1
             else []
         )
-        effectiveness_levels_by_group["+".join(group)] = sorted(
+        fault_levels_by_group["+".join(group)] = sorted(
             {level for level_sequence in level_sequences_by_flight for level in level_sequence if level < 1.0}
         )
         n_effectiveness_changes += sum(
@@ -442,20 +444,20 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         n_repairs += sum(
             int(level == 1.0) for level_sequence in level_sequences_by_flight for level in level_sequence[1:]
         )
-    effectiveness_levels_by_group = {
-        group_name: levels for group_name, levels in effectiveness_levels_by_group.items() if levels
+    fault_levels_by_group = {
+        group_name: levels for group_name, levels in fault_levels_by_group.items() if levels
     }
     may_air_move = model.vehicle.moving_air
-    command_delay_candidates_s = [
+    command_delay_offset_candidates_s = [
         delay_samples / model.rate_hz
-        for delay_samples in ((0.0,) if may_air_move else _COMMAND_DELAY_CANDIDATES_SAMPLES)
+        for delay_samples in ((0.0,) if may_air_move else _COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES)
     ]
     other_laws_settings = (
         _FILTER_SETTINGS_FOR_OTHER_LAWS | (_FILTER_SETTINGS_FOR_MOVING_AIR if may_air_move else {})
         if model.vehicle.other_laws
         else {}
     )
-    if not effectiveness_levels_by_group:
+    if not fault_levels_by_group:
         trim_random_walk_sd = _estimate_trim_random_walk_sd(usable_flights, model)
         model_with_trim_drift = model.model_copy(
             update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **other_laws_settings)}
@@ -474,17 +476,17 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
             **other_laws_settings,
             power=effective_sample_share,
             trim_walk=trim_random_walk_sd,
-            delays_s=command_delay_candidates_s,
+            delays_s=command_delay_offset_candidates_s,
         )
     return FilterSettings(
-        levels=effectiveness_levels_by_group,
+        levels=fault_levels_by_group,
         changes_per_hour=float(
             np.sqrt(
                 (n_effectiveness_changes + 1) / usable_hours * FilterSettings().effectiveness_changes_per_hour
             )
         ),
         **(_FILTER_SETTINGS_FOR_OTHER_DAYS | other_laws_settings),
-        delays_s=command_delay_candidates_s,
+        delays_s=command_delay_offset_candidates_s,
         repair_share=(n_repairs + _N_PRIOR_EFFECTIVENESS_CHANGES / 2)
         / (n_effectiveness_changes + _N_PRIOR_EFFECTIVENESS_CHANGES),
         power=_EFFECTIVE_SAMPLE_SHARE_LABELLED,
@@ -508,12 +510,14 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     for fold_model, held_out_flights in _cross_validation_fits(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
-        has_known_effect = np.array(trust.is_group_effect_known(fold_model))
+        group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
             group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
-            group_responses = group_responses.sum(axis=3)[:, :, has_known_effect].reshape(residual.size, -1)
+            group_responses = group_responses.sum(axis=3)[:, :, group_has_known_effect].reshape(
+                residual.size, -1
+            )
             normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
-                group_responses, residual.ravel(), _prior_gain_covariance(fold_model, has_known_effect)
+                group_responses, residual.ravel(), _prior_gain_covariance(fold_model, group_has_known_effect)
             )
             normalized_squared_error_sum = normalized_squared_error_sum + normalized_squared_error
             n_gains = n_gains + n_determined_gains
@@ -531,13 +535,13 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
     for fold_model, held_out_flights in _cross_validation_fits(
         usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
     ):
-        has_known_effect = np.array(trust.is_group_effect_known(fold_model))
+        group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         prior_gain_covariance: Floats = np.asarray(
-            np.kron(_prior_gain_covariance(fold_model, has_known_effect), np.ones((3, 3))), dtype=float
+            np.kron(_prior_gain_covariance(fold_model, group_has_known_effect), np.ones((3, 3))), dtype=float
         )
         for held_out in held_out_flights:
             group_responses, residual = _standardized_responses_and_residual(fold_model, held_out)
-            group_responses = group_responses[:, :, has_known_effect].reshape(*residual.shape, -1)
+            group_responses = group_responses[:, :, group_has_known_effect].reshape(*residual.shape, -1)
             n_windows = max(round(len(residual) * held_out.samples.dt_s / _GAIN_ERROR_WINDOW_S), 1)
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses = _without_mean(group_responses[window_rows])
@@ -577,11 +581,11 @@ def _is_gyro_noise_spectrum(noise_ma_coefficients: Sequence[float]) -> bool:
     return len(noise_ma_coefficients) > 1 and noise_ma_coefficients[1] < 0.0
 
 
-def _prior_gain_covariance(model: Model, has_known_effect: NDArray[np.bool_]) -> Floats:
+def _prior_gain_covariance(model: Model, group_has_known_effect: NDArray[np.bool_]) -> Floats:
     """Covariance of the gains of the groups with a known effect that the filter leaves free."""
     initial_gain_covariance = build_trim_and_gain_state_model(model).initial_covariance[3:, 3:]
     return np.asarray(
-        initial_gain_covariance[0, 0] + np.diag(np.diag(initial_gain_covariance)[1:][has_known_effect])
+        initial_gain_covariance[0, 0] + np.diag(np.diag(initial_gain_covariance)[1:][group_has_known_effect])
     )
 
 
@@ -647,7 +651,7 @@ def _estimate_trim_random_walk_sd(
                 fold_model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance
             )
             standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise_covariance), MIN_DIVISOR))
-            for begin, end in _consecutive_runs(rows):
+            for begin, end in _runs_of_consecutive_rows(rows):
                 for i, span in enumerate(span_samples.astype(int).tolist()):
                     span_means = (
                         standardized_residual[begin:end][: (end - begin) // span * span]
@@ -671,7 +675,7 @@ def _estimate_trim_random_walk_sd(
     return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), default_random_walk_sd).tolist()
 
 
-def _consecutive_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
+def _runs_of_consecutive_rows(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Begin and end of what of increasing places follows one another."""
     run_edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
     return list(pairwise(run_edges))
@@ -762,7 +766,7 @@ def add_fitted_ranges_and_alarm_threshold(
         samples_and_usable, model, gain_standard_errors, max_noise_variance_scale
     ).model_copy(update={"gain_standard_error_by_column": column_gain_standard_errors})
     requested_false_alarms_per_hour = model.vehicle.false_alarms_per_hour
-    false_alarms_per_hour = (
+    target_false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
         if requested_false_alarms_per_hour is None and not model.settings.likely_effectiveness_levels_by_group
         else requested_false_alarms_per_hour
@@ -781,11 +785,14 @@ def add_fitted_ranges_and_alarm_threshold(
         )
     can_set_threshold = bool(peak_tail or model.vehicle.other_laws)
     alarm_threshold = (
-        _choose_alarm_threshold(peak_tail, false_alarms_per_hour, model)
-        if false_alarms_per_hour and can_set_threshold
+        _choose_alarm_threshold(peak_tail, target_false_alarms_per_hour, model)
+        if target_false_alarms_per_hour and can_set_threshold
         else None
     )
-    alarm_settings = {"false_alarms_per_hour": false_alarms_per_hour, "alarm_threshold": alarm_threshold}
+    alarm_settings = {
+        "false_alarms_per_hour": target_false_alarms_per_hour,
+        "alarm_threshold": alarm_threshold,
+    }
     return model.model_copy(
         update={
             "fitted_ranges": fitted_ranges.model_copy(
@@ -796,7 +803,7 @@ def add_fitted_ranges_and_alarm_threshold(
             ),
             "settings": model.settings.model_copy(update=alarm_settings),
             "identification_results": dict(
-                _cross_validate_alarm_threshold(held_out_peaks_and_hours, false_alarms_per_hour, model)
+                _cross_validate_alarm_threshold(held_out_peaks_and_hours, target_false_alarms_per_hour, model)
             ),
         }
     )
@@ -845,12 +852,12 @@ def _squared_gain_deviation_beyond_noise(model: Model, held_out: FlightWithUsabl
     group_responses, residual = _standardized_responses_and_residual(model, held_out)
     group_responses = group_responses.sum(axis=3).reshape(residual.size, -1)
     squared_deviation = np.full(group_responses.shape[1], np.nan)
-    has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
-    information = group_responses[:, has_known_effect].T @ group_responses[:, has_known_effect]
+    group_has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
+    information = group_responses[:, group_has_known_effect].T @ group_responses[:, group_has_known_effect]
     gain_error_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
-    gain_errors = gain_error_covariance @ (group_responses[:, has_known_effect].T @ residual.ravel())
-    if has_known_effect.any():  # a part without a residual shows the effect of no group
-        squared_deviation[has_known_effect] = np.maximum(
+    gain_errors = gain_error_covariance @ (group_responses[:, group_has_known_effect].T @ residual.ravel())
+    if group_has_known_effect.any():  # a part without a residual shows the effect of no group
+        squared_deviation[group_has_known_effect] = np.maximum(
             gain_errors**2 - np.diag(gain_error_covariance) * max(float((residual**2).mean()), 1.0), 0.0
         )
     return squared_deviation
@@ -866,7 +873,7 @@ def _gain_variance_between_laws(prior_gain_sd: Floats, squared_gain_deviations: 
 
 
 def _choose_alarm_threshold(
-    tail: extremes.PeakTail | None, false_alarms_per_hour: float, model: Model
+    tail: extremes.PeakTail | None, target_false_alarms_per_hour: float, model: Model
 ) -> float:
     """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
     lorden_bound_factor = (
@@ -875,10 +882,10 @@ def _choose_alarm_threshold(
         else 0.0
     )
     min_threshold = lorden_bound_factor * extremes.threshold_by_lorden_bound(
-        model.rate_hz, false_alarms_per_hour
+        model.rate_hz, target_false_alarms_per_hour
     )
     return (
-        max(extremes.threshold_for_false_alarms(tail, false_alarms_per_hour), min_threshold)
+        max(extremes.threshold_for_false_alarms(tail, target_false_alarms_per_hour), min_threshold)
         if tail is not None
         else min_threshold
     )
@@ -903,7 +910,7 @@ def _total_healthy_minutes(held_out_peaks_and_hours: Sequence[extremes.PeaksAndH
 
 def _cross_validate_alarm_threshold(
     held_out_peaks_and_hours: Sequence[extremes.PeaksAndHours],
-    false_alarms_per_hour: float | None,
+    target_false_alarms_per_hour: float | None,
     model: Model,
 ) -> Document:
     """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
@@ -912,10 +919,10 @@ def _cross_validate_alarm_threshold(
         extremes.fit_peak_tail([*held_out_peaks_and_hours[:i], *held_out_peaks_and_hours[i + 1 :]])
         for i in range(len(held_out_peaks_and_hours))
     ]
-    if false_alarms_per_hour is None or len(held_out_peaks_and_hours) < 2 or not all(tails_of_others):
+    if target_false_alarms_per_hour is None or len(held_out_peaks_and_hours) < 2 or not all(tails_of_others):
         return {}
     thresholds = [
-        _choose_alarm_threshold(tail, false_alarms_per_hour, model) for tail in tails_of_others if tail
+        _choose_alarm_threshold(tail, target_false_alarms_per_hour, model) for tail in tails_of_others if tail
     ]
     n_alarms_by_flight = [
         int((peaks >= threshold).sum())
@@ -941,11 +948,11 @@ def _noise_scale_and_healthy_alarm_peaks(
         held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
     )
     healthy_rows = np.flatnonzero(is_healthy)
-    page_sum_runs = [
+    cusum_runs = [
         page_cusum(evidence_increments[healthy_rows[begin:end]], np.inf)
-        for begin, end in _consecutive_runs(healthy_rows)
+        for begin, end in _runs_of_consecutive_rows(healthy_rows)
     ]
-    peaks = np.concatenate([extremes.peaks_between_zeros(page_sum) for page_sum in page_sum_runs])
+    peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in cusum_runs])
     return float(noise_variance_scales[held_out.is_usable].max(initial=1.0)), (
         peaks,
         len(healthy_rows) * held_out.samples.dt_s / 3600.0,
@@ -1006,16 +1013,16 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
         relative_error_sd_of_summed_response[group_index] = np.sqrt(
             response_sum_over_noise_sd**2 @ np.maximum(summed_response_error_variance, 0.0)
         ) / max(float(response_sum_over_noise_sd @ response_sum_over_noise_sd), MIN_DIVISOR)
-        response_over_its_errors = (
+        response_over_standard_errors = (
             rate_regression.coefficients[group_coefficient_rows]
             / noise_sd
             / np.maximum(standard_errors_over_noise_sd, MIN_DIVISOR)
         )
         response_factor_information[group_index] += np.einsum(
             "la,lm,ma->",
-            response_over_its_errors,
+            response_over_standard_errors,
             np.linalg.pinv(coefficient_error_correlation, rcond=_RANK_TOLERANCE),
-            response_over_its_errors,
+            response_over_standard_errors,
         )
     return np.minimum(
         1.0 / np.sqrt(response_factor_information)

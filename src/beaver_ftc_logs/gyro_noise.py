@@ -40,10 +40,10 @@ def _residual_autocovariance(
     model: Model, process_covariance: Floats, gyro_noise_rad_s: float, n_lags: int
 ) -> NDArray[np.float64]:
     """E w[k] w[k-t]' for lags t = 0 ... n_lags, (n_lags + 1, 3, 3)."""
-    past_coefficients = np.array(model.past_coefficients)[: 3 * model.n_rate_lags].reshape(
-        model.n_rate_lags, 3, 3
-    )
-    ma_coefficients = np.concatenate([np.eye(3)[None], -past_coefficients.transpose(0, 2, 1)])
+    lagged_rate_coefficients = np.array(model.lagged_rate_and_signal_coefficients)[
+        : 3 * model.n_rate_lags
+    ].reshape(model.n_rate_lags, 3, 3)
+    ma_coefficients = np.concatenate([np.eye(3)[None], -lagged_rate_coefficients.transpose(0, 2, 1)])
     autocovariance = np.zeros((max(n_lags, model.n_rate_lags) + 1, 3, 3))
     for lag in range(len(ma_coefficients)):
         autocovariance[lag] = gyro_noise_rad_s**2 * np.einsum(

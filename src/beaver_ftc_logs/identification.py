@@ -60,7 +60,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "another_day": expected_performance_on_another_day(fold_entries, model),
         "collinear": collinear_regressors(usable_flights, model),
         "colour": median_standard_error_inflation_by_axis(usable_flights, model),
-        "spectrum": residual_spectrum(usable_flights, model),
+        "spectrum": residual_to_white_density_by_band(usable_flights, model),
         "output_error": fit_output_error(usable_flights, surface_indices_by_group(model)),
     }
     settings = model.settings.model_copy(update={"credible_mass": credible_mass})
@@ -73,18 +73,23 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     much of it, the flight itself shows (`filtering.recent_noise_variance_scale`)."""
     if not model.noise_models:
         return model
-    known_ma_coefficients = [tuple(one.ma_coefficients) for one in model.noise_models]
-    max_covariance_inflation = max(one.covariance_inflation for one in model.noise_models)
+    known_ma_coefficients = [tuple(noise_model.ma_coefficients) for noise_model in model.noise_models]
+    max_covariance_inflation = max(noise_model.covariance_inflation for noise_model in model.noise_models)
     quietest_covariance = min(
-        (np.array(one.residual_covariance) for one in model.noise_models), key=np.linalg.det
+        (np.array(noise_model.residual_covariance) for noise_model in model.noise_models), key=np.linalg.det
     )
     noise_models = list(model.noise_models)
     for ma_coefficients in ADDED_NOISE_MA_COEFFICIENTS:
         if ma_coefficients not in known_ma_coefficients:
             whitened_flights = fitting.flights_with_usable_rows(
-                [whiten_samples(one, ma_coefficients) for one in flights]
+                [whiten_samples(flight, ma_coefficients) for flight in flights]
             )
-            residuals = np.vstack([fitting.one_step_residuals(model, one)[1] for one in whitened_flights])
+            residuals = np.vstack(
+                [
+                    fitting.one_step_residuals(model, whitened_flight)[1]
+                    for whitened_flight in whitened_flights
+                ]
+            )
             noise_models.append(
                 NoiseModel(
                     average=list(ma_coefficients),
@@ -108,7 +113,7 @@ def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tu
     others, which costs power and raises no false alarm. Labelled faults show what they do under the law that
     flies, in the air that there is.
     """
-    has_labels = any(np.isfinite(one.labels).any() for one in flights)
+    has_labels = any(np.isfinite(flight.labels).any() for flight in flights)
     reason = "labels show faults under it" if has_labels else "logs of healthy flight do not tell"
     assumption_text_of_key = {"other_laws": "other laws may fly", "moving_air": "the air may move"}
     assumption_lines = []
@@ -122,7 +127,7 @@ def with_assumed_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tu
         else:
             assumption_lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
-        has_airspeed = any(one.airspeed is not None for one in flights)
+        has_airspeed = any(flight.airspeed is not None for flight in flights)
         airspeed_text = "explains no more" if has_airspeed else "is not logged"
         assumption_lines.append(f"reference_airspeed_mps: none, the airspeed {airspeed_text}")
     return vehicle, assumption_lines
@@ -141,25 +146,25 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     if not vehicle.moving_air:
         return list(flights)
     ma_coefficients_by_flight = [
-        _choose_noise_ma_coefficients(one, vehicle, n_rate_and_command_lags) for one in flights
+        _choose_noise_ma_coefficients(flight, vehicle, n_rate_and_command_lags) for flight in flights
     ]
     whitened_flights = [
-        whiten_samples(one, noise_ma_coefficients)
-        for one, noise_ma_coefficients in zip(flights, ma_coefficients_by_flight, strict=True)
+        whiten_samples(flight, noise_ma_coefficients)
+        for flight, noise_ma_coefficients in zip(flights, ma_coefficients_by_flight, strict=True)
     ]
     for _ in range(_MAX_WHITENING_ROUNDS):
         regressors, rates, _ = fitting.stacked_regression_data(
             fitting.flights_with_usable_rows(whitened_flights), vehicle, *n_rate_and_command_lags
         )
-        common_coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
+        pooled_regression_coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
         log_determinants_and_ma_coefficients = [
             _log_determinant_and_best_ma_coefficients(
-                fitting.flights_with_usable_rows([one]),
+                fitting.flights_with_usable_rows([flight]),
                 vehicle,
                 n_rate_and_command_lags,
-                np.asarray(common_coefficients),
+                np.asarray(pooled_regression_coefficients),
             )
-            for one in flights
+            for flight in flights
         ]
         if (
             new_ma_coefficients_by_flight := [
@@ -173,9 +178,9 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         ma_coefficients_by_flight = new_ma_coefficients_by_flight
         whitened_flights = [
             whiten_samples(
-                one, noise_ma_coefficients, float(np.exp((mean_log_determinant - log_determinant) / 6.0))
+                flight, noise_ma_coefficients, float(np.exp((mean_log_determinant - log_determinant) / 6.0))
             )
-            for one, (log_determinant, noise_ma_coefficients) in zip(
+            for flight, (log_determinant, noise_ma_coefficients) in zip(
                 flights, log_determinants_and_ma_coefficients, strict=True
             )
         ]
@@ -246,10 +251,10 @@ def expected_performance_on_another_day(fold_entries: list[Document], model: Mod
     fitted_ranges, settings = model.fitted_ranges, model.settings
     if fitted_ranges is None or fitted_ranges.alarm_peak_tail is None or settings.alarm_threshold is None:
         return expected_performance
-    false_alarms_per_hour = settings.false_alarms_per_hour or 0.0
+    target_false_alarms_per_hour = settings.false_alarms_per_hour or 0.0
     return expected_performance | {
         "false_alarms_per_hour": {
-            "asked": false_alarms_per_hour,
+            "asked": target_false_alarms_per_hour,
             **asdict(
                 extremes.expected_false_alarms_per_hour(
                     fitted_ranges.alarm_peak_tail, settings.alarm_threshold
@@ -258,7 +263,7 @@ def expected_performance_on_another_day(fold_entries: list[Document], model: Mod
         },
         "minutes_left_out": fitted_ranges.alarm_peak_tail.healthy_minutes,
         "minutes_missing": extremes.missing_healthy_minutes(
-            fitted_ranges.alarm_peak_tail, false_alarms_per_hour
+            fitted_ranges.alarm_peak_tail, target_false_alarms_per_hour
         ),
         **model.identification_results,
     }
@@ -280,14 +285,15 @@ def _choose_dynamic_pressure_scaling(
     flights: Sequence[Samples], vehicle: Vehicle
 ) -> tuple[Sequence[Samples], Vehicle]:
     airspeeds_by_flight = [
-        one.airspeed[np.isfinite(one.airspeed)] for one in flights if one.airspeed is not None
+        flight.airspeed[np.isfinite(flight.airspeed)] for flight in flights if flight.airspeed is not None
     ]
     known_airspeeds_mps = np.concatenate(airspeeds_by_flight) if airspeeds_by_flight else np.empty(0)
     reference_airspeed_mps = float(np.median(known_airspeeds_mps)) if known_airspeeds_mps.size else 0.0
     if vehicle.reference_airspeed_mps is not None or reference_airspeed_mps <= 0.0:
         return flights, vehicle
     scaled_flights = [
-        with_airspeed_effects(one, reference_airspeed_mps, vehicle.surface_airspeed_powers) for one in flights
+        with_airspeed_effects(flight, reference_airspeed_mps, vehicle.surface_airspeed_powers)
+        for flight in flights
     ]
     scaled_vehicle = vehicle.model_copy(update={"reference_airspeed_mps": reference_airspeed_mps})
     if _min_bic(flights, vehicle) - _min_bic(scaled_flights, scaled_vehicle) < _DECISIVE_BIC_DIFFERENCE:
@@ -309,8 +315,8 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
     linkages change the square. Another than that must explain decisively more."""
 
     scaled_flights = [
-        with_airspeed_effects(one, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers)
-        for one in flights
+        with_airspeed_effects(flight, vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers)
+        for flight in flights
     ]
     whitened_flights = whiten_flights(
         scaled_flights, vehicle
@@ -319,15 +325,15 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
     def scale_and_whiten_flights(scaled_vehicle: Vehicle, does_whiten: bool = True) -> list[Samples]:
         rescaled_flights = [
             with_airspeed_effects(
-                one, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
+                flight, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
-            for one in flights
+            for flight in flights
         ]
         if not (does_whiten and vehicle.moving_air):
             return rescaled_flights
         return [
-            whiten_samples(one, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
-            for one, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
+            whiten_samples(rescaled_flight, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
+            for rescaled_flight, whitened_flight in zip(rescaled_flights, whitened_flights, strict=True)
         ]
 
     bic_to_beat = _min_bic(scale_and_whiten_flights(vehicle), vehicle) - _DECISIVE_BIC_DIFFERENCE
@@ -364,7 +370,13 @@ def check_explained_variance(
         for axis, explained_share in mean_explained_share_by_axis.items()
         if explained_share <= 0.0
     }:
-        usable_minutes = sum(int(one.is_usable.sum()) * one.samples.dt_s for one in usable_flights) / 60.0
+        usable_minutes = (
+            sum(
+                int(usable_flight.is_usable.sum()) * usable_flight.samples.dt_s
+                for usable_flight in usable_flights
+            )
+            / 60.0
+        )
         stillest_surface_and_sd = min(
             _command_sd_by_surface(usable_flights, model).items(), key=lambda pair: pair[1]
         )
@@ -395,7 +407,10 @@ def _remarks_on_rates(usable_flights: Sequence[fitting.FlightWithUsableRows], mo
     """Return the mistakes found in the rates when the log was read, each after a semicolon."""
     rate_column_prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
     notes = [
-        note for one in usable_flights for note in one.samples.notes if note.startswith(rate_column_prefixes)
+        note
+        for usable_flight in usable_flights
+        for note in usable_flight.samples.notes
+        if note.startswith(rate_column_prefixes)
     ]
     return "".join(f"; {note}" for note in notes)
 
@@ -472,7 +487,9 @@ def median_standard_error_inflation_by_axis(
     )
 
 
-def residual_spectrum(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> list[Document]:
+def residual_to_white_density_by_band(
+    usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model
+) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
     residual = np.vstack(
         [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
@@ -502,10 +519,10 @@ def identification_text(model: Model) -> str:
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
-            f"  noise of the colour {_ma_coefficients_text(one)}: "
-            f"{one.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
+            f"  noise of the colour {_ma_coefficients_text(noise_model)}: "
+            f"{noise_model.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
             "differ, and other laws may"
-            for one in model.noise_models
+            for noise_model in model.noise_models
         ),
         *(f"  {line}" for line in trust.unknown_effect_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
@@ -626,23 +643,23 @@ def fit_output_error(
     )
     if len(window_rates) < 20 or not np.ptp(window_rates, axis=(0, 1)).all():
         return {"windows": len(window_rates), "says": "too few gap-free windows in which every rate moves"}
-    fitted_windows, held_out_windows = slice(0, None, 2), slice(1, None, 2)
+    fitted_window_slice, held_out_window_slice = slice(0, None, 2), slice(1, None, 2)
     rate_sd = window_rates.std(axis=(0, 1))
-    initial_parameters, min_parameters, max_parameters = _initial_output_error_parameters(
+    initial_parameters, min_parameters, max_parameters = _output_error_first_guess_and_bounds(
         len(surface_groups), dt_s
     )
 
     def standardized_simulation_error(parameters: Floats, window_slice: slice) -> Floats:
-        simulated = _simulate_free_runs(
+        simulated_rates = _simulate_free_runs(
             parameters, window_commands[window_slice], window_rates[window_slice], dt_s
         )
-        return ((simulated - window_rates[window_slice]) / rate_sd).ravel()
+        return ((simulated_rates - window_rates[window_slice]) / rate_sd).ravel()
 
     optimum = least_squares(
         standardized_simulation_error,
         initial_parameters,
         bounds=(min_parameters, max_parameters),
-        args=(fitted_windows,),
+        args=(fitted_window_slice,),
         loss="soft_l1",
         max_nfev=40,
     )
@@ -650,8 +667,8 @@ def fit_output_error(
     standard_errors = np.sqrt(
         np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
     )
-    held_out_error = standardized_simulation_error(optimum.x, held_out_windows).reshape(-1, 3) * rate_sd
-    explained_variance_share = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_windows].reshape(
+    held_out_error = standardized_simulation_error(optimum.x, held_out_window_slice).reshape(-1, 3) * rate_sd
+    explained_variance_share = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_window_slice].reshape(
         -1, 3
     ).var(axis=0)
     return {
@@ -696,19 +713,19 @@ def _cut_free_run_windows(
             ):
                 window_commands.append(group_commands[window_rows])
                 window_rates.append(samples.rates[window_end - window_samples : window_end])
-    window_stride = max(len(window_rates) // _MAX_FREE_RUN_WINDOWS, 1)
+    window_thinning_factor = max(len(window_rates) // _MAX_FREE_RUN_WINDOWS, 1)
     commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
-    return np.reshape(window_commands[::window_stride], commands_shape), np.reshape(
-        window_rates[::window_stride], (-1, window_samples, 3)
+    return np.reshape(window_commands[::window_thinning_factor], commands_shape), np.reshape(
+        window_rates[::window_thinning_factor], (-1, window_samples, 3)
     )
 
 
-def _initial_output_error_parameters(n_groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
+def _output_error_first_guess_and_bounds(n_groups: int, dt_s: float) -> tuple[Floats, Floats, Floats]:
     """First guess and bounds of lag, delay, A, B and c."""
     initial_parameters = [0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * n_groups, 0.01), *np.zeros(3)]
-    unbounded = np.full(len(initial_parameters) - 2, np.inf)
-    min_parameters = [_MIN_SERVO_LAG_S, 0.0, *-unbounded]
-    max_parameters = [_MAX_SERVO_LAG_S, _MAX_COMMAND_DELAY_S, *unbounded]
+    infinite_bounds = np.full(len(initial_parameters) - 2, np.inf)
+    min_parameters = [_MIN_SERVO_LAG_S, 0.0, *-infinite_bounds]
+    max_parameters = [_MAX_SERVO_LAG_S, _MAX_COMMAND_DELAY_S, *infinite_bounds]
     return np.array(initial_parameters), np.array(min_parameters), np.array(max_parameters)
 
 

@@ -83,21 +83,21 @@ class FilterSettings(Section):
         description="in which that returns to the common gain, s",
         alias="own_gain_time_s",
     )
-    max_trim_deviation_sd: Number = Field(
+    max_trim_deviation_in_sd: Number = Field(
         4.0,
         gt=0,
         le=_MAX_COEFFICIENT,
         description="farthest the trim is adapted, in its spread",
         alias="trim_bound",
     )
-    max_gain_deviation_sd: Number = Field(
+    max_gain_deviation_in_sd: Number = Field(
         3.0,
         gt=0,
         le=_MAX_COEFFICIENT,
         description="farthest the gain is adapted, in its spread",
         alias="gain_bound",
     )
-    command_delay_candidates_s: CoefficientRow = Field(
+    command_delay_offset_candidates_s: CoefficientRow = Field(
         [0.0],
         min_length=1,
         max_length=9,
@@ -273,7 +273,7 @@ class Model(Section):
     n_rate_lags: Whole = Field(ge=1, le=50, alias="history")
     n_command_lags: Whole = Field(ge=1, le=50, alias="lags")
     intercept: CoefficientRow = Field(min_length=3, max_length=3)
-    past_coefficients: CoefficientMatrix = Field(
+    lagged_rate_and_signal_coefficients: CoefficientMatrix = Field(
         description="(3 history + signal_regressor_names x signal lags, 3)", alias="past"
     )
     command_response: list[CoefficientMatrix] = Field(
@@ -306,16 +306,21 @@ class Model(Section):
             self.vehicle.signal_regressor_names
         ) * self.vehicle.n_signal_lags(self.n_rate_lags)
         reason = (
-            f"has {len(self.past_coefficients)} rows, allowed: {n_past_rows}, as `identify` writes them: "
-            "identify it again"
+            f"has {len(self.lagged_rate_and_signal_coefficients)} rows, "
+            f"allowed: {n_past_rows}, as `identify` writes them: identify it again"
         )
-        mistakes: list[Conflict] = [(("past",), reason)] * (len(self.past_coefficients) != n_past_rows)
-        mistakes += [*self._group_mistakes(), *self._shape_mistakes(len(self.past_coefficients))]
+        mistakes: list[Conflict] = [(("past",), reason)] * (
+            len(self.lagged_rate_and_signal_coefficients) != n_past_rows
+        )
+        mistakes += [
+            *self._group_and_settings_mistakes(),
+            *self._shape_mistakes(len(self.lagged_rate_and_signal_coefficients)),
+        ]
         refuse(mistakes)  # before any of it is computed with
         refuse(self._invalid_covariances_or_errors())
         return self
 
-    def _group_mistakes(self) -> Iterator[Conflict]:
+    def _group_and_settings_mistakes(self) -> Iterator[Conflict]:
         """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
         seen_surfaces: set[str] = set()
         for i, group in enumerate(self.groups):
@@ -329,7 +334,7 @@ class Model(Section):
             if name not in group_names:
                 level_reason = f"{name!r:.60} is no group, allowed: {', '.join(group_names)}"
                 yield ("settings", "levels", name), level_reason
-        for k, delay_s in enumerate(self.settings.command_delay_candidates_s):
+        for k, delay_s in enumerate(self.settings.command_delay_offset_candidates_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
@@ -337,7 +342,7 @@ class Model(Section):
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         n_groups = len(self.groups)
         expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
-            (("past",), self.past_coefficients, (n_past_rows, 3)),
+            (("past",), self.lagged_rate_and_signal_coefficients, (n_past_rows, 3)),
             (("response",), self.command_response, (n_groups, self.n_command_lags, 3)),
             (("response_sd",), self.command_response_standard_error, (n_groups, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
@@ -450,7 +455,7 @@ class Model(Section):
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return (
             np.array(self.intercept),
-            np.array(self.past_coefficients),
+            np.array(self.lagged_rate_and_signal_coefficients),
             np.array(self.command_response),
             np.array(self.residual_covariance),
         )
@@ -472,6 +477,6 @@ def load_model(path: Path) -> Model:
     return read_file(Model, path, _MAX_FILE_BYTES)
 
 
-def as_text(model: Model) -> str:
+def model_file_text(model: Model) -> str:
     """The model as the text of its file."""
     return model.model_dump_json(indent=1, by_alias=True) + "\n"

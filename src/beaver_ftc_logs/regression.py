@@ -118,8 +118,10 @@ def unexplained_rates_and_responses(
     past_regressors, lagged_group_commands, is_predictable = build_regressors(
         samples, surface_indices_by_group(model), *lag_counts_and_label_scaling
     )
-    _, past_coefficients, response_coefficients, _ = model.intercept_past_response_noise()
-    rates_unexplained_by_past = samples.rates - np.einsum("nm,mr->nr", past_regressors, past_coefficients)
+    _, lagged_rate_and_signal_coefficients, response_coefficients, _ = model.intercept_past_response_noise()
+    rates_unexplained_by_past = samples.rates - np.einsum(
+        "nm,mr->nr", past_regressors, lagged_rate_and_signal_coefficients
+    )
     return (
         is_predictable,
         rates_unexplained_by_past,

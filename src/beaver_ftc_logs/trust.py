@@ -215,17 +215,17 @@ def is_group_effect_known(model: Model) -> list[bool]:
 
 def is_group_gain_known(model: Model) -> list[bool]:
     """Whether the effect of each group is known under any law: the model may not err by all of it."""
-    has_known_effect = is_group_effect_known(model)
+    group_has_known_effect = is_group_effect_known(model)
     if (
         model.fitted_ranges is None
         or not model.fitted_ranges.group_gain_standard_error
         or not model.vehicle.other_laws
     ):
-        return has_known_effect
+        return group_has_known_effect
     return [
         is_effect_known and regression.BOUND_MARGIN_STANDARD_ERRORS * gain_standard_error < 1.0
         for is_effect_known, gain_standard_error in zip(
-            has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
+            group_has_known_effect, model.fitted_ranges.group_gain_standard_error, strict=True
         )
     ]
 
@@ -233,7 +233,12 @@ def is_group_gain_known(model: Model) -> list[bool]:
 def surfaces_of_unknown_effect(model: Model) -> set[str]:
     """The surfaces of which nothing is said."""
     groups_and_flags = zip(model.groups, is_group_effect_known(model), strict=True)
-    return {name for group, has_known_effect in groups_and_flags if not has_known_effect for name in group}
+    return {
+        name
+        for group, group_has_known_effect in groups_and_flags
+        if not group_has_known_effect
+        for name in group
+    }
 
 
 def unknown_effect_sentences(model: Model) -> list[str]:
@@ -246,13 +251,13 @@ def unknown_effect_sentences(model: Model) -> list[str]:
     return [
         f"{sentence_start.format('+'.join(group), explained_share)}: its effect cannot be told, "
         "nothing is said of it"
-        for group, explained_share, has_known_effect in zip(
+        for group, explained_share, group_has_known_effect in zip(
             model.groups,
             model.fitted_ranges.effect_share_explained_by_others,
             is_group_effect_known(model),
             strict=False,
         )
-        if not has_known_effect
+        if not group_has_known_effect
     ]
 
 
@@ -674,7 +679,7 @@ def coefficients_by_column_without_own_axis(model: Model) -> dict[str, tuple[lis
         rate_column_names * model.n_rate_lags
         + model.vehicle.signal_regressor_names * model.vehicle.n_signal_lags(model.n_rate_lags)
     )
-    coefficients, rows_of_column = np.array(model.past_coefficients), dict[str, list[int]]()
+    coefficients, rows_of_column = np.array(model.lagged_rate_and_signal_coefficients), dict[str, list[int]]()
     for row, name in enumerate(column_of_row):
         rows_of_column.setdefault(name.removesuffix(" by airspeed"), []).append(row)
         if row < 3 * model.n_rate_lags:

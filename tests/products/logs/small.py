@@ -69,7 +69,7 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     members = [[list(its.surfaces).index(one) for one in group] for group in model.groups]
     moved = np.column_stack([(labels * surfaces)[:, group].sum(axis=1) for group in members])
     white = rng.standard_normal((n, 3)) @ np.linalg.cholesky(np.array(model.residual_covariance)).T
-    response, past = np.array(model.command_response), np.array(model.past_coefficients)
+    response, past = np.array(model.command_response), np.array(model.lagged_rate_and_signal_coefficients)
     rates = np.zeros((n, 3))
     for k in range(max(model.n_rate_lags, model.n_command_lags), n):
         before = [*(rates[k - j] for j in range(1, model.n_rate_lags + 1)), signals[k - 1]]

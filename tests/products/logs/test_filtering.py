@@ -32,7 +32,7 @@ def delays_of(samples, model):
 
     evidence = [
         _run_bank_on_flight(_with_command_delay(samples, d), model, bank)[3]
-        for d in model.settings.command_delay_candidates_s
+        for d in model.settings.command_delay_offset_candidates_s
     ]
     return _model_probabilities_with_forgetting(evidence, model.rate_hz)
 
@@ -110,7 +110,7 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     """A pitching moment that grows: where the settings let the trim wander it is found there."""
     sd, past = (
         np.sqrt(np.diag(np.array(wing_model.residual_covariance)))[1],
-        np.array(wing_model.past_coefficients),
+        np.array(wing_model.lagged_rate_and_signal_coefficients),
     )
     moment = np.clip((healthy.t_s - 60.0) / 100.0, 0.0, 1.0) * 0.8 * sd
     answer = np.zeros((len(moment) + wing_model.n_rate_lags, 3))  # of the rates, by the model's own past
@@ -123,8 +123,8 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
         model = with_settings(
             wing_model,
             trim_random_walk_sd=[walk] * 3,
-            max_trim_deviation_sd=40.0,
-            command_delay_candidates_s=[0.0],
+            max_trim_deviation_in_sd=40.0,
+            command_delay_offset_candidates_s=[0.0],
         )
         one, other = (
             hypothesis_posterior(flight, model, build_hypothesis_bank(model))[1][-1, 1]
@@ -142,7 +142,7 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     rng = np.random.default_rng(8)
     rates = healthy.rates.copy()
     rates[600:] += 5.0 * rng.choice([-1.0, 1.0], (len(rates) - 600, 3))
-    model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delay_candidates_s=[0.0])
+    model = with_settings(wing_model, noise_scale_memory_s=memory_s, command_delay_offset_candidates_s=[0.0])
     bank = build_hypothesis_bank(model)
     posterior, _, scale = hypothesis_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)

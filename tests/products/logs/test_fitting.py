@@ -207,7 +207,7 @@ def test_a_model_is_what_was_fitted(changed, fitted, usable_flights):
     )
     past = 1 + 3 * fitted.n_rate_lags
     assert fitted.intercept == fit.coefficients[0].tolist()
-    assert fitted.past_coefficients == fit.coefficients[1:past].tolist()
+    assert fitted.lagged_rate_and_signal_coefficients == fit.coefficients[1:past].tolist()
     for field, values in (
         ("command_response", fit.coefficients),
         ("command_response_standard_error", fit.standard_errors),
@@ -231,7 +231,7 @@ def test_settings_by_hand(fitted):
     assert settings.likely_effectiveness_levels_by_group == {"right": [0.4], "left": [0.5]}
     assert settings.effectiveness_changes_per_hour == pytest.approx(np.sqrt((4 + 1) / (use / 36000.0) * 12.0))
     assert settings.repair_share == pytest.approx((2 + 10) / (4 + 20))
-    assert settings.command_delay_candidates_s == pytest.approx([-0.04, 0.0, 0.04])
+    assert settings.command_delay_offset_candidates_s == pytest.approx([-0.04, 0.0, 0.04])
     stuck = fitting.estimate_filter_settings(
         fitting.flights_with_usable_rows([small.flight(TAIL, 400)]), TAIL
     )
@@ -335,7 +335,7 @@ def test_a_flight_alone_is_left_out_by_halves_of_what_is_known():
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
-    quick = fitted.settings.model_copy(update={"command_delay_candidates_s": [0.0]})
+    quick = fitted.settings.model_copy(update={"command_delay_offset_candidates_s": [0.0]})
     entries, bounds = fitting.score_folds_and_choose_credible_mass(
         usable_flights, fitted.model_copy(update={"settings": quick})
     )
@@ -382,7 +382,7 @@ def test_what_one_step_prediction_explains(usable_flights):
     for i in (0, 100, len(expected) - 1):
         k = expected[i]
         past = np.concatenate([samples.rates[k - 1], samples.rates[k - 2]]) @ np.array(
-            MODEL.past_coefficients
+            MODEL.lagged_rate_and_signal_coefficients
         )
         moved = sum(
             samples.commands[k - j, g] * left[k - j, g] * np.array(MODEL.command_response[g][j - 1])

@@ -163,7 +163,7 @@ def test_what_a_detector_is_told_before_the_flight(changed):
     fields = {name: value for name, value in vars(told).items() if name not in ("model", "declared")}
     assert not changed(fields | {"declared": vars(told.declared)})
     x = np.array([[0.1, 0.2, -0.3], [0.4, 0.0, 0.2]])
-    past = np.array(WING.past_coefficients)[:3]
+    past = np.array(WING.lagged_rate_and_signal_coefficients)[:3]
     np.testing.assert_allclose(told.model.f(x, np.zeros(4)), (x @ past - x) / 0.1)
     assert told.model.G(np.zeros(4)).tolist() == [[0.0] * 4] * 3
 

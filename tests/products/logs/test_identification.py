@@ -16,7 +16,7 @@ from beaver_ftc_logs.identification import (
     identification_text,
     identify,
     regressor_names,
-    residual_spectrum,
+    residual_to_white_density_by_band,
     scale_by_dynamic_pressure_if_better,
 )
 from beaver_ftc_logs.pages import load_template
@@ -236,7 +236,7 @@ def test_a_spectrum_by_bands():
     samples = small.flight(model, 600)
     samples.rates[:, 1] += 0.5 * np.sin(2 * np.pi * 3.0 * samples.t_s)
     usable_flights = fitting.flights_with_usable_rows([samples])
-    bands = residual_spectrum(usable_flights, model)
+    bands = residual_to_white_density_by_band(usable_flights, model)
     ends = [(band["from_hz"], band["to_hz"]) for band in bands]
     assert ends == [(0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0)]
     from scipy import signal
@@ -249,7 +249,9 @@ def test_a_spectrum_by_bands():
             white = residual[:, axis].var() / 10.0
             assert band[name] == pytest.approx(density[inside, axis].mean() / white)
     assert max(bands, key=lambda band: band["q"])["from_hz"] == 2.0
-    low = residual_spectrum(fitting.flights_with_usable_rows([small.flight(MODEL, 300)]), MODEL)
+    low = residual_to_white_density_by_band(
+        fitting.flights_with_usable_rows([small.flight(MODEL, 300)]), MODEL
+    )
     assert [band["to_hz"] for band in low] == [0.1, 0.5, 1.0, 2.0, 5.0]
 
 
@@ -322,7 +324,7 @@ def test_what_is_told_of_a_fit(monkeypatch, lag_s, short):
         share = 1.0 - left.var() / of.var()
         assert found["explained_of_windows_not_fitted"][name] == pytest.approx(share)
     assert (given["loss"], given["max_nfev"]) == ("soft_l1", 40)
-    start, low, high = identification._initial_output_error_parameters(2, 0.1)
+    start, low, high = identification._output_error_first_guess_and_bounds(2, 0.1)
     np.testing.assert_array_equal(given["start"], start)
     np.testing.assert_array_equal(given["bounds"], (low, high))
 
@@ -386,7 +388,7 @@ def test_of_many_windows_every_so_many_is_kept(n, kept_of):
 
 
 def test_where_the_fit_begins_and_what_it_may_say():
-    start, low, high = identification._initial_output_error_parameters(2, 0.05)
+    start, low, high = identification._output_error_first_guess_and_bounds(2, 0.05)
     assert start.tolist() == [
         0.1, 0.05, 0.7, 0, 0, 0, 0.7, 0, 0, 0, 0.7, *[0.01] * 6, 0, 0, 0,
     ]  # fmt: skip

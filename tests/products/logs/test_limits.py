@@ -5,7 +5,7 @@ import json
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.model import Model, as_text, load_model
+from beaver_ftc_logs.model import Model, load_model, model_file_text
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 from products.logs import small
 
@@ -39,13 +39,13 @@ def test_a_model_comes_back_from_its_file(tmp_path):
     model = small.model(settings={"levels": {"left": [0.4]}}, identified={"tests": [1, {"a": None}]})
     path = tmp_path / "below" / "model.json"
     path.parent.mkdir()
-    path.write_text(as_text(model))
+    path.write_text(model_file_text(model))
     assert load_model(path) == model
     lines = path.read_text().splitlines()
     assert lines[1] == ' "vehicle": {'
     assert path.read_text().endswith("}\n")
     intercept, past, response, noise = model.intercept_past_response_noise()
-    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.past_coefficients)
+    assert (intercept.tolist(), past.tolist()) == (model.intercept, model.lagged_rate_and_signal_coefficients)
     assert (response.tolist(), noise.tolist()) == (model.command_response, model.residual_covariance)
 
 

@@ -9,7 +9,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose, fitting, gyro_noise, identification, samples, trust
 from beaver_ftc_logs.bank import build_hypothesis_bank, build_residual_noise
 from beaver_ftc_logs.filtering import _update_gaussian, hypothesis_posterior
-from beaver_ftc_logs.model import FittedRanges, NoiseModel, as_text, load_model
+from beaver_ftc_logs.model import FittedRanges, NoiseModel, load_model, model_file_text
 from beaver_ftc_logs.regression import unexplained_rates_and_responses, whitened_rates_and_responses
 from beaver_ftc_logs.samples import whiten_samples
 from products.logs import small
@@ -248,7 +248,7 @@ def test_a_model_that_is_read_again_samples_as_it_did(tmp_path, keys, rate_hz):
     """In memory a key that was left out is known to be; a file has every key."""
     model = small.model(small.WING | keys)
     assert model.vehicle.max_sample_rate_hz == rate_hz
-    (tmp_path / "model.json").write_text(as_text(model))
+    (tmp_path / "model.json").write_text(model_file_text(model))
     assert load_model(tmp_path / "model.json").vehicle.max_sample_rate_hz == rate_hz
 
 

@@ -52,7 +52,7 @@ def test_a_surface_lost_from_the_first_second_is_none_of_that(wing, wing_folder,
 @pytest.fixture(scope="module")
 def n_signal_lags():
     """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""
-    past = [*small.model(small.TAIL).past_coefficients[:-1], [0.3, 0.2, -0.1]]
+    past = [*small.model(small.TAIL).lagged_rate_and_signal_coefficients[:-1], [0.3, 0.2, -0.1]]
     model = small.model(small.TAIL, past=past)
     flight = small.flight(model, n=1200, seed=7)
     known = FittedRanges(commands=central_ranges(flight.commands), rates=central_ranges(flight.rates))
@@ -74,9 +74,9 @@ def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(n_sig
     model, _ = n_signal_lags
     lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
     assert check_columns_as_identified(lost, model) is None
-    past = np.array(model.past_coefficients)
+    past = np.array(model.lagged_rate_and_signal_coefficients)
     past[:3] += np.array([[0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
-    coupled = model.model_copy(update={"past_coefficients": past.tolist()})
+    coupled = model.model_copy(update={"lagged_rate_and_signal_coefficients": past.tolist()})
     idle = coupled.model_copy(update={"command_response": np.zeros_like(model.command_response).tolist()})
     flight = small.flight(idle, n=6000, seed=9)
     assert check_columns_as_identified(flight, coupled) is None

@@ -436,7 +436,7 @@ def test_what_each_column_brings_to_the_axes_of_others():
     model = small.model(small.TAIL)
     flown = small.flight(model, n=7)
     found, names = trust._column_contributions_to_rates(flown, model)
-    past, rates = np.array(model.past_coefficients), flown.rates
+    past, rates = np.array(model.lagged_rate_and_signal_coefficients), flown.rates
     assert names == ["p_rad_s", "q_rad_s", "r_rad_s", "airspeed_m_s"]
     for k in range(2, 7):
         for i in range(3):

@@ -142,7 +142,7 @@ def two_methods(monkeypatch):
 
 
 def test_a_labelled_flight_is_left_out_by_halves(changed, monkeypatch, two_methods):
-    monkeypatch.setattr(fitting, "_COMMAND_DELAY_CANDIDATES_SAMPLES", (0.0,))  # quick
+    monkeypatch.setattr(fitting, "_COMMAND_DELAY_OFFSET_CANDIDATES_SAMPLES", (0.0,))  # quick
     flight = small.flight(MODEL, 1000, lost=LOST)
     data = data_set(MODEL, [flight])
     document = benchmark._compare_methods(data)

@@ -246,10 +246,12 @@ def _read_sample_inputs(
     si_columns = convert_to_si(recording, vehicle).columns
     mean_age_s_by_held_column = dict(samples.mean_age_s_by_held_column)
 
-    def sampled_values(quantity: QuantityColumn) -> Floats:
-        values, mean_age_s = values_and_mean_age_at(si_columns[quantity.column], samples.t_s, samples.dt_s)
+    def sampled_values(quantity_column: QuantityColumn) -> Floats:
+        values, mean_age_s = values_and_mean_age_at(
+            si_columns[quantity_column.column], samples.t_s, samples.dt_s
+        )
         if mean_age_s is not None:
-            mean_age_s_by_held_column[quantity.column] = mean_age_s
+            mean_age_s_by_held_column[quantity_column.column] = mean_age_s
         return values
 
     alpha_rad, beta_rad, qdyn_pa, *aircraft_signals = (

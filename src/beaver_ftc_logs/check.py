@@ -128,42 +128,42 @@ def _log_size_text(samples: Samples) -> str:
 
 def _compare_rates_and_angles(recording: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, attitude_quantities = recording.columns, vehicle.attitude
-    if attitude_quantities is None or attitude_quantities.roll.column not in columns:
+    columns, attitude_columns = recording.columns, vehicle.attitude
+    if attitude_columns is None or attitude_columns.roll.column not in columns:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     rate_columns = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
-    pitch_quantity = attitude_quantities.pitch
+    pitch_quantity_column = attitude_columns.pitch
     pitch_in_si = (
-        _column_in_si(columns, pitch_quantity)
-        if pitch_quantity is not None and pitch_quantity.column in columns
+        _column_in_si(columns, pitch_quantity_column)
+        if pitch_quantity_column is not None and pitch_quantity_column.column in columns
         else None
     )
     roll_fit = physics.fit_roll_angle_to_rates(
-        rate_columns, _column_in_si(columns, attitude_quantities.roll), pitch_in_si
+        rate_columns, _column_in_si(columns, attitude_columns.roll), pitch_in_si
     )
     if roll_fit is None:
         return ["too little moves to compare the rates with the roll angle"]
-    comparison_texts = [
-        _angle_rate_fit_text(roll_fit, attitude_quantities.roll.column, vehicle.rates.p.column)
-    ]
-    if pitch_quantity is not None and pitch_in_si is not None:
+    comparison_texts = [_angle_rate_fit_text(roll_fit, attitude_columns.roll.column, vehicle.rates.p.column)]
+    if pitch_quantity_column is not None and pitch_in_si is not None:
         pitch_fit = physics.fit_pitch_angle_to_rates(
-            rate_columns, _column_in_si(columns, attitude_quantities.roll), pitch_in_si
+            rate_columns, _column_in_si(columns, attitude_columns.roll), pitch_in_si
         )
         comparison_texts += (
-            [_angle_rate_fit_text(pitch_fit, pitch_quantity.column, vehicle.rates.q.column)]
+            [_angle_rate_fit_text(pitch_fit, pitch_quantity_column.column, vehicle.rates.q.column)]
             if pitch_fit
             else []
         )
-    if (yaw_quantity := attitude_quantities.yaw) is not None and yaw_quantity.column in columns:
+    if (yaw_quantity_column := attitude_columns.yaw) is not None and yaw_quantity_column.column in columns:
         yaw_fit = physics.fit_yaw_angle_to_rates(
             rate_columns,
-            _column_in_si(columns, attitude_quantities.roll),
+            _column_in_si(columns, attitude_columns.roll),
             pitch_in_si,
-            _column_in_si(columns, yaw_quantity),
+            _column_in_si(columns, yaw_quantity_column),
         )
         comparison_texts += (
-            [_angle_rate_fit_text(yaw_fit, yaw_quantity.column, vehicle.rates.r.column)] if yaw_fit else []
+            [_angle_rate_fit_text(yaw_fit, yaw_quantity_column.column, vehicle.rates.r.column)]
+            if yaw_fit
+            else []
         )
     return comparison_texts
 
@@ -180,9 +180,9 @@ def _angle_rate_fit_text(fit: physics.AngleRateFit, angle_column_name: str, rate
     )
 
 
-def _column_in_si(columns: Any, quantity: Any) -> Column:
-    column: Column = columns[quantity.column]
-    return replace(column, values=quantity.to_si(column.values))
+def _column_in_si(columns: Any, quantity_column: Any) -> Column:
+    column: Column = columns[quantity_column.column]
+    return replace(column, values=quantity_column.to_si(column.values))
 
 
 def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:

@@ -11,7 +11,11 @@ from beaver_ftc.diagnosis.detection.filters import (
     fault_acceleration_range,
     fault_acceleration_range_along_parity,
 )
-from beaver_ftc.diagnosis.model_prediction import add_instant_to_sums, begin_frame_sums, fill_frame_means
+from beaver_ftc.diagnosis.model_prediction import (
+    add_instant_to_sums,
+    begin_frame_sums_with_instant,
+    fill_frame_means,
+)
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 
@@ -19,7 +23,7 @@ from beaver_ftc.scenario.schema import Scenario
 @kernel
 def first(frames):
     fdi = frames[0].fdi
-    begin_frame_sums(
+    begin_frame_sums_with_instant(
         frames[0].prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frames[0].measured
     )
 

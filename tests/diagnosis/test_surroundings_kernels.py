@@ -99,7 +99,7 @@ def test_the_gusts_of_a_frame_are_summed_over_its_instants():
     record["memory"]["air_rotation_in_level_axes"] = 0.0, 0.02, -0.03
     gusts.fill_gust_effect_and_specific_force(record, design, X, Y, U)
     first = record["output"]["angular_acceleration_by_gust"].copy()
-    gusts.begin_gust_sums(record, V, 0.01)
+    gusts.begin_gust_sums_with_instant(record, V, 0.01)
     gusts.update_gust_and_sums(record, design, X, Y, U, np.zeros(3), 0.01)
     assert record["memory"]["angular_acceleration_by_gust_sum"] == pytest.approx(
         first + record["output"]["angular_acceleration_by_gust"]

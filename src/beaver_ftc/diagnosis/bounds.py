@@ -709,20 +709,22 @@ POLE_DESIGN_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds 
 
 
 @lru_cache(maxsize=64)
-def max_inertia_coefficient_errors(relative_inertia_tolerance: float, mass: MassProperties) -> np.ndarray:
+def max_inertia_coefficient_errors(
+    relative_inertia_tolerance: float, mass_properties: MassProperties
+) -> np.ndarray:
     """Largest change of the twelve inertia coefficients for every inertia within its tolerance.
 
     Each coefficient is monotonic in each inertia while the others are constant, so the largest change is at a
     corner.
     """
-    nominal_coefficients = np.array(inertia_coefficients(mass))
+    nominal_coefficients = np.array(inertia_coefficients(mass_properties))
     max_coefficient_changes = np.zeros(12)
     for signs in product((-1.0, 1.0), repeat=4):
         changed_inertias = {
-            inertia_name: getattr(mass, inertia_name) * (1 + relative_inertia_tolerance * sign)
+            inertia_name: getattr(mass_properties, inertia_name) * (1 + relative_inertia_tolerance * sign)
             for inertia_name, sign in zip(_INERTIA_NAMES, signs, strict=True)
         }
-        changed_coefficients = np.array(inertia_coefficients(replace(mass, **changed_inertias)))
+        changed_coefficients = np.array(inertia_coefficients(replace(mass_properties, **changed_inertias)))
         max_coefficient_changes = np.maximum(
             max_coefficient_changes, np.abs(changed_coefficients - nominal_coefficients)
         )
@@ -757,18 +759,22 @@ def configure_uncertainty_bound(
 
 
 def fill_declared_errors(
-    declared_errors: np.void, declared: Declared, design: np.void, mass: MassProperties
+    declared_errors: np.void, declared: Declared, design: np.void, mass_properties: MassProperties
 ) -> None:
-    """Fill the declared errors; design, mass: record and mass properties of the design model."""
+    """Fill the declared errors; design, mass_properties: record and mass properties of the design model."""
     coefficient_tolerances = declared.coefficients.absolute(
         declared.aircraft.moments, design["moments"]["value"]
     )
     declared_errors["coefficient_tolerance"][: coefficient_tolerances.size] = coefficient_tolerances
-    declared_errors["inertia_coefficient_tolerance"] = max_inertia_coefficient_errors(declared.inertia, mass)
+    declared_errors["inertia_coefficient_tolerance"] = max_inertia_coefficient_errors(
+        declared.inertia, mass_properties
+    )
     declared_errors["deflection_error_bound"] = declared.actuators.deflection_rad
-    sensor_errors, air, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(span_m)
-    declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(span_m)
+    sensor_errors, turbulence, span_m = declared.sensors, declared.air, declared.aircraft.geometry.span_m
+    declared_errors["air_rotation_bound_aloft"] = GUST_LIMIT_SIGMA * turbulence.rotation_limit_rad_s(span_m)
+    declared_errors["air_rotation_bound_at_1_m"] = GUST_LIMIT_SIGMA * turbulence.low_rotation_limit_rad_s(
+        span_m
+    )
     declared_errors["air_rotation_bound"] = declared_errors["air_rotation_bound_aloft"]
     declared_errors["altitude_error_bound_at_zero_m"] = sensor_errors["altitude"].worst
     declared_errors["altitude_error_bound_per_m"] = sensor_errors["altitude"].slope
@@ -795,7 +801,7 @@ def fill_declared_engine_instrument_errors(
     """
     sensor_errors = declared.sensors
     has_instrument_errors = any(
-        not getattr(sensor_errors.declared, instrument).is_ideal for instrument in OF_THE_SLIPSTREAM
+        not getattr(sensor_errors.declared, instrument_name).is_ideal for instrument_name in OF_THE_SLIPSTREAM
     )
     if not (has_instrument_errors and declared.aircraft.has_engine_instruments):
         return
@@ -803,7 +809,8 @@ def fill_declared_engine_instrument_errors(
     max_manifold_pressure = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
     max_readings = dict(zip(ENGINE, (initial_condition.engine_rpm, max_manifold_pressure), strict=True))
     reading_error_bounds = [
-        sensor_errors[instrument].of_reading(max_reading) for instrument, max_reading in max_readings.items()
+        sensor_errors[instrument_name].of_reading(max_reading)
+        for instrument_name, max_reading in max_readings.items()
     ]
     declared_errors["has_engine_instrument_errors"] = 1
     declared_errors["power_error_kw_by_instruments"], declared_errors["power_error_kw_per_density_ratio"] = (
@@ -939,8 +946,8 @@ def flow_angle_in_level_axes_noise_std(sensor_errors: SensorErrors, airspeed_mps
     max_attitude_and_flow_angle_rad = 0.3  # attitudes and incidences of up to 17 deg
     vane_attitude_pairs = (("alpha", "theta"), ("beta", "psi"))
     vane_and_attitude_noise_std = [
-        hypot(sensor_errors[vane].random, sensor_errors[attitude_angle].random)
-        for vane, attitude_angle in vane_attitude_pairs
+        hypot(sensor_errors[vane_name].random, sensor_errors[attitude_angle_name].random)
+        for vane_name, attitude_angle_name in vane_attitude_pairs
     ]
     return np.array(vane_and_attitude_noise_std) + max_attitude_and_flow_angle_rad * (
         sensor_errors["V"].random / airspeed_mps + sensor_errors["phi"].random
@@ -969,14 +976,14 @@ def moment_axis_of_term(term: Term) -> int:
 
 
 def moment_term_tolerances(
-    declared: Declared, design: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
+    declared: Declared, design: np.void, mass_properties: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
     (statistical.py); y, u in trim."""
     aircraft, sensor_errors = declared.aircraft, declared.sensors
     coefficient_magnitudes = np.abs(design["moments"]["value"][: len(aircraft.moments)])
-    inertia_coefficient_errors = max_inertia_coefficient_errors(declared.inertia, mass)
-    nominal_inertia_coefficients = np.abs(inertia_coefficients(mass))
+    inertia_coefficient_errors = max_inertia_coefficient_errors(declared.inertia, mass_properties)
+    nominal_inertia_coefficients = np.abs(inertia_coefficients(mass_properties))
     own_axis_inertia_coefficient_indices = (2, 7, 11)  # what multiplies a moment there
     relative_term_tolerances = np.full(
         coefficient_magnitudes.shape,
@@ -994,10 +1001,10 @@ def moment_term_tolerances(
     )
     coefficient_slope_magnitudes = np.abs(coefficient_slopes(design, np.zeros(3), y, u))
     span_m, chord_m = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for gyro, signal_index, rate_normalisation_length_m in zip(
+    for gyro_name, signal_index, rate_normalisation_length_m in zip(
         AXES, (PH, QH, RH), (span_m / 2, chord_m, span_m / 2), strict=True
     ):
-        normalised_rate_error = sensor_errors[gyro].steady * rate_normalisation_length_m / y[AIRSPEED]
+        normalised_rate_error = sensor_errors[gyro_name].steady * rate_normalisation_length_m / y[AIRSPEED]
         for k, term in enumerate(aircraft.moments):
             if term.is_constant:
                 tolerances_covering_constant_errors[k] += (
@@ -1010,14 +1017,12 @@ def moment_term_tolerances(
 def _relative_signal_error_of_term(sensor_errors: SensorErrors, term: Term) -> float:
     """Relative error of the signals that a term multiplies, by the slopes of gyros, vanes, airspeed and
     pressure."""
-    own_gyro = AXES[
-        moment_axis_of_term(term)
-    ]  # a gyro's slope is counted once for all terms of its own_gyro axis
-    relative_error = sensor_errors[own_gyro].slope + sensor_errors["qdyn"].slope
-    for signal, exponent in term.of:
-        if signal in _AXIS_OF_RATE_SIGNAL:
+    own_gyro_name = AXES[moment_axis_of_term(term)]  # a slope of it is counted once for all terms of the axis
+    relative_error = sensor_errors[own_gyro_name].slope + sensor_errors["qdyn"].slope
+    for signal_name, exponent in term.of:
+        if signal_name in _AXIS_OF_RATE_SIGNAL:
             relative_error += exponent * sensor_errors["V"].slope
-        signal_errors = sensor_errors.get(_AXIS_OF_RATE_SIGNAL.get(signal, signal))
-        if signal_errors is not None and _AXIS_OF_RATE_SIGNAL.get(signal) != own_gyro:
+        signal_errors = sensor_errors.get(_AXIS_OF_RATE_SIGNAL.get(signal_name, signal_name))
+        if signal_errors is not None and _AXIS_OF_RATE_SIGNAL.get(signal_name) != own_gyro_name:
             relative_error += exponent * signal_errors.slope
     return relative_error

@@ -470,7 +470,7 @@ def fill_gust_effect_and_specific_force(gust, design, x, y, u):
 
 
 @kernel
-def begin_gust_sums(gust, V, dt):
+def begin_gust_sums_with_instant(gust, V, dt):
     """Start the sums over the next frame's instants, dt s apart, with this instant; V m/s."""
     gust.memory.angular_acceleration_by_gust_sum[:] = gust.output.angular_acceleration_by_gust
     add_acceleration_variance_by_axes_turn(gust, V, dt)
@@ -728,7 +728,7 @@ def gust_effect_product(gust, gust_axes, axis_i, axis_j, gust_axis):
     return effect_on_i * effect_on_j
 
 
-def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassProperties) -> None:
+def configure_gust_estimate(gust: np.void, declared: Declared, mass_properties: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
     turbulence, sensor_errors, aircraft = declared.air, declared.sensors, declared.aircraft
     span_m = aircraft.geometry.span_m
@@ -741,7 +741,7 @@ def configure_gust_estimate(gust: np.void, declared: Declared, mass: MassPropert
         gust["output"]["accounts_for_gusts"] and not gust["output"]["is_gust_measured"]
     )
     fill_table(gust["memory"]["force_table"], aircraft, aircraft.measurable_forces, FORCES)
-    gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
+    gust["config"]["wing_area_per_mass"] = aircraft.geometry.wing_area_m2 / mass_properties.mass_kg
     gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
     gust["config"]["wing_span"] = span_m
     gust["config"]["gust_rotation_intensity_per_airspeed_aloft"] = turbulence.rotation_walk(span_m)

@@ -91,22 +91,23 @@ class WhiteningFilter:
         return np.sqrt(np.cumsum(np.square(self.whitened_response(fault_acceleration)).sum(axis=1)))
 
     def deflection_coefficient_with_unknowns(
-        self, fault_acceleration: np.ndarray, regressors: np.ndarray, constant_std: np.ndarray
+        self, fault_acceleration: np.ndarray, regressors: np.ndarray, unknown_constant_std: np.ndarray
     ) -> float:
         """d of fault_acceleration (n, 3) rad/s2 with unknown constants in all frames.
 
-        The constants, of standard deviation constant_std (m,) > 0, multiply regressors (n, 3, m).
+        The constants, of standard deviation unknown_constant_std (m,) > 0, multiply regressors (n, 3, m).
         """
         whitened_fault = self.whitened_response(fault_acceleration).ravel()
         whitened_regressors = (
-            self.whitened_response(regressors).reshape(whitened_fault.size, constant_std.size) * constant_std
+            self.whitened_response(regressors).reshape(whitened_fault.size, unknown_constant_std.size)
+            * unknown_constant_std
         )
         regressor_fault_correlation = whitened_regressors.T @ whitened_fault
         squared_deflection_coefficient = (
             whitened_fault @ whitened_fault
             - regressor_fault_correlation
             @ np.linalg.solve(
-                whitened_regressors.T @ whitened_regressors + np.eye(constant_std.size),
+                whitened_regressors.T @ whitened_regressors + np.eye(unknown_constant_std.size),
                 regressor_fault_correlation,
             )
         )

@@ -658,26 +658,29 @@ def advance_estimator(isolation, fie, bound_record, x, predicted_acceleration, d
         acceleration_at_zero_theta = fie.frame_mean_effect.acceleration_at_zero_theta[i]
         regressor = fie.frame_mean_effect.regressor[i]
         theta = fie.theta[i]
-        decay = isolation.config.filter_decay[i]
+        decay_factor = isolation.config.filter_decay[i]
         fie.xhat[i] = (
             x[i]
             + dt * (predicted_acceleration[i] + acceleration_at_zero_theta + regressor * theta)
-            + decay * (fie.xhat[i] - x[i])
+            + decay_factor * (fie.xhat[i] - x[i])
         )
     adapt_estimate(isolation, fie, dt)
     for i in range(3):
-        regressor, decay = fie.frame_mean_effect.regressor[i], isolation.config.filter_decay[i]
-        fie.filtered_positive_regressor[i] = decay * fie.filtered_positive_regressor[i] + dt * max(
+        regressor, decay_factor = fie.frame_mean_effect.regressor[i], isolation.config.filter_decay[i]
+        fie.filtered_positive_regressor[i] = decay_factor * fie.filtered_positive_regressor[i] + dt * max(
             regressor, 0.0
         )
-        fie.filtered_negative_regressor[i] = decay * fie.filtered_negative_regressor[i] + dt * min(
+        fie.filtered_negative_regressor[i] = decay_factor * fie.filtered_negative_regressor[i] + dt * min(
             regressor, 0.0
         )
         fie.filtered_eta_bar[i] = advance_residual_bound(
-            fie.filtered_eta_bar[i], bound_record.eta_bar[i] + fie.frame_mean_effect.error_bound[i], decay, dt
+            fie.filtered_eta_bar[i],
+            bound_record.eta_bar[i] + fie.frame_mean_effect.error_bound[i],
+            decay_factor,
+            dt,
         )
         fie.filtered_gyro_error_bound[i] = advance_gyro_error_bound(
-            fie.filtered_gyro_error_bound[i], bound_record.changing_gyro_error_bound_before[i], decay
+            fie.filtered_gyro_error_bound[i], bound_record.changing_gyro_error_bound_before[i], decay_factor
         )
         fie.filtered_uncertainty_bound[i] = (
             fie.filtered_eta_bar[i]

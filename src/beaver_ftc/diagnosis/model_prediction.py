@@ -200,7 +200,7 @@ def evaluate_bound_and_frame_means(prediction, bound_record, measured, frame_ind
 
 
 @kernel
-def begin_frame_sums(prediction, bound_record, layout, diagnoses_all_types, measured):
+def begin_frame_sums_with_instant(prediction, bound_record, layout, diagnoses_all_types, measured):
     """Start the next frame's sums with this instant, at which the old command is still in effect."""
     prediction.x_before[:] = measured.x
     bound_record.changing_gyro_error_bound_before[:] = bound_record.changing_gyro_error_bound

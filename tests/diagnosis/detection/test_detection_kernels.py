@@ -193,7 +193,7 @@ def test_means_over_a_frame_are_of_its_instants(count, has_surface_term_errors):
             np.abs(per_rad),
         )
         if k == 0:
-            model_prediction.begin_frame_sums(
+            model_prediction.begin_frame_sums_with_instant(
                 record, fdi["bound"], fdi["layout"], fdi["config"]["diagnoses_all_types"], measured
             )
         else:

@@ -196,7 +196,7 @@ def configure_statistical_detector(
     config: FdiConfig,
     declared: Declared,
     design: np.void,
-    mass: MassProperties,
+    mass_properties: MassProperties,
     trim: TrimState,
     rate_hz: float,
 ) -> None:
@@ -216,7 +216,7 @@ def configure_statistical_detector(
     test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
-    configure_gust_estimate(gust, declared, mass)
+    configure_gust_estimate(gust, declared, mass_properties)
     uses_parity_views = config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
         aircraft, *(parity_directions_of(aircraft, uses_forces) if uses_parity_views else ())
@@ -240,7 +240,7 @@ def configure_statistical_detector(
         trim,
         dt_s,
     )
-    term_tolerances = moment_term_tolerances(declared, design, mass, *trim[1:])
+    term_tolerances = moment_term_tolerances(declared, design, mass_properties, *trim[1:])
     _configure_regressor_tolerances(statistical, aircraft, term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
@@ -953,7 +953,7 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
     if bound_record.error_map.n_boxes > 0:
         update_uncertainty_change(noise_model, blocks, bound_record.error_map, u)
     if gust.output.accounts_for_gusts:
-        gusts.begin_gust_sums(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
+        gusts.begin_gust_sums_with_instant(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
 
 
 @kernel

@@ -489,7 +489,7 @@ def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, predicti
         gusts.fill_gust_effect_and_specific_force(
             inertial_gust, prediction.design, measured.x, forces_record.y_without_vanes, prediction.u
         )
-        gusts.begin_gust_sums(inertial_gust, forces_record.y_without_vanes[AIRSPEED], dt)
+        gusts.begin_gust_sums_with_instant(inertial_gust, forces_record.y_without_vanes[AIRSPEED], dt)
 
 
 @apart

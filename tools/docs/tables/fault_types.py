@@ -36,23 +36,31 @@ def fault_matrix() -> str:
     return _matrix(declared=False)
 
 
+def fault_matrix_probe() -> str:
+    """A third of these flights at one airspeed: each fault, and each surface, in some of them."""
+    return "\n".join(map(_closely, _probed(declared=False)))
+
+
 def fault_matrix_light() -> str:
     """The same in light turbulence, in words."""
     return _matrix(declared=True, turbulence="light")
 
 
 def fault_matrix_light_probe() -> str:
-    """A third of these flights at one airspeed: each fault, and each surface, in some of them."""
-    rows = [fly_case(case) for case in cases((45.0,), declared=True, turbulence="light")[::PROBED]]
+    """As many of these."""
+    rows = _probed(declared=True, turbulence="light")
     return "\n".join((*map(_closely, rows), _told(beside_told(rows))))
+
+
+def _probed(**instruments: Any) -> list[Document]:
+    return [fly_case(case) for case in cases((45.0,), **instruments)[::PROBED]]
 
 
 def _closely(row: Document) -> str:
     """What became of one flight, to more digits than the table has."""
     ratio = "lost" if row["ratio"] is None else f"{row['ratio']:.6g}"
-    return (
-        f"{row['surface']} {row['fault']}: {row['verdict']} {row['delay_s']} {ratio} {row['told_chance']:.6g}"
-    )
+    told = f" {row['told_chance']:.6g}" if "told_chance" in row else ""  # with declared instruments alone
+    return f"{row['surface']} {row['fault']}: {row['verdict']} {row['delay_s']} {ratio}{told}"
 
 
 def _matrix(declared: bool, turbulence: str = "none") -> str:

@@ -39,8 +39,10 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
     input_arrays = [np.column_stack([log_columns[name] for name in names]) for names in input_column_names]
     replayed = stepped.replay_samples(diagnosis, input_arrays, scenario.rate_hz)
-    rows = stepped.diagnosis_rows_from_replay(log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi)
-    return diagnosis_columns(rows, aircraft.surfaces), _replay_verdict(
+    diagnosis_rows = stepped.diagnosis_rows_from_replay(
+        log_columns["t_s"], replayed, aircraft.surfaces, scenario.fdi
+    )
+    return diagnosis_columns(diagnosis_rows, aircraft.surfaces), _replay_verdict(
         path, scenario, log_columns, replayed.verdicts
     )
 
@@ -55,21 +57,21 @@ def _read_columns(path: Path, names: list[str]) -> dict[str, Floats]:
     return log_columns
 
 
-def diagnosis_columns(rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
+def diagnosis_columns(diagnosis_rows: Any, surfaces: Sequence[str]) -> dict[str, Any]:
     """The columns of diagnosis.parquet. Where the diagnosis says nothing of a surface's effectiveness, its
     bounds are 0 and 1."""
     columns: dict[str, Any] = {
-        "t_s": rows.t_s,
-        "faulty": rows.faulty,
-        "named": rows.isolated_surfaces.tolist(),
+        "t_s": diagnosis_rows.t_s,
+        "faulty": diagnosis_rows.faulty,
+        "named": diagnosis_rows.isolated_surfaces.tolist(),
     }
     for i, surface in enumerate(surfaces):
-        columns[f"{surface}_effectiveness"] = rows.effectiveness[:, i]
+        columns[f"{surface}_effectiveness"] = diagnosis_rows.effectiveness[:, i]
         columns[f"{surface}_low"], columns[f"{surface}_high"] = (
-            rows.effectiveness_low[:, i],
-            rows.effectiveness_high[:, i],
+            diagnosis_rows.effectiveness_low[:, i],
+            diagnosis_rows.effectiveness_high[:, i],
         )
-    return columns | {"credible": rows.credible}
+    return columns | {"credible": diagnosis_rows.credible}
 
 
 def _replay_verdict(

@@ -485,10 +485,10 @@ def _labelled_effectiveness_by_surface(recording: RecordedFlight, vehicle: Vehic
     """Labels (n, S) as the log gives them, nan for a surface without one and where the log says nothing."""
     labels = np.full((len(t_s), len(vehicle.surfaces)), np.nan)
     for i, surface in enumerate(vehicle.surfaces):
-        label = vehicle.labels.get(surface)
-        column = recording.columns.get(label.column) if label else None
-        if label is not None and column is not None:
-            labels[:, i] = _latest_values(t_s, column.t_s, label.to_si(column.values))
+        label_quantity = vehicle.labels.get(surface)
+        column = recording.columns.get(label_quantity.column) if label_quantity else None
+        if label_quantity is not None and column is not None:
+            labels[:, i] = _latest_values(t_s, column.t_s, label_quantity.to_si(column.values))
     return labels
 
 

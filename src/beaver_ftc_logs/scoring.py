@@ -15,7 +15,7 @@ from beaver_ftc_logs.samples import Samples
 _SIMULTANEOUS_FAILURE_SPAN_S = 2.0
 
 
-def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str]]) -> Document:
+def score_diagnosis(samples: Samples, diagnosis_rows: DiagnosisRows, groups: list[list[str]]) -> Document:
     """All figures that the log allows: by its labels, or by its failure if it has no labels.
 
     Where the log has more rows than samples, each row is compared with the label of the last sample up to its
@@ -23,19 +23,19 @@ def score_diagnosis(samples: Samples, rows: DiagnosisRows, groups: list[list[str
     """
     is_surface_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_surface_labelled.any():
-        return score_against_failures(rows, samples.logged_failures, groups)
-    sample_index_of_row = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
+        return score_against_failures(diagnosis_rows, samples.logged_failures, groups)
+    sample_index_of_row = np.maximum(np.searchsorted(samples.t_s, diagnosis_rows.t_s, side="right") - 1, 0)
     fields_of_labelled_surfaces = {
-        name: getattr(rows, name).compress(is_surface_labelled, axis=1)
+        name: getattr(diagnosis_rows, name).compress(is_surface_labelled, axis=1)
         for name in ("effectiveness", "effectiveness_low", "effectiveness_high")
     }
     return score_against_labels(
-        replace(rows, **fields_of_labelled_surfaces),
+        replace(diagnosis_rows, **fields_of_labelled_surfaces),
         samples.labels[sample_index_of_row].compress(is_surface_labelled, axis=1),
     )
 
 
-def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
+def score_against_labels(diagnosis_rows: DiagnosisRows, labels: Floats) -> Document:
     """Scores against labelled effectiveness (n, S), on the rows in which every label is known.
 
     A setting is a row of labels that makes up at least 0.5 % of the flight. classes: share of rows whose
@@ -47,7 +47,7 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
         score_names = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
         return {"rows": 0, "settings": [], **dict.fromkeys(score_names)}
     true_effectiveness = labels[is_every_label_known]
-    estimated_effectiveness = rows.effectiveness[is_every_label_known]
+    estimated_effectiveness = diagnosis_rows.effectiveness[is_every_label_known]
     label_settings, n_rows_of_setting = np.unique(true_effectiveness, axis=0, return_counts=True)
     frequent_settings = label_settings[n_rows_of_setting >= 0.005 * len(true_effectiveness)]
     is_truly_faulty = (true_effectiveness < 1.0).any(axis=1)
@@ -60,13 +60,15 @@ def score_against_labels(rows: DiagnosisRows, labels: Floats) -> Document:
                 == nearest_label_setting_index(true_effectiveness, frequent_settings)
             )
         ),
-        "healthy_or_faulty": float(np.mean((rows.faulty[is_every_label_known] == 1) == is_truly_faulty)),
+        "healthy_or_faulty": float(
+            np.mean((diagnosis_rows.faulty[is_every_label_known] == 1) == is_truly_faulty)
+        ),
         "side": float(np.mean(((estimated_effectiveness < 1.0) == (true_effectiveness < 1.0)).all(axis=1))),
         "mean_error": float(np.abs(estimated_effectiveness - true_effectiveness).mean()),
         "held_by_bounds": float(
             np.mean(
-                (rows.effectiveness_low[is_every_label_known] <= true_effectiveness)
-                & (true_effectiveness <= rows.effectiveness_high[is_every_label_known])
+                (diagnosis_rows.effectiveness_low[is_every_label_known] <= true_effectiveness)
+                & (true_effectiveness <= diagnosis_rows.effectiveness_high[is_every_label_known])
             )
         ),
     }
@@ -79,7 +81,7 @@ def nearest_label_setting_index(effectiveness: Floats, label_settings: Floats) -
 
 
 def score_against_failures(
-    rows: DiagnosisRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
+    diagnosis_rows: DiagnosisRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
 ) -> Document:
     """Scores against the first failure in the log: alarms before it are false, the first one after it has the
     delay delay_s."""
@@ -92,26 +94,32 @@ def score_against_failures(
             if failure.t_s < first_failure_s + _SIMULTANEOUS_FAILURE_SPAN_S
         }
     )
-    is_before_failure = onset.is_false(rows.t_s)
-    alarm_rows_after_failure = np.flatnonzero(~is_before_failure & (rows.faulty == 1))
+    is_before_failure = onset.is_false(diagnosis_rows.t_s)
+    alarm_rows_after_failure = np.flatnonzero(~is_before_failure & (diagnosis_rows.faulty == 1))
     detected = bool(alarm_rows_after_failure.size)
-    name_shares = _name_shares_after_failure(rows, alarm_rows_after_failure)
+    name_shares = _name_shares_after_failure(diagnosis_rows, alarm_rows_after_failure)
     return {
         "failure": "+".join(failed_surfaces) or None,
         "failure_s": onset.at_s,
-        "healthy_s": float(rows.t_s[is_before_failure][-1] - rows.t_s[0]) if is_before_failure.any() else 0.0,
-        "false_alarms": int(np.sum(np.diff(rows.faulty[is_before_failure], prepend=0) == 1)),
+        "healthy_s": float(diagnosis_rows.t_s[is_before_failure][-1] - diagnosis_rows.t_s[0])
+        if is_before_failure.any()
+        else 0.0,
+        "false_alarms": int(np.sum(np.diff(diagnosis_rows.faulty[is_before_failure], prepend=0) == 1)),
         "detected": detected,
-        "delay_s": onset.delay_s(float(rows.t_s[alarm_rows_after_failure[0]])) if detected else None,
+        "delay_s": onset.delay_s(float(diagnosis_rows.t_s[alarm_rows_after_failure[0]]))
+        if detected
+        else None,
         "named": name_shares,
         "right_group": _is_right_group(name_shares, failed_surfaces, groups),
     }
 
 
-def _name_shares_after_failure(rows: DiagnosisRows, alarm_rows_after_failure: np.ndarray) -> dict[str, float]:
+def _name_shares_after_failure(
+    diagnosis_rows: DiagnosisRows, alarm_rows_after_failure: np.ndarray
+) -> dict[str, float]:
     """Return the names after the failure, as shares of the rows with an alarm."""
     names, n_rows_of_name = np.unique(
-        rows.isolated_surfaces[alarm_rows_after_failure].astype(str), return_counts=True
+        diagnosis_rows.isolated_surfaces[alarm_rows_after_failure].astype(str), return_counts=True
     )
     return {
         str(name): float(share)

@@ -50,18 +50,20 @@ correct logs with faults of any kind none was below 0.98 and 0.87, in light turb
 
 
 def compute_fitted_ranges(
-    flights: Sequence[tuple[Samples, Mask]],
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
     model: Model,
     gain_standard_error: Floats,
     max_noise_variance_scale: float,
 ) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. flights: with the samples used; gain_standard_error
-    (G,) and max_noise_variance_scale: of parts not fitted."""
+    """Compute the ranges in which a model was fitted. flights_with_used_rows: each flight, and its samples
+    used; gain_standard_error (G,) and max_noise_variance_scale: of parts not fitted."""
     surface_groups = regression.surface_indices_by_group(model)
-    rates = np.vstack([samples.rates[is_used] for samples, is_used in flights])
-    commands = np.vstack([samples.commands[is_used] for samples, is_used in flights])
+    rates = np.vstack([samples.rates[is_used] for samples, is_used in flights_with_used_rows])
+    commands = np.vstack([samples.commands[is_used] for samples, is_used in flights_with_used_rows])
     used_airspeeds = [
-        samples.airspeed[is_used] for samples, is_used in flights if samples.airspeed is not None
+        samples.airspeed[is_used]
+        for samples, is_used in flights_with_used_rows
+        if samples.airspeed is not None
     ]
     group_commands = np.column_stack(
         [commands[:, surface_indices].sum(axis=1) for surface_indices in surface_groups]
@@ -72,20 +74,22 @@ def compute_fitted_ranges(
         airspeed=central_ranges(np.concatenate(used_airspeeds)[:, None])[0] if used_airspeeds else None,
         spread=np.nanstd(rates, axis=0).tolist(),
         correlation=_correlation_matrix(group_commands).tolist(),
-        tied=effect_share_explained_by_others(flights, model).tolist(),
+        tied=effect_share_explained_by_others(flights_with_used_rows, model).tolist(),
         gain_sd=gain_standard_error.tolist(),
-        still_s=_longest_unchanged_time_s_by_column(flights),
+        still_s=_longest_unchanged_time_s_by_column(flights_with_used_rows),
         scale=max_noise_variance_scale,
-        energy_climb=_estimate_unpowered_energy_height_rate_mps(flights),
-        minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights) / 60.0,
+        energy_climb=_estimate_unpowered_energy_height_rate_mps(flights_with_used_rows),
+        minutes=sum(int(is_used.sum()) * samples.dt_s for samples, is_used in flights_with_used_rows) / 60.0,
     )
 
 
-def _estimate_unpowered_energy_height_rate_mps(flights: Sequence[tuple[Samples, Mask]]) -> float | None:
+def _estimate_unpowered_energy_height_rate_mps(
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
+) -> float | None:
     """Return the rate of the energy height in the lowest part of healthy flight, m/s; None if not known."""
     used_energy_height_rates_mps = [
         flight.energy_height_rate_mps[is_used]
-        for flight, is_used in flights
+        for flight, is_used in flights_with_used_rows
         if flight.energy_height_rate_mps is not None
     ]
     energy_height_rates_mps = (
@@ -113,15 +117,17 @@ def _correlation_matrix(values: Floats) -> Floats:
     return np.asarray(centred.T @ centred / np.maximum(np.outer(column_norms, column_norms), MIN_DIVISOR))
 
 
-def _longest_unchanged_time_s_by_column(flights: Sequence[tuple[Samples, Mask]]) -> dict[str, float]:
+def _longest_unchanged_time_s_by_column(
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]],
+) -> dict[str, float]:
     column_names = dict.fromkeys(
-        column_name for samples, _ in flights for column_name in samples.time_since_change_s
+        column_name for samples, _ in flights_with_used_rows for column_name in samples.time_since_change_s
     )
     return {
         column_name: max(
             (
                 float(flight.time_since_change_s[column_name].max(initial=0.0))
-                for flight, _ in flights
+                for flight, _ in flights_with_used_rows
                 if column_name in flight.time_since_change_s
             )
         )
@@ -129,11 +135,13 @@ def _longest_unchanged_time_s_by_column(flights: Sequence[tuple[Samples, Mask]])
     }
 
 
-def effect_share_explained_by_others(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def effect_share_explained_by_others(
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
+) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
     group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    effect_power, unexplained_power = _effect_powers(flights, model)
+    effect_power, unexplained_power = _effect_powers(flights_with_used_rows, model)
     has_moved = effect_power > _MIN_EFFECT_NOISE_POWER_RATIO
     explained_share = 1.0 - unexplained_power / np.minimum(
         np.where(has_moved, effect_power, 1.0), _EFFECT_NOISE_POWER_RATIO_CAP
@@ -141,13 +149,17 @@ def effect_share_explained_by_others(flights: Sequence[tuple[Samples, Mask]], mo
     return np.where(has_moved, np.maximum(explained_share, 0.0), 1.0)
 
 
-def effect_power_unexplained_by_others(flights: Sequence[tuple[Samples, Mask]], model: Model) -> Floats:
+def effect_power_unexplained_by_others(
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
+) -> Floats:
     """Power of each group's effect on the rates that nothing else makes up, in variances of the noise a
     sample, (G,)."""
-    return _effect_powers(flights, model)[1]
+    return _effect_powers(flights_with_used_rows, model)[1]
 
 
-def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tuple[Floats, Floats]:
+def _effect_powers(
+    flights_with_used_rows: Sequence[tuple[Samples, Mask]], model: Model
+) -> tuple[Floats, Floats]:
     """Power of each group's effect on the rates, in variances of the noise a sample, (G,), and of what past,
     signals and the other groups do not make up of it, (G,)."""
     surface_groups = regression.surface_indices_by_group(model)
@@ -158,11 +170,14 @@ def _effect_powers(flights: Sequence[tuple[Samples, Mask]], model: Model) -> tup
         model.vehicle.n_signal_lags(model.n_rate_lags),
     )
     regressors_by_flight = [
-        regression.build_regressors(flight, surface_groups, *regressor_arguments) for flight, _ in flights
+        regression.build_regressors(flight, surface_groups, *regressor_arguments)
+        for flight, _ in flights_with_used_rows
     ]
     is_row_used_by_flight = [
         is_used & is_predictable
-        for (_, is_used), (_, _, is_predictable) in zip(flights, regressors_by_flight, strict=True)
+        for (_, is_used), (_, _, is_predictable) in zip(
+            flights_with_used_rows, regressors_by_flight, strict=True
+        )
     ]
     past_regressors = np.vstack(
         [

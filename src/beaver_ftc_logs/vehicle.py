@@ -310,9 +310,9 @@ class Vehicle(Section):
         ]
         if self.attitude is not None:
             quantities.append((("attitude", "roll"), ANGLE, self.attitude.roll))
-            for angle in ("pitch", "yaw"):
-                if (angle_column := getattr(self.attitude, angle)) is not None:
-                    quantities.append((("attitude", angle), ANGLE, angle_column))
+            for angle_name in ("pitch", "yaw"):
+                if (angle_column := getattr(self.attitude, angle_name)) is not None:
+                    quantities.append((("attitude", angle_name), ANGLE, angle_column))
         if self.acceleration is not None:
             quantities.append((("acceleration",), ACCELERATION, self.acceleration))
         if self.airspeed is not None:

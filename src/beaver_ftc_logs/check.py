@@ -68,7 +68,7 @@ _MAX_PROPOSED_COMMANDS, _MAX_READ_COLUMNS = 8, 60
 _PLAUSIBLE_LOG_RATE_RANGE_HZ = (4.0, 2000.0)
 
 
-def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
+def check_log(path: Path, vehicle: Vehicle | None, reader_name: str | None) -> Document:
     """Return a description of a log in `lines`, and a `vehicle` for it: the one given, or a guess.
 
     usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
@@ -76,12 +76,13 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
     remarks: list[str] = []
     guessed_vehicle: Document | None = None
     if vehicle is None:
-        guessed_vehicle = _guess_vehicle(path, reader, remarks)
+        guessed_vehicle = _guess_vehicle(path, reader_name, remarks)
         if guessed_vehicle is None:
             return {"log": str(path), "usable": False, "lines": remarks, "vehicle": None}
         vehicle = Vehicle.model_validate(guessed_vehicle)
     usable_and_lines_by_part = [
-        _check_recording(recording, vehicle) for recording in read_parts_for_vehicle(path, vehicle, reader)
+        _check_recording(recording, vehicle)
+        for recording in read_parts_for_vehicle(path, vehicle, reader_name)
     ]
     for part_number, (_, part_lines) in enumerate(usable_and_lines_by_part, 1):
         remarks += (
@@ -185,10 +186,10 @@ def _column_in_si(columns: Any, quantity_column: Any) -> Column:
     return replace(column, values=quantity_column.to_si(column.values))
 
 
-def _guess_vehicle(path: Path, reader: str | None, remarks: list[str]) -> Document | None:
+def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> Document | None:
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
-    reader_name = reader or detect_reader(path)
+    reader_name = reader_name or detect_reader(path)
     time_column_and_unit = _find_time_column_and_unit(path, remarks) if reader_name == "table" else None
     recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column_and_unit, recognized_columns))

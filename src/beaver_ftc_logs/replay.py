@@ -34,7 +34,7 @@ def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
 
     scenario = load_scenario(path.with_name("scenario.yaml"))
     aircraft = scenario.airframe
-    input_column_names = [*stepped.log_input_columns(aircraft), ["altitude_m"]]
+    input_column_names = [*stepped.log_input_column_names(aircraft), ["altitude_m"]]
     log_columns = _read_columns(path, ["t_s", *chain.from_iterable(input_column_names)])
     diagnosis = Diagnosis(aircraft, scenario.rate_hz, **stepped.declared_errors(scenario))
     input_arrays = [np.column_stack([log_columns[name] for name in names]) for names in input_column_names]
@@ -96,7 +96,7 @@ def _replay_verdict(
         "rows_that_differ": sum(
             bool(logged_flag) != row_verdict.detected for logged_flag, row_verdict in logged_and_replayed
         ),
-        "left_out": _unreplayed_inputs(scenario),
+        "left_out": _unreplayed_input_texts(scenario),
     }
     return verdict | {"as_flown": _is_as_flown(path, verdict)}
 
@@ -110,7 +110,7 @@ def _last_isolation_start_and_name(t_s: Floats, verdicts: list[Any]) -> tuple[fl
     return named_since_s, name
 
 
-def _unreplayed_inputs(scenario: Any) -> list[str]:
+def _unreplayed_input_texts(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal_sensors = type(scenario.sensors)()
     sensors_with_declared_errors = [

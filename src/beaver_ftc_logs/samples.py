@@ -95,7 +95,7 @@ def resample(recording: RecordedFlight, vehicle: Vehicle) -> Samples:
     )
     recording = convert_to_si(recording, vehicle)
     _check_columns(recording, used_column_names, rate_column_names=rate_column_names)
-    _check_rates_fit_attitude(recording, vehicle)
+    _check_rates_attitude_and_gravity(recording, vehicle)
     log_stamps_s = recording.columns[rate_column_names[0]].t_s
     t_s, stretch_number, step_s = _time_base(recording.name, log_stamps_s, vehicle.max_sample_rate_hz)
     values_and_mean_age_by_column = {
@@ -229,7 +229,7 @@ def _used_column_defect_texts(
 def _time_since_change_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
-    column = _finite_rows(column)
+    column = _column_of_finite_rows(column)
     return np.nan_to_num(
         _latest_values(t_s, column.t_s, signals.time_since_change_s(column)) + _held_age_s(column, t_s)
     )
@@ -237,7 +237,7 @@ def _time_since_change_s(column: Column, t_s: Floats) -> Floats:
 
 def _is_stale(column: Column, t_s: Floats, step_s: float) -> NDArray[np.bool_]:
     """Whether at each sample a gap has opened since the last number of a column."""
-    column = _finite_rows(column)
+    column = _column_of_finite_rows(column)
     usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
 
@@ -278,7 +278,7 @@ def _sampled_energy_height_rate_mps(
     return energy.compute_energy_height_rate_mps(t_s, altitude, airspeed, stretch_number)
 
 
-def _check_rates_fit_attitude(recording: RecordedFlight, vehicle: Vehicle) -> None:
+def _check_rates_attitude_and_gravity(recording: RecordedFlight, vehicle: Vehicle) -> None:
     """Raise BadInput where rates, roll and gravity contradict one another: what is in another unit."""
     columns, attitude, mistake = recording.columns, vehicle.attitude, None
     rate_by_column_name = {(name := getattr(vehicle.rates, axis).column): columns[name] for axis in "pqr"}
@@ -443,13 +443,13 @@ def values_and_mean_age_at(column: Column, t_s: Floats, step_s: float) -> tuple[
 
 def _held_values(column: Column, t_s: Floats) -> tuple[Floats, float]:
     """The last value up to each time, nan before the first; and its mean age, s."""
-    column = _finite_rows(column)
+    column = _column_of_finite_rows(column)
     age_s = _held_age_s(column, t_s)
     age_s = age_s[np.isfinite(age_s)]
     return _latest_values(t_s, column.t_s, column.values), float(age_s.mean()) if age_s.size else float("nan")
 
 
-def _finite_rows(column: Column) -> Column:
+def _column_of_finite_rows(column: Column) -> Column:
     """The rows of a column that have a number."""
     is_number = np.isfinite(column.values)
     return replace(column, t_s=column.t_s[is_number], values=column.values[is_number])
@@ -468,7 +468,7 @@ def _latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 
 def _averaged_values(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float]:
     """The mean over the interval that ends at each time, and half that interval: the delay it adds, s."""
-    column = _finite_rows(column)
+    column = _column_of_finite_rows(column)
     stamps, cumulated_values = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
     stamp_tolerance_s = 1e-6 * step_s  # of stamps that are meant to fall on the edge
     interval_end_rows = np.searchsorted(stamps, t_s + stamp_tolerance_s, side="right")

@@ -45,7 +45,7 @@ def declared_errors(scenario: Any) -> dict[str, Any]:
     return {key: scenario_values[key] for key in _ERROR_DECLARING_SCENARIO_KEYS if key in scenario_values}
 
 
-def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
+def log_input_column_names(aircraft: Any) -> tuple[list[str], ...]:
     """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
     attitude."""
     return (
@@ -57,7 +57,7 @@ def log_input_columns(aircraft: Any) -> tuple[list[str], ...]:
 
 
 def replay_samples(diagnosis: Diagnosis, inputs: Sequence[Floats], rate_hz: float) -> ReplayedVerdicts:
-    """The verdicts of evenly spaced samples; inputs: as `log_input_columns`, (n, ...) each."""
+    """The verdicts of evenly spaced samples; inputs: as `log_input_column_names`, (n, ...) each."""
     verdicts: list[Verdict] = []
     innovation, innovation_bound = np.empty_like(inputs[0]), np.empty_like(inputs[0])
     expected_effect = np.empty((*innovation.shape, inputs[2].shape[1]))

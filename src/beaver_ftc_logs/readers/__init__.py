@@ -23,40 +23,42 @@ _TIME_COLUMNS = {"alfa": ("%time", "ns"), "ulog": ("timestamp", "us"), "ardupilo
 
 def read_flight(
     path: Path,
-    reader: str | None = None,
+    reader_name: str | None = None,
     time_column_and_unit: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
-    reader: one of READERS; by the path's own form where None. time_column_and_unit: of a table. columns:
+    reader_name: one of READERS; by the path's own form where None. time_column_and_unit: of a table. columns:
     those that a log is read for, all where None. Raises BadInput with one line: why the log cannot be used.
     """
     return next(
-        _read_with_reader(path, reader, time_column_and_unit, {"columns": columns, "rows_per_part": None})
+        _read_with_reader(
+            path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": None}
+        )
     )
 
 
 def read_parts(
     path: Path,
-    reader: str | None = None,
+    reader_name: str | None = None,
     time_column_and_unit: tuple[str, str] | None = None,
     columns: Collection[str] | None = None,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""
     return _read_with_reader(
-        path, reader, time_column_and_unit, {"columns": columns, "rows_per_part": ROWS_PER_PART}
+        path, reader_name, time_column_and_unit, {"columns": columns, "rows_per_part": ROWS_PER_PART}
     )
 
 
 def _read_with_reader(
     path: Path,
-    reader: str | None,
+    reader_name: str | None,
     time_column_and_unit: tuple[str, str] | None,
     reading_options: dict[str, Any],
 ) -> Iterator[RecordedFlight]:
     check_exists(path)
-    reader_name = reader or detect_reader(path)
+    reader_name = reader_name or detect_reader(path)
     if reader_name not in READERS:
         raise BadInput(f"--reader {reader_name}: is not known, allowed: {', '.join(READERS)}")
     module = import_module(f"beaver_ftc_logs.readers.{reader_name}")

@@ -171,7 +171,7 @@ def test_a_replay_that_finds_nothing(tmp_path):
 def test_errors_of_the_flow_sensors_are_left_out():
     """Those of the gyros are in the measured rates."""
     flawed = scenario(alpha={"bias_deg": 0.1}, q={"bias_deg_s": 0.1})
-    assert of._unreplayed_inputs(flawed) == ["the declared errors of alpha: the log has the true value"]
+    assert of._unreplayed_input_texts(flawed) == ["the declared errors of alpha: the log has the true value"]
 
 
 FOUND = {
@@ -209,7 +209,7 @@ def test_columns_that_a_log_must_have(tmp_path):
     with pytest.raises(BadInput, match=r"no column c, allowed: a log\.parquet as `run` writes it"):
         of._read_columns(path, ["t_s", "c"])
     aircraft = SimpleNamespace(signals=["dpt"], surfaces=SURFACES)
-    assert stepped.log_input_columns(aircraft) == (
+    assert stepped.log_input_column_names(aircraft) == (
         ["p_measured_rad_s", "q_measured_rad_s", "r_measured_rad_s"],
         ["alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt"],
         [f"{name}_cmd_rad" for name in SURFACES],

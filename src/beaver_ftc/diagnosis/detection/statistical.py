@@ -916,16 +916,16 @@ def excludes_loss(
 @kernel
 def estimate_loss(blocks, surface_index):
     """Estimate of theta, in [-1, 0], of a loss of effectiveness of a surface, and one over its variance."""
-    theta, information = 0.0, 0.0
+    theta_estimate, theta_information = 0.0, 0.0
     for block in blocks:
         for hypothesis in block.hypothesis[: block.n_hypotheses]:
             if (
                 hypothesis.kind == LOSS
                 and hypothesis.surface == surface_index
-                and hypothesis.theta_information > information
+                and hypothesis.theta_information > theta_information
             ):
-                theta, information = hypothesis.theta_estimate, hypothesis.theta_information
-    return theta, information
+                theta_estimate, theta_information = hypothesis.theta_estimate, hypothesis.theta_information
+    return theta_estimate, theta_information
 
 
 @kernel

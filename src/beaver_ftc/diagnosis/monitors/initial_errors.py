@@ -177,7 +177,7 @@ def index_of_test_showing_error_change(hypothesis_index):
 
 
 @kernel
-def update_error_change_bounds(redundancy, initial_errors):
+def update_change_bounds_and_widen_error_bounds(redundancy, initial_errors):
     """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
     part of it that this filter forgets in a sample."""
     share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
@@ -601,7 +601,7 @@ def update_initial_error_bounds(redundancy, initial_errors, readings):
     if max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD:  # the tests of the attitude restart
         initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
-    update_error_change_bounds(redundancy, initial_errors)
+    update_change_bounds_and_widen_error_bounds(redundancy, initial_errors)
     fill_effects_per_unit_error(redundancy, initial_errors, readings)
     filter_effects_per_unit_error(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)

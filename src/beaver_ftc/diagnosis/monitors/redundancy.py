@@ -355,7 +355,7 @@ MIN_READING_SHARE_LEFT_BY_ERROR = 0.01
 READING_ROUNDING_SHARE = 1e-10  # of a reading: the part of each bound that covers rounding
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
-INTEGRATION_WEIGHT, SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT = 1.5, 0.5
+ADAMS_BASHFORTH_WEIGHT, ADAMS_BASHFORTH_SUBTRACTED_WEIGHT = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
 POSITION_INTEGRATION_ERROR_FACTOR = 4.0 / 3.0
@@ -506,8 +506,8 @@ def predict_readings(redundancy):
     memory.previous_acceleration_magnitude = vector_length(memory.previous_body_acceleration)
     for i in range(3):
         scratch_vector[i] = (
-            INTEGRATION_WEIGHT * memory.body_acceleration[i]
-            - SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * memory.previous_body_acceleration[i]
+            ADAMS_BASHFORTH_WEIGHT * memory.body_acceleration[i]
+            - ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * memory.previous_body_acceleration[i]
         )
     memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
@@ -557,8 +557,8 @@ def extrapolated_error_bound(redundancy, sensor):
     """Bound the error of 3/2 a - 1/2 a_before by the errors of the reading of a sensor in the two samples. A
     constant error counts once."""
     return (
-        INTEGRATION_WEIGHT * redundancy.memory.previous_error_bound[sensor]
-        + SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
+        ADAMS_BASHFORTH_WEIGHT * redundancy.memory.previous_error_bound[sensor]
+        + ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
         - redundancy.config.constant_error_bound[sensor]
     )
 
@@ -583,9 +583,7 @@ def acceleration_error_bound(redundancy, max_turn_rate, gyro_error_bound_sum):
         constant_acceleration_error_bound += config.constant_error_bound[i]
     axis_turning_error_bound = config.sample_time_s * (
         max_turn_rate * constant_acceleration_error_bound
-        + SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT
-        * gyro_error_bound_sum
-        * memory.previous_acceleration_magnitude
+        + ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * gyro_error_bound_sum * memory.previous_acceleration_magnitude
     )
     return (
         EARTH_ACCELERATION_BOUND_M_S2
@@ -895,9 +893,7 @@ def start_redundancy_tests(redundancy, readings, specific_force):
     memory.acceleration_magnitude = memory.earlier_acceleration_magnitudes[0] = (
         vector_length(memory.body_acceleration) + MIN_FAULTY_FORCE_JUMP_M_S2
     )
-    memory.first_acceleration_error_bound = (
-        SUBTRACTED_PREVIOUS_INTEGRATION_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
-    )
+    memory.first_acceleration_error_bound = ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * MIN_FAULTY_FORCE_JUMP_M_S2
     bound_residuals(redundancy, readings)
     for test_index in range(RPM_TEST):
         restart_test(redundancy.test[test_index])

@@ -61,6 +61,7 @@ from beaver_ftc.diagnosis.monitors.initial_errors import (
     update_initial_error_bounds,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import (
+    ADAMS_BASHFORTH_WEIGHT,
     AIRSPEED,
     AIRSPEED_HYPOTHESIS,
     ALPHA,
@@ -80,7 +81,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_ERROR_CONFIRMED,
     GYRO_ERROR_REFUTED,
     GYRO_ERROR_UNDECIDED,
-    INTEGRATION_WEIGHT,
     MANIFOLD_PRESSURE_TEST,
     MIN_AIRSPEED_MPS,
     MIN_FAULTY_FORCE_JUMP_M_S2,
@@ -226,7 +226,7 @@ def flow_reading_jumped(monitor, readings):
     )
     min_reading_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
     max_accelerometer_effect = (
-        INTEGRATION_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_acceleration_error
+        ADAMS_BASHFORTH_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_acceleration_error
     )
     return (
         abs(alarm_test.residual)
@@ -986,12 +986,13 @@ def axis_of_largest_turn_residual(monitor, default_axis):
 
 
 @kernel
-def allows_surface_isolation(monitor, alarm_is_from_earlier_frame):
-    """Whether a surface may be isolated; alarm_is_from_earlier_frame: the alarm was a frame or more ago."""
+def allows_surface_isolation(monitor, surface_alarm_is_from_earlier_frame):
+    """Whether a surface may be isolated; surface_alarm_is_from_earlier_frame: the alarm was a frame or more
+    ago."""
     if not monitor.config.enabled:
         return True
     return (
-        alarm_is_from_earlier_frame == 1
+        surface_alarm_is_from_earlier_frame == 1
         and (monitor.memory.gyros_excluded == 1 or not monitor.config.attitude_is_noisy)
         and not flow_sensor_is_frozen(monitor)
     )

@@ -168,8 +168,8 @@ def _effectiveness_levels_and_prior_shares(model: Model, group_index: int) -> tu
 def _rate_offset_variance_per_fault_kind(model: Model, group_index: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
-    summed_response_in_residual_sd = np.abs(command_response[group_index]).sum(axis=0) / np.sqrt(
+    _, _, response_coefficients, residual_covariance = model.intercept_past_response_noise()
+    summed_response_in_residual_sd = np.abs(response_coefficients[group_index]).sum(axis=0) / np.sqrt(
         np.diag(residual_covariance)
     )
     relative_axis_response = np.clip(
@@ -233,9 +233,9 @@ class TrimAndGainStateModel(NamedTuple):
 def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     """The prior and the limits of trim and gains, from a model's settings."""
     settings, n_groups = model.settings, len(model.groups)
-    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
+    _, _, response_coefficients, residual_covariance = model.intercept_past_response_noise()
     residual_variance = np.diag(residual_covariance)
-    trim_shift_sd_by_group = command_response.sum(axis=1) * settings.trim_command_shift_sd
+    trim_shift_sd_by_group = response_coefficients.sum(axis=1) * settings.trim_command_shift_sd
     initial_covariance = np.zeros((4 + n_groups, 4 + n_groups))
     initial_covariance[:3, :3] = (
         np.diag(residual_variance * settings.trim_sd**2) + trim_shift_sd_by_group.T @ trim_shift_sd_by_group

@@ -38,7 +38,8 @@ def logs_with_one_mistake_corrected(
     """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit.
     surfaces_of_unknown_effect: surfaces whose effect the model does not know: that shows nothing of their
     commands."""
-    surfaces, rate_columns = list(vehicle.surfaces), [getattr(vehicle.rates, axis).column for axis in "pqr"]
+    surfaces = list(vehicle.surfaces)
+    rate_column_names = [getattr(vehicle.rates, axis).column for axis in "pqr"]
     for first_surface_index, second_surface_index in combinations(
         [i for i, name in enumerate(surfaces) if name not in surfaces_of_unknown_effect], 2
     ):
@@ -52,18 +53,18 @@ def logs_with_one_mistake_corrected(
             f"the commands of {surfaces[first_surface_index]} and {surfaces[second_surface_index]} exchanged",
             exchanged_samples,
         )
-    for first_rate_column, second_rate_column in combinations(rate_columns, 2):
+    for first_rate_name, second_rate_name in combinations(rate_column_names, 2):
         exchanged_samples = _with_exchanged_or_scaled_columns(
             samples,
             vehicle,
-            {first_rate_column: second_rate_column, second_rate_column: first_rate_column},
+            {first_rate_name: second_rate_name, second_rate_name: first_rate_name},
             {},
         )
-        yield CorrectedLog(f"{first_rate_column} and {second_rate_column} exchanged", exchanged_samples)
-    for name in [*rate_columns, *vehicle.signal_columns]:
+        yield CorrectedLog(f"{first_rate_name} and {second_rate_name} exchanged", exchanged_samples)
+    for name in [*rate_column_names, *vehicle.signal_columns]:
         for factor in (-1.0, *_UNIT_SIZE_RATIOS, *(1.0 / unit_ratio for unit_ratio in _UNIT_SIZE_RATIOS)):
             scaled_samples = _with_exchanged_or_scaled_columns(samples, vehicle, {}, {name: factor})
-            log_jacobian = float(np.log(abs(factor))) if name in rate_columns else 0.0
+            log_jacobian = float(np.log(abs(factor))) if name in rate_column_names else 0.0
             yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled_samples, log_jacobian)
 
 

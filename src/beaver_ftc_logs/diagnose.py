@@ -207,9 +207,9 @@ def _withdraw_contradicted_isolation(
     since gusts have directions too.
     """
     residual = standardized_healthy_residual(model, *unexplained_rates_and_responses(samples, model))
-    _, _, command_response, residual_covariance = model.intercept_past_response_noise()
+    _, _, response_coefficients, residual_covariance = model.intercept_past_response_noise()
     response_directions = np.linalg.solve(
-        np.linalg.cholesky(residual_covariance), command_response.sum(axis=1).T
+        np.linalg.cholesky(residual_covariance), response_coefficients.sum(axis=1).T
     )
     direction_norms = np.linalg.norm(response_directions, axis=0)
     squared_projections = (residual @ (response_directions / np.maximum(direction_norms, MIN_DIVISOR))) ** 2

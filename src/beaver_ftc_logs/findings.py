@@ -72,14 +72,19 @@ def _join_brief_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list
     after it, and alike neighbours made one."""
     joined_runs: list[tuple[int, int]] = []
     for begin, end in runs:
-        last_run = joined_runs[-1] if joined_runs else (begin, begin)
-        continues_event = (
+        previous_run = joined_runs[-1] if joined_runs else (begin, begin)
+        may_join_previous_run = (
             _is_brief(rows, begin, end)
-            or _is_brief_and_unnamed(rows, *last_run)
-            or _have_same_verdict(rows, last_run[0], begin)
+            or _is_brief_and_unnamed(rows, *previous_run)
+            or _have_same_verdict(rows, previous_run[0], begin)
         )
-        if last_run[0] < begin and rows.faulty[last_run[0]] and rows.faulty[begin] and continues_event:
-            joined_runs[-1] = (last_run[0], end)
+        if (
+            previous_run[0] < begin
+            and rows.faulty[previous_run[0]]
+            and rows.faulty[begin]
+            and may_join_previous_run
+        ):
+            joined_runs[-1] = (previous_run[0], end)
         else:
             joined_runs.append((begin, end))
     return joined_runs

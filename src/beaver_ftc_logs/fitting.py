@@ -1069,7 +1069,7 @@ def gain_standard_error_by_column(
     return gain_standard_error_of_column
 
 
-def explained_variance_by_fold(
+def prediction_quality_by_fold(
     usable_flights: Sequence[FlightWithUsableRows], model: Model
 ) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""

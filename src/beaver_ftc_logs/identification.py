@@ -48,7 +48,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     _check_command_units_alike(flights, vehicle)
     usable_flights = fitting.flights_with_usable_rows(whiten_flights(flights, vehicle))
     model = fitting.fit_model(usable_flights, vehicle)
-    check_explained_variance(fitting.explained_variance_by_fold(usable_flights, model), usable_flights, model)
+    check_explained_variance(fitting.prediction_quality_by_fold(usable_flights, model), usable_flights, model)
     model = add_unseen_noise_models(
         fitting.add_fitted_ranges_and_alarm_threshold(usable_flights, model), flights
     )
@@ -81,13 +81,13 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
     noise_models = list(model.noise_models)
     for ma_coefficients in ADDED_NOISE_MA_COEFFICIENTS:
         if ma_coefficients not in known_ma_coefficients:
-            whitened_flights = fitting.flights_with_usable_rows(
+            usable_whitened_flights = fitting.flights_with_usable_rows(
                 [whiten_samples(flight, ma_coefficients) for flight in flights]
             )
             residuals = np.vstack(
                 [
-                    fitting.one_step_residuals(model, whitened_flight)[1]
-                    for whitened_flight in whitened_flights
+                    fitting.one_step_residuals(model, usable_flight)[1]
+                    for usable_flight in usable_whitened_flights
                 ]
             )
             noise_models.append(

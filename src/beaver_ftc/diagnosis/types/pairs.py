@@ -278,12 +278,14 @@ def alternative_types_would_have_shown(config, surface):
     may_be_command_independent_type = verdict.can_be_another_type(
         surface, verdict.sole_remaining_constant_parameter_type(surface), False
     )
-    type_is_undecided = may_be_command_independent_type or verdict.remaining_type_can_hide_at_rest(
+    another_type_is_possible = may_be_command_independent_type or verdict.remaining_type_can_hide_at_rest(
         config, surface
     )
     anomaly_spans_half_cycle = surface.evidence.n_anomalous_frames >= config.slowest_half_cycle_frames
     return (
-        anomaly_spans_half_cycle and verdict.types_would_have_shown(config, surface) and not type_is_undecided
+        anomaly_spans_half_cycle
+        and verdict.types_would_have_shown(config, surface)
+        and not another_type_is_possible
     )
 
 

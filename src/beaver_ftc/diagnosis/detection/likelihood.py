@@ -697,13 +697,15 @@ def normalised_evidence(
 
 
 @kernel
-def evaluate_onset_tests(block, onset_tests, n_tests, llr_bounds_ignore_uncertainty, has_error_map):
+def evaluate_onset_tests(
+    block, onset_tests, n_tests, llr_bounds_ignore_uncertainty, non_loss_llr_bounds_include_uncertainty
+):
     """Fill the score and the log-likelihood ratios of n onset tests; those of a test without information are
     0.
 
     llr_bounds_ignore_uncertainty: the bounds on the ratios leave out the bounded uncertainty.
-    has_error_map: the model's error is mapped; it is then large and lasting, so the bounds on
-    hypotheses other than a loss always include it.
+    non_loss_llr_bounds_include_uncertainty: the bounds on hypotheses other than a loss always include it,
+    because the model's error is mapped: it is then large and lasting.
     """
     supporting_correlation_sign = onset_tests.supporting_correlation_sign
     transient_response_sum_bound_0 = block.transient_response_sum_bound[0]
@@ -726,7 +728,7 @@ def evaluate_onset_tests(block, onset_tests, n_tests, llr_bounds_ignore_uncertai
         )
         evidence_error_bound = evidence_by_errors_and_air + (
             max_evidence_by_uncertainty
-            if has_error_map and not is_loss_or_its_end
+            if non_loss_llr_bounds_include_uncertainty and not is_loss_or_its_end
             else uncertainty_weight_in_llr_bounds * max_evidence_by_uncertainty
         )
         score = normalised_evidence(
@@ -746,11 +748,13 @@ def evaluate_onset_tests(block, onset_tests, n_tests, llr_bounds_ignore_uncertai
 
 
 @kernel
-def evaluate_hypotheses(block, upper_bound_decay_factor_per_frame=0.0, has_error_map=False):
+def evaluate_hypotheses(
+    block, upper_bound_decay_factor_per_frame=0.0, non_loss_llr_bounds_include_uncertainty=False
+):
     """Fill the score, the estimate and the bounds on the log-likelihood ratio of each hypothesis.
 
     upper_bound_decay_factor_per_frame: if a loss may end, the factor by which earlier upper bounds decay;
-    else 0. has_error_map: see `evaluate_onset_tests`.
+    else 0. non_loss_llr_bounds_include_uncertainty: see `evaluate_onset_tests`.
     """
     for group_index in range(n_test_groups(block)):
         evaluate_onset_tests(
@@ -758,7 +762,7 @@ def evaluate_hypotheses(block, upper_bound_decay_factor_per_frame=0.0, has_error
             block.onset_tests[group_index],
             n_onset_tests_in_group(block, group_index),
             upper_bound_decay_factor_per_frame > 0.0,
-            has_error_map,
+            non_loss_llr_bounds_include_uncertainty,
         )
     for h, hypothesis in enumerate(block.hypothesis[: block.n_hypotheses]):
         onset_tests = block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP]
@@ -790,14 +794,14 @@ def update_block(
     dt,
     evidence_decay_factor,
     upper_bound_decay_factor_per_frame=0.0,
-    has_error_map=False,
+    non_loss_llr_bounds_include_uncertainty=False,
 ):
     """Update a block with one frame of the innovation: whiten it and test every hypothesis; dt s.
 
     The innovation, rad/s2, is in `frame_innovation`. Noise, drift, signatures and, if `uses_regressors`,
     regressors are those of the frame. uncertainty_bound: see `fill_uncertainty_response_bounds`;
     evidence_decay_factor: `accumulate_evidence`; upper_bound_decay_factor_per_frame,
-    has_error_map: `evaluate_hypotheses`.
+    non_loss_llr_bounds_include_uncertainty: `evaluate_hypotheses`.
     """
     advance_covariance(block, dt)
     if block.alarm_level > 0.0:
@@ -812,7 +816,7 @@ def update_block(
     if uses_regressors:
         whiten_regressors(block, dt)
     accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor)
-    evaluate_hypotheses(block, upper_bound_decay_factor_per_frame, has_error_map)
+    evaluate_hypotheses(block, upper_bound_decay_factor_per_frame, non_loss_llr_bounds_include_uncertainty)
 
 
 @kernel

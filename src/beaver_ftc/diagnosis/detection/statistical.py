@@ -213,7 +213,9 @@ def configure_statistical_detector(
         statistical_settings, aircraft, dt_s
     )
     test_config["enabled"], test_config["frame_share_per_instant"] = 1, 1.0 / max(n_instants_per_frame, 1)
-    test_config["has_error_map"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    test_config["non_loss_llr_bounds_include_uncertainty"] = (
+        aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    )
     statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust_estimate(gust, declared, mass_properties)
@@ -601,7 +603,7 @@ TEST_CONFIG_RECORD = record(
     n_score_columns=int,
     uses_regressors=int,  # whether unknown constants have tolerances
     frame_share_per_instant=float,  # one over the number of instants in a frame
-    has_error_map=int,  # whether the model's error is mapped
+    non_loss_llr_bounds_include_uncertainty=int,  # if the error is mapped and no surface can be lost
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
@@ -683,7 +685,7 @@ def update_blocks(
             dt,
             evidence_decay_factor,
             upper_bound_decay_factor_per_frame,
-            test_config.has_error_map,
+            test_config.non_loss_llr_bounds_include_uncertainty,
         )
 
 

@@ -24,12 +24,12 @@ class GustStates:
     """
 
     def __init__(self, context: Context) -> None:
-        declared, dt = context.declared, context.dt_s
-        self.n_states = 3 if declared.air else 0
-        self.decay_factor = np.exp(-dt / declared.gust_time_s[: self.n_states])
-        self.initial_variance = declared.gust_rad_s[: self.n_states] ** 2
+        declared_uncertainty, dt = context.declared, context.dt_s
+        self.n_states = 3 if declared_uncertainty.air else 0
+        self.decay_factor = np.exp(-dt / declared_uncertainty.gust_time_s[: self.n_states])
+        self.initial_variance = declared_uncertainty.gust_rad_s[: self.n_states] ** 2
         self.process_noise_variance = (1.0 - self.decay_factor**2) * self.initial_variance
-        self.rate_effect = dt * declared.gust_effect[:, : self.n_states]
+        self.rate_effect = dt * declared_uncertainty.gust_effect[:, : self.n_states]
 
 
 def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.ndarray:
@@ -38,8 +38,12 @@ def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.n
     The declared bound, eta_bar, as long as it is the published one; with more declared that bound is the sum
     of all worst cases, instruments and air included, which have states or a variance of their own here.
     """
-    declared = context.declared
-    return np.hypot(context.constant_rad_s2, declared.model_rad_s2) if declared.errors else eta_bar
+    declared_uncertainty = context.declared
+    return (
+        np.hypot(context.constant_rad_s2, declared_uncertainty.model_rad_s2)
+        if declared_uncertainty.errors
+        else eta_bar
+    )
 
 
 def update_state(

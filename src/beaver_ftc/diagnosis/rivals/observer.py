@@ -62,20 +62,22 @@ class SurfaceFit:
 
 def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
-    declared, dt = context.declared, context.dt_s
+    declared_uncertainty, dt = context.declared, context.dt_s
     residual_std_by_model_error = (
-        np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared.model_rad_s2) * dt / (1.0 - decay_factor)
+        np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared_uncertainty.model_rad_s2)
+        * dt
+        / (1.0 - decay_factor)
     )
-    gust_correlation = np.exp(-dt / np.maximum(declared.turbulence_time_s, dt))
+    gust_correlation = np.exp(-dt / np.maximum(declared_uncertainty.turbulence_time_s, dt))
     residual_std_by_gust = (
         dt
-        * declared.turbulence_rad_s2
+        * declared_uncertainty.turbulence_rad_s2
         * np.sqrt(
             (1.0 + decay_factor * gust_correlation)
             / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * gust_correlation))
         )
     )
-    residual_std_by_gyro = declared.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
+    residual_std_by_gyro = declared_uncertainty.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
     return np.sqrt(residual_std_by_model_error**2 + residual_std_by_gust**2 + residual_std_by_gyro**2)
 
 

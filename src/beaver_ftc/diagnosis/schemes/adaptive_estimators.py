@@ -377,9 +377,9 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     fill_block_signatures(
         blocks, frame_means.Gu_with_previous_G, unanticipated_pitch(prediction.design, y, 1.0)
     )
-    is_alarm_latched, loss_can_end = statistical_detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
+    is_alarm_latched, may_loss_end = statistical_detector.alarm.detected_at_s >= 0.0, not fdi.config.abrupt
     statistical.update_blocks(
-        test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, loss_can_end
+        test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, may_loss_end
     )
     parity.update_view_directions_and_signatures(
         parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
@@ -508,14 +508,14 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
         update_statistical_tests(fdi, prediction, measured, k, t)
     update_isolation_estimators(fdi, prediction)
     record_commands_in_variant(fdi.config.isolation_variant, fdi, prediction)
-    network_leaks = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
+    do_weights_leak = conclusion_record.isolated_estimator >= 0 or conclusion_record.accommodated_surface >= 0
     filters.advance_fdae(
         fdi.fdae,
         bound_record,
         prediction.x_before,
         prediction.acceleration_with_known_faults,
         conclusion_record.detected,
-        network_leaks,
+        do_weights_leak,
         dt,
     )
 

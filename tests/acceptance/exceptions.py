@@ -203,14 +203,15 @@ TABLE = (
         r"\1 --no-report",
     ),
     Exempt(
-        r"(beaver-ftc run (?!elevator-partial-loss$)(?:[\w./-]+|scenarios/\*\.yaml|\S+ --(?:csv|acmi))"
+        r"(beaver-ftc run (?!elevator-partial-loss$)"
+        r"(?:[\w./-]+(?: \w[\w./-]+)?|scenarios/\*\.yaml|\S+ --(?:csv|acmi|certificate))"
         r"(?: --junit \S+)?(?: --plugin \S+)?)",
         "seconds of figures: test_scenarios.py draws them, and the same command with elevator-partial-loss",
         r"\1 --no-report",
     ),
     Exempt(
-        r"(beaver-ftc mismatch \S+ (?:--variant \S+,\S+|--map))",
-        "half a minute with figures, which the same command without the option draws",
+        r"(beaver-ftc mismatch (?:fault-free|\S+ (?:--variant \S+,\S+|--map)))",
+        "half a minute with figures, which the command of the other page draws",
         r"\1 --no-report",
     ),
     Exempt(

@@ -202,7 +202,7 @@ IDENTIFY = {
         identification_results={"i": 1}, settings=SimpleNamespace(model_dump=lambda by_alias: {"s": 2})
     ),
     "beaver_ftc_logs__identification__identification_text": "fitted",
-    "beaver_ftc_logs__model__as_text": "text",
+    "beaver_ftc_logs__model__model_file_text": "text",
     "studies__engine__store__write_whole": None,
     "beaver_ftc_logs__pages__render_identification": "page",
     "beaver_ftc_logs__pages__refuse_to_replace_foreign_file": None,

@@ -16,10 +16,13 @@ PYTEST := env -u PYTHONDONTWRITEBYTECODE OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=
 FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(wildcard tests/test_re*.py tests/test_arch*.py)
 
 # Kernels on plain arrays, without a compiler: to compile each by itself takes ten times as long as to try it.
+# With what compiles nothing they take about as long as tests/warm.py, for which all others wait.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
   $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py detection/test_noise_numbers.py test_short_flights.py types/test_types_verdict.py) \
   $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
-  tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py
+  tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py \
+  $(addprefix tests/scenario/test_,dump.py given.py loader.py aircraft_folder.py) \
+  tests/test_architecture.py tests/test_stages.py tests/test_readouts.py $(addprefix tests/tools/test_,reference.py docs_names.py)
 
 .PHONY: demo check test core-test nightly promises plain acceptance cost waits test-fast coverage mutants drawn lint docs docs-check site clean help
 
@@ -88,7 +91,7 @@ nightly: $(VENV)/.dev
 	$(BIN)/python -m tools.drawn
 	$(BIN)/python -m tools.mutants --seed $(SEED)
 
-OF_THE_CORE = $(filter-out tests/products/%,$(PLAIN))
+OF_THE_CORE = $(filter-out tests/products/% tests/tools/%,$(PLAIN))
 
 # The core knows none of the products beside it: its tests pass in a copy that has them not.
 core-test: $(VENV)/.dev

@@ -36,7 +36,7 @@ class Statistical:
     @staticmethod
     def record(record, row):
         tests, blocks, views = record["test_config"], record["block"], views_of(record)
-        statistical.write_scores_to_log_row(tests, blocks, views, record["forces"], record["gust"], row)
+        statistical.write_alarm_scores_to_log_row(tests, blocks, views, record["forces"], record["gust"], row)
 
     @staticmethod
     def filter_innovation_after_known_faults(record, surprise, dt):
@@ -49,7 +49,7 @@ class Statistical:
     @staticmethod
     def drifts(record, fdi, design, x, y):
         noise, blocks, air = record["noise"], record["block"], record["gust"]
-        statistical.fill_drift_and_model_noise(
+        statistical.fill_uncertainty_bound_drift_and_noise(
             noise, blocks, air, fdi["bound"], design, _measured(x, y), fdi["config"]["dt"]
         )
 

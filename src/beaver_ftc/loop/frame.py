@@ -568,7 +568,7 @@ def record_row(frame, commanded, row):
     detector = fdi.statistical
     if logged.tests and detector.test_config.enabled:
         views = detector.views[: detector.n_views]
-        statistical.write_scores_to_log_row(
+        statistical.write_alarm_scores_to_log_row(
             detector.test_config, detector.block, views, detector.forces, detector.gust, row
         )
 

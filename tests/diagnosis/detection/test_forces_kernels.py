@@ -601,7 +601,7 @@ def test_the_alarm_of_a_force_is_the_scores_and_the_logs_and_has_its_time(viewed
     alarm["detected_at_s"], tests["n_score_columns"] = -1.0, 4
     statistical.update_alarm(alarm, tests, chances["block"], views, chances["forces"], chances["gust"], 2.5)
     assert (alarm["score_over_alarm_level"], alarm["axis"], alarm["detected_at_s"]) == (1.5, axis, 2.5)
-    statistical.write_scores_to_log_row(
+    statistical.write_alarm_scores_to_log_row(
         tests, chances["block"], views, chances["forces"], chances["gust"], row
     )
     assert row.tolist() == [7.0, 0.0, *(1.5 if i == axis else 0.0 for i in (ROLL, PITCH, YAW))]

@@ -155,7 +155,7 @@ def _step_fault_hypotheses(axes: tuple[int, ...]) -> Iterator[HypothesisEntry]:
 
 def n_tests_per_frame(aircraft: Aircraft, *parity_directions: ParityDirection) -> int:
     """The number of one-sided tests that the detector makes in a frame, those of these views included."""
-    alarm_hypothesis_kinds = [
+    kind_of_each_alarm_hypothesis = [
         kind
         for _, hypotheses in axes_and_hypotheses_by_block(aircraft)
         for kind, _, _, raises_alarm in hypotheses
@@ -164,14 +164,20 @@ def n_tests_per_frame(aircraft: Aircraft, *parity_directions: ParityDirection) -
     n_tone_tests = 0
     for parity_direction in parity_directions:
         if parity_direction.orthogonal_to_surface >= 0 and any(parity_direction.direction[SIDE_FORCE:]):
-            alarm_hypothesis_kinds += [STEP_FAULT, *(LOSS for _ in parity_direction.surfaces_tested_for_loss)]
+            kind_of_each_alarm_hypothesis += [
+                STEP_FAULT,
+                *(LOSS for _ in parity_direction.surfaces_tested_for_loss),
+            ]
             n_tone_tests += N_TONE_FREQUENCIES
         elif (
             parity_direction.orthogonal_to_surface == AXIS_VIEW
             and not parity_direction.uses_inertial_flow_angle
         ):
             n_tone_tests += N_TONE_FREQUENCIES
-    return N_ONSET_SLOTS * sum(N_TESTED_SIGNS_BY_KIND[kind] for kind in alarm_hypothesis_kinds) + n_tone_tests
+    return (
+        N_ONSET_SLOTS * sum(N_TESTED_SIGNS_BY_KIND[kind] for kind in kind_of_each_alarm_hypothesis)
+        + n_tone_tests
+    )
 
 
 def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
@@ -195,7 +201,7 @@ def configure_statistical_detector(
     fdi: np.void,
     config: FdiConfig,
     declared: Declared,
-    design: np.void,
+    design_model: np.void,
     mass_properties: MassProperties,
     trim: TrimState,
     rate_hz: float,
@@ -205,7 +211,7 @@ def configure_statistical_detector(
     statistical["alarm"]["detected_at_s"] = -1.0
     if statistical_settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    test_config, gust, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
+    test_config, gust_estimate, aircraft = statistical["test_config"], statistical["gust"], declared.aircraft
     sensor_errors, dt_s = declared.sensors, 1.0 / rate_hz
     n_instants_per_frame = int(fdi["config"]["n_substeps"])
     airspeed_mps = float(trim[1][AIRSPEED])
@@ -217,14 +223,16 @@ def configure_statistical_detector(
         aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
     )
     statistical["forces"]["in_use"] = uses_forces = declared.uses_accelerometers
-    gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
-    configure_gust_estimate(gust, declared, mass_properties)
+    gust_estimate["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
+    configure_gust_estimate(gust_estimate, declared, mass_properties)
     uses_parity_views = config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
         aircraft, *(parity_directions_of(aircraft, uses_forces) if uses_parity_views else ())
     )
     test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
-    configure_gust_velocity_and_speed_error(gust, declared, float(test_config["alarm_level"]), airspeed_mps)
+    configure_gust_velocity_and_speed_error(
+        gust_estimate, declared, float(test_config["alarm_level"]), airspeed_mps
+    )
     test_config["isolation_llr_margin"] = derive_isolation_llr_margin(
         statistical_settings.misnaming, rate_hz, aircraft
     )
@@ -238,11 +246,11 @@ def configure_statistical_detector(
         statistical,
         drift_uncertainty_frequency_rad_s(statistical_settings, aircraft),
         declared,
-        design,
+        design_model,
         trim,
         dt_s,
     )
-    term_tolerances = moment_term_tolerances(declared, design, mass_properties, *trim[1:])
+    term_tolerances = moment_term_tolerances(declared, design_model, mass_properties, *trim[1:])
     _configure_regressor_tolerances(statistical, aircraft, term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
@@ -257,13 +265,13 @@ def configure_statistical_detector(
             dt_s,
         )
         if uses_forces:
-            acceleration_slopes_by_air_data = jacobian(design, *trim)[3]
+            acceleration_slopes_by_air_data = jacobian(design_model, *trim)[3]
             configure_forces(fdi, declared, trim, acceleration_slopes_by_air_data, dt_s)
-            gust["output"][
+            gust_estimate["output"][
                 "uses_accelerometers"
             ] = not declared.monitors_sensors  # the monitor may find them broken
-            statistical["inertial_gust"] = gust
-            statistical["inertial_gust"]["output"]["accounts_for_gusts"] *= gust["output"][
+            statistical["inertial_gust"] = gust_estimate
+            statistical["inertial_gust"]["output"]["accounts_for_gusts"] *= gust_estimate["output"][
                 "uses_accelerometers"
             ]
             statistical["inertial_gust"]["memory"]["unmeasured_intensity_share"] = np.minimum(
@@ -272,34 +280,36 @@ def configure_statistical_detector(
         configure_parity_views(statistical, aircraft)
     mean_reverting_block, pitch_block = statistical["block"][-1], statistical["block"][likelihood.PITCH_BLOCK]
     rolling_gust_correlation_length_m = (
-        float(gust["config"]["rolling_gust_correlation_length"])
-        if gust["output"]["accounts_for_gusts"]
+        float(gust_estimate["config"]["rolling_gust_correlation_length"])
+        if gust_estimate["output"]["accounts_for_gusts"]
         else 0.0
     )
     gust_correlation_lengths_m = (
-        rotation_lengths(gust["config"]["wing_span"])
-        if gust["config"]["has_only_coarse_estimate"]
+        rotation_lengths(gust_estimate["config"]["wing_span"])
+        if gust_estimate["config"]["has_only_coarse_estimate"]
         else [rolling_gust_correlation_length_m]
     )
     mean_reverting_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
         statistical, airspeed_mps, rate_hz, float(min(gust_correlation_lengths_m))
     )
-    if gust["output"]["accounts_for_gusts"]:
+    if gust_estimate["output"]["accounts_for_gusts"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for field_name in ("n_axes", "drift_decay_factor", "gyro_noise_variance", "P_xx", "P_dd"):
             statistical["block"]["no_gust_filter"][field_name] = statistical["block"][field_name]
         mean_reverting_block["gust_drift_intensity_factor"] = (
             rolling_gust_correlation_length_m / mean_reverting_block["drift_correlation_length_m"]
         ) ** 2
-        if not gust["output"]["is_gust_measured"]:
-            pitching_gust_correlation_length_m = float(rotation_lengths(gust["config"]["wing_span"])[1])
+        if not gust_estimate["output"]["is_gust_measured"]:
+            pitching_gust_correlation_length_m = float(
+                rotation_lengths(gust_estimate["config"]["wing_span"])[1]
+            )
             pitch_block["drift_correlation_length_m"] = derive_drift_correlation_length_m(
                 statistical, airspeed_mps, rate_hz, pitching_gust_correlation_length_m
             )
             pitch_block["gust_drift_intensity_factor"] = (
                 pitching_gust_correlation_length_m / pitch_block["drift_correlation_length_m"]
             ) ** 2
-        add_gust_estimate_noise(statistical, sensor_errors, design, *trim[1:], dt_s)
+        add_gust_estimate_noise(statistical, sensor_errors, design_model, *trim[1:], dt_s)
 
 
 def _configure_blocks(statistical: np.void, sensor_errors: SensorErrors, aircraft: Aircraft) -> None:
@@ -383,7 +393,7 @@ def _configure_drift_and_model_noise(
     statistical: np.void,
     uncertainty_frequency_rad_s: float,
     declared: Declared,
-    design: np.void,
+    design_model: np.void,
     trim: TrimState,
     dt_s: float,
 ) -> None:
@@ -391,18 +401,22 @@ def _configure_drift_and_model_noise(
     u."""
     reading_noise_std = declared.sensors.each("random")
     gyro_noise_std = float(reading_noise_std[:3].max())
-    max_constant_part_of_uncertainty_bound = max(declared.constant_rad_s2)
+    largest_constant_bound_over_axes_rad_s2 = max(declared.constant_rad_s2)
     alarm_level = float(statistical["test_config"]["alarm_level"])
     statistical["noise"]["drift_intensity_over_squared_bound"] = derive_drift_intensity_over_squared_bound(
-        max_constant_part_of_uncertainty_bound, uncertainty_frequency_rad_s, gyro_noise_std, alarm_level, dt_s
+        largest_constant_bound_over_axes_rad_s2,
+        uncertainty_frequency_rad_s,
+        gyro_noise_std,
+        alarm_level,
+        dt_s,
     )
-    _, G, acceleration_slopes_by_rates, acceleration_slopes_by_air_data = jacobian(design, *trim)
+    _, G, acceleration_slopes_by_rates, acceleration_slopes_by_air_data = jacobian(design_model, *trim)
     statistical["noise"]["acceleration_variance_without_air_data"] = (
         acceleration_slopes_by_rates**2 @ reading_noise_std[:3] ** 2
     )
     acceleration_variance_by_air_data = (
         acceleration_slopes_by_air_data[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ reading_noise_std[3:] ** 2
-    )  # later as `add_reading_regressors_and_model_noise` says
+    )  # later as `add_reading_regressors_and_fill_noise` says
     statistical["noise"]["acceleration_variance_by_input_noise"] = (
         statistical["noise"]["acceleration_variance_without_air_data"] + acceleration_variance_by_air_data
     )
@@ -456,11 +470,11 @@ def derive_drift_correlation_length_m(
         return gust_correlation_length_m
     longest_window_s = 2 ** (N_ONSET_SLOTS - 1) / rate_hz
     alarm_level = float(statistical["test_config"]["alarm_level"])
-    drift_lag_s = (
+    drift_time_constant_s = (
         sqrt(2.0 * longest_window_s / statistical["noise"]["drift_intensity_over_squared_bound"])
         / alarm_level
     )
-    return min(airspeed_mps * drift_lag_s, gust_correlation_length_m or np.inf)
+    return min(airspeed_mps * drift_time_constant_s, gust_correlation_length_m or np.inf)
 
 
 def _configure_regressor_tolerances(
@@ -501,60 +515,68 @@ def configure_reading_regressors(
 
 
 @kernel
-def fill_signal_change_per_reading(
-    moment_table, declared_errors, y, reading_index, signal_change_per_reading
+def fill_signal_slopes_for_one_reading(
+    moment_table, declared_errors, y, reading_index, signal_slopes_for_one_reading
 ):
-    """Fill signal_change_per_reading (N_SIGNALS,): change of a table's signals per unit of a reading."""
-    signal_change_per_reading[:] = 0.0
+    """Fill signal_slopes_for_one_reading (N_SIGNALS,): change of a table's signals per unit of a reading."""
+    signal_slopes_for_one_reading[:] = 0.0
     if reading_index < AIRSPEED:  # a vane
-        signal_change_per_reading[reading_index] = 1.0
+        signal_slopes_for_one_reading[reading_index] = 1.0
     if reading_index == AIRSPEED:
         for k in range(PH, RH + 1):
-            signal_change_per_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
+            signal_slopes_for_one_reading[k] = -moment_table.signal[k] / y[AIRSPEED]
     if declared_errors.has_engine_instrument_errors and reading_index >= AIRSPEED:
-        slipstream_per_airspeed, slipstream_per_pressure, slipstream_per_kw = slipstream_slopes(
+        slipstream_per_airspeed, slipstream_per_qdyn, slipstream_per_kw = slipstream_slopes(
             y, declared_errors.power_error_kw_per_density_ratio
         )
-        slipstream_per_pressure_or_kw = (
-            slipstream_per_pressure if reading_index == QDYN else slipstream_per_kw
-        )
-        signal_change_per_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
-            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_pressure_or_kw
+        slipstream_per_qdyn_or_kw = slipstream_per_qdyn if reading_index == QDYN else slipstream_per_kw
+        signal_slopes_for_one_reading[_SLIPSTREAM_SIGNAL_INDEX] = (
+            slipstream_per_airspeed if reading_index == AIRSPEED else slipstream_per_qdyn_or_kw
         )
 
 
 @kernel
-def fill_acceleration_change_per_reading(design, y, u, reading_index, monomial_change_per_reading, out):
-    """Fill out (3,) rad/s2 with the change of the accelerations per unit of a reading.
+def fill_acceleration_slopes_for_one_reading(
+    design_model, y, u, reading_index, monomial_slopes_for_one_reading, acceleration_slopes_for_one_reading
+):
+    """Fill acceleration_slopes_for_one_reading (3,), rad/s2 per unit of the reading.
 
-    monomial_change_per_reading: the change of the monomials per unit of it.
+    monomial_slopes_for_one_reading: the change of the monomials per unit of it.
     """
-    moment_table, dynamic_force = design.moments, y[QDYN] * design.S
+    moment_table, dynamic_force = design_model.moments, y[QDYN] * design_model.S
     for i in range(3):
-        out[i] = whole_sum(moment_table, i, monomial_change_per_reading, u)
+        acceleration_slopes_for_one_reading[i] = whole_sum(
+            moment_table, i, monomial_slopes_for_one_reading, u
+        )
         if reading_index == QDYN:
-            out[i] += whole_sum(moment_table, i, moment_table.power, u) / y[QDYN]
-    rolling_moment_per_reading = dynamic_force * design.b * out[0]
-    pitching_moment_per_reading = dynamic_force * design.c * out[1]
-    yawing_moment_per_reading = dynamic_force * design.b * out[2]
-    out[0], out[1], out[2] = (
-        design.Pl * rolling_moment_per_reading + design.Pn * yawing_moment_per_reading,
-        design.Qm * pitching_moment_per_reading,
-        design.Rl * rolling_moment_per_reading + design.Rn * yawing_moment_per_reading,
+            acceleration_slopes_for_one_reading[i] += (
+                whole_sum(moment_table, i, moment_table.power, u) / y[QDYN]
+            )
+    rolling_moment_per_reading = dynamic_force * design_model.b * acceleration_slopes_for_one_reading[0]
+    pitching_moment_per_reading = dynamic_force * design_model.c * acceleration_slopes_for_one_reading[1]
+    yawing_moment_per_reading = dynamic_force * design_model.b * acceleration_slopes_for_one_reading[2]
+    (
+        acceleration_slopes_for_one_reading[0],
+        acceleration_slopes_for_one_reading[1],
+        acceleration_slopes_for_one_reading[2],
+    ) = (
+        design_model.Pl * rolling_moment_per_reading + design_model.Pn * yawing_moment_per_reading,
+        design_model.Qm * pitching_moment_per_reading,
+        design_model.Rl * rolling_moment_per_reading + design_model.Rn * yawing_moment_per_reading,
     )
 
 
 @kernel
-def add_reading_regressors_and_model_noise(
-    frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u
+def add_reading_regressors_and_fill_noise(
+    frame_share_per_instant, noise_model, blocks, declared_errors, design_model, y, u
 ):
     """Add this instant, a `frame_share_per_instant` of the frame, to the readings' regressors, rad/s2 per
     unit, and fill the model noise, rad2/s4, as it is now; `design.moments` is evaluated there."""
-    moment_table = design.moments
-    acceleration_change_per_reading = noise_model.acceleration_change_per_reading
+    moment_table = design_model.moments
+    acceleration_slopes_for_one_reading = noise_model.acceleration_change_per_reading
     noise_model.acceleration_variance_by_input_noise[:] = noise_model.acceleration_variance_without_air_data
     for reading_index in range(N_INPUT_READINGS):
-        fill_signal_change_per_reading(
+        fill_signal_slopes_for_one_reading(
             moment_table, declared_errors, y, reading_index, noise_model.signal_change_per_reading
         )
         directional(
@@ -564,31 +586,31 @@ def add_reading_regressors_and_model_noise(
             noise_model.signal_change_per_reading,
             noise_model.monomial_change_per_reading,
         )
-        fill_acceleration_change_per_reading(
-            design,
+        fill_acceleration_slopes_for_one_reading(
+            design_model,
             y,
             u,
             reading_index,
             noise_model.monomial_change_per_reading,
-            acceleration_change_per_reading,
+            acceleration_slopes_for_one_reading,
         )
         for i in range(3):
             noise_model.acceleration_variance_by_input_noise[i] += (
-                acceleration_change_per_reading[i] * noise_model.reading_noise_std[reading_index]
+                acceleration_slopes_for_one_reading[i] * noise_model.reading_noise_std[reading_index]
             ) ** 2
         pitch_block = blocks[likelihood.PITCH_BLOCK]
         pitch_block.regressor[pitch_block.n_regressors - N_INPUT_READINGS + reading_index, 0] += (
-            frame_share_per_instant * acceleration_change_per_reading[1]
+            frame_share_per_instant * acceleration_slopes_for_one_reading[1]
         )
         for lateral_block in blocks[LATERAL_BLOCK:]:
             j = lateral_block.n_regressors - N_INPUT_READINGS + reading_index
-            lateral_block.regressor[j, 0] += frame_share_per_instant * acceleration_change_per_reading[0]
-            lateral_block.regressor[j, 1] += frame_share_per_instant * acceleration_change_per_reading[2]
+            lateral_block.regressor[j, 0] += frame_share_per_instant * acceleration_slopes_for_one_reading[0]
+            lateral_block.regressor[j, 1] += frame_share_per_instant * acceleration_slopes_for_one_reading[2]
 
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
-MIN_LLR_SHARE_OF_CONSTANT_LOSS = 0.25
+MIN_CONSTANT_OVER_GROWING_LOSS_LLR = 0.25
 # The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
 # moves by this share of its travel.
 TRAVEL_SHARE_REVERSING_ERROR = 0.25
@@ -607,7 +629,7 @@ TEST_CONFIG_RECORD = record(
 )  # fmt: skip
 
 # The noise model: accelerations that are not caused by a fault.
-NOISE_RECORD = record(
+NOISE_MODEL_RECORD = record(
     # of the drift that represents a bounded uncertainty, over bound squared, 1/s
     drift_intensity_over_squared_bound=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
@@ -635,7 +657,7 @@ ALARM_RECORD = record(
 def statistical_dtype(record_size: StatisticalRecordSize = USUAL_RECORD_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
-        test_config=TEST_CONFIG_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
+        test_config=TEST_CONFIG_RECORD, noise=NOISE_MODEL_RECORD, alarm=ALARM_RECORD,
         block=(block_dtype(record_size.rate_block_capacity), N_FILTER_BLOCKS),
         n_views=int, views=(parity_view_dtype(record_size.view_block_capacity), record_size.n_views),
         tone_config=TONE_CONFIG_RECORD,
@@ -648,36 +670,40 @@ def update_blocks(
     test_config,
     uncertainty_bound,
     blocks,
-    gust,
-    innovation,
+    gust_estimate,
+    acceleration_innovation,
     dt,
     frame_index,
     is_alarm_latched,
-    may_loss_end=False,
+    losses_may_end=False,
 ):
     """Update the blocks with frame k, of dt s: innovation and bound `uncertainty_bound`, both (3,) rad/s2.
 
-    is_alarm_latched: the detector has raised its alarm; may_loss_end: a loss may end.
+    is_alarm_latched: the detector has raised its alarm; losses_may_end: a loss may end.
     """
     evidence_decay_factor = test_config.evidence_decay_factor if is_alarm_latched else 1.0
-    onset_slot = likelihood.onset_slot_to_reset(frame_index)
+    onset_slot_index_to_reset = likelihood.onset_slot_to_reset(frame_index)
     for block_index, block in enumerate(blocks):
         if not is_alarm_latched:
-            likelihood.reset_onset_slot(block, onset_slot)
+            likelihood.reset_onset_slot(block, onset_slot_index_to_reset)
         for i, axis in enumerate(block.axes[: block.n_axes]):
-            block.frame_innovation[i] = innovation[axis] - gust.output.mean_angular_acceleration_by_gust[axis]
-        block.has_coarse_gust_estimate = gust.config.has_only_coarse_estimate
-        if gust.config.has_only_coarse_estimate:
-            likelihood.set_coarse_gust_effect_of_block(block, gust.output.angular_acceleration_by_coarse_gust)
-        if gust.output.accounts_for_gusts:
-            add_gust_axes_turn_to_drift_covariance(gust, block)
+            block.frame_innovation[i] = (
+                acceleration_innovation[axis] - gust_estimate.output.mean_angular_acceleration_by_gust[axis]
+            )
+        block.has_coarse_gust_estimate = gust_estimate.config.has_only_coarse_estimate
+        if gust_estimate.config.has_only_coarse_estimate:
+            likelihood.set_coarse_gust_effect_of_block(
+                block, gust_estimate.output.angular_acceleration_by_coarse_gust
+            )
+        if gust_estimate.output.accounts_for_gusts:
+            add_gust_axes_turn_to_drift_covariance(gust_estimate, block)
             if block_index < likelihood.MEAN_REVERTING_LATERAL_BLOCK:
                 likelihood.whiten_by_no_gust_filter(block, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 block.no_gust_filter.unscaled_white_innovation_rad_s[:] = blocks[
                     LATERAL_BLOCK
                 ].no_gust_filter.unscaled_white_innovation_rad_s
-        upper_bound_decay_factor_per_frame = test_config.evidence_decay_factor if may_loss_end else 0.0
+        upper_bound_decay_factor_per_frame = test_config.evidence_decay_factor if losses_may_end else 0.0
         likelihood.update_block(
             block,
             uncertainty_bound,
@@ -690,23 +716,24 @@ def update_blocks(
 
 
 @kernel
-def add_gust_axes_turn_to_drift_covariance(gust, block):
+def add_gust_axes_turn_to_drift_covariance(gust_estimate, block):
     """Add to the covariance of the drift what a fast turn of the gusts' axes may change in it."""
     for i in range(block.n_axes):
         for j in range(block.n_axes):
             block.P_dd[i, j] += (
                 block.gust_drift_intensity_factor
-                * gust.output.acceleration_variance_by_axes_turn[block.axes[i], block.axes[j]]
+                * gust_estimate.output.acceleration_variance_by_axes_turn[block.axes[i], block.axes[j]]
             )
 
 
 @kernel
-def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_faults, dt):
+def filter_innovation_after_known_faults(blocks, gust_estimate, innovation_after_known_faults, dt):
     """Filter the innovation after known faults (3,) rad/s2; the state tracks its slowly varying mean."""
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
         for i, axis in enumerate(block.axes[: block.n_axes]):
             block.frame_innovation[i] = (
-                innovation_after_known_faults[axis] - gust.output.mean_angular_acceleration_by_gust[axis]
+                innovation_after_known_faults[axis]
+                - gust_estimate.output.mean_angular_acceleration_by_gust[axis]
             )
         likelihood.whiten(
             block, block.filter_state_after_known_faults, block.frame_innovation, dt, block.frame_innovation
@@ -714,7 +741,7 @@ def filter_innovation_after_known_faults(blocks, gust, innovation_after_known_fa
 
 
 @kernel
-def fill_statistical_unmodelled_acceleration(blocks, gust, out):
+def fill_statistical_unmodelled_acceleration(blocks, gust_estimate, out):
     """Fill out (3,) rad/s2 with the estimated acceleration that the control law's model lacks.
 
     It is the estimated drift plus the effect of the gust estimated from the vanes.
@@ -722,12 +749,15 @@ def fill_statistical_unmodelled_acceleration(blocks, gust, out):
     for block in blocks[: likelihood.MEAN_REVERTING_LATERAL_BLOCK]:
         for i, axis in enumerate(block.axes[: block.n_axes]):
             out[axis] = (
-                block.filter_state_after_known_faults[2 + i] + gust.output.angular_acceleration_by_gust[axis]
+                block.filter_state_after_known_faults[2 + i]
+                + gust_estimate.output.angular_acceleration_by_gust[axis]
             )
 
 
 @kernel
-def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_error_known=True):
+def update_alarm(
+    alarm, test_config, blocks, views, measured_forces, gust_estimate, t, is_model_error_known=True
+):
     """Fill the largest score over the alarm level, its axis, and at the first alarm its time t s.
 
     The score is 0 where the model's error is not `is_model_error_known`.
@@ -743,7 +773,7 @@ def update_alarm(alarm, test_config, blocks, views, forces, gust, t, is_model_er
         keep_largest_alarm_score(
             alarm,
             test_config.alarm_level,
-            parity.view_alarm_score(view, views, test_config, forces, gust),
+            parity.view_alarm_score(view, views, test_config, measured_forces, gust_estimate),
             view.alarm_axis,
         )
     if alarm.score_over_alarm_level > 1.0 and alarm.detected_at_s < 0.0:
@@ -759,15 +789,15 @@ def update_max_alarm_score_so_far(alarm):
 
 
 @kernel
-def keep_largest_alarm_score(alarm, alarm_level, score, axis):
+def keep_largest_alarm_score(alarm, alarm_level, score_in_standard_deviations, axis):
     """Keep a score if it is the largest."""
-    score_over_alarm_level = score / alarm_level
+    score_over_alarm_level = score_in_standard_deviations / alarm_level
     if score_over_alarm_level > alarm.score_over_alarm_level:
         alarm.score_over_alarm_level, alarm.axis = score_over_alarm_level, axis
 
 
 @kernel
-def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
+def write_alarm_scores_to_log_row(test_config, blocks, views, measured_forces, gust_estimate, row):
     """Write the last columns of a log row: scores over the alarm level, first of losses, then of steps.
 
     Scores of forces and of oscillations are in the column of the step on their axis.
@@ -783,7 +813,8 @@ def write_scores_to_log_row(test_config, blocks, views, forces, gust, row):
         score_column = row.size - 3 + view.alarm_axis
         row[score_column] = max(
             row[score_column],
-            parity.view_alarm_score(view, views, test_config, forces, gust) / test_config.alarm_level,
+            parity.view_alarm_score(view, views, test_config, measured_forces, gust_estimate)
+            / test_config.alarm_level,
         )
 
 
@@ -866,7 +897,13 @@ def confirms_loss(test_config, blocks, estimators, loss_estimator_indices, surfa
 
 @kernel
 def excludes_loss(
-    test_config, blocks, estimators, loss_estimator_indices, surface_index, may_loss_end_in_pitch, is_abrupt
+    test_config,
+    blocks,
+    estimators,
+    loss_estimator_indices,
+    surface_index,
+    includes_loss_end_in_pitch,
+    is_abrupt,
 ):
     """True if an alternative explains the data better than a loss of this surface.
 
@@ -874,15 +911,17 @@ def excludes_loss(
 
     Each block of roll and yaw is compared together with that of pitch, because a loss acts on its own axes
     only. A loss that is not declared `is_abrupt` may grow. A constant theta then explains only a part of its
-    effect, so the loss is excluded only if its ratio is also below MIN_LLR_SHARE_OF_CONSTANT_LOSS of the
+    effect, so the loss is excluded only if its ratio is also below MIN_CONSTANT_OVER_GROWING_LOSS_LLR of the
     best. The same holds for a loss that begins inside a frame of several instants, and for the end of a loss
-    there. The end of a loss in pitch counts only if `may_loss_end_in_pitch` is set: a fault outside the class
-    may look like it. Arguments as in `confirms_loss`.
+    there. The end of a loss in pitch counts only if `includes_loss_end_in_pitch` is set: a fault outside the
+    class may look like it. Arguments as in `confirms_loss`.
     """
     pitch_block = blocks[likelihood.PITCH_BLOCK]
     has_one_instant_per_frame = test_config.frame_share_per_instant == 1.0
-    loss_llr_share_limit = 1.0 if is_abrupt and has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
-    loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_LLR_SHARE_OF_CONSTANT_LOSS
+    loss_llr_share_limit = (
+        1.0 if is_abrupt and has_one_instant_per_frame else MIN_CONSTANT_OVER_GROWING_LOSS_LLR
+    )
+    loss_end_llr_share_limit = 1.0 if has_one_instant_per_frame else MIN_CONSTANT_OVER_GROWING_LOSS_LLR
     for lateral_block in blocks[LATERAL_BLOCK:]:
         alternative_llr_lower_bound = best_alternative_llr_lower_bound(
             pitch_block, estimators, loss_estimator_indices, surface_index
@@ -898,7 +937,7 @@ def excludes_loss(
             loss_llr_upper_bound(lateral_block, surface_index, False),
         )
         upper_bound_of_loss_end_llr = loss_llr_upper_bound(lateral_block, surface_index, True)
-        if may_loss_end_in_pitch:
+        if includes_loss_end_in_pitch:
             upper_bound_of_loss_end_llr = max(
                 upper_bound_of_loss_end_llr, loss_llr_upper_bound(pitch_block, surface_index, True)
             )
@@ -931,14 +970,16 @@ def estimate_loss(blocks, surface_index):
 
 
 @kernel
-def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt):
+def prepare_tests(
+    test_config, noise_model, blocks, gust_estimate, bound_record, design_model, measured, u, dt
+):
     """Prepare the next frame, of dt s: gust, regressors, drift and model noise at this instant.
 
     bound_record: the declared bounds; u (n,) rad: positions of healthy surfaces.
     """
     x, y = measured.x, measured.y
-    if gust.output.accounts_for_gusts:
-        gusts.fill_gust_effect_and_specific_force(gust, design, x, y, u)
+    if gust_estimate.output.accounts_for_gusts:
+        gusts.fill_gust_effect_and_specific_force(gust_estimate, design_model, x, y, u)
     if test_config.uses_regressors:
         for block in blocks:
             block.regressor[:] = 0.0
@@ -947,15 +988,19 @@ def prepare_tests(test_config, noise_model, blocks, gust, bound_record, design, 
             noise_model,
             blocks,
             bound_record.declared_errors,
-            design,
+            design_model,
             measured,
             u,
         )
-    fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt)
+    fill_uncertainty_bound_drift_and_noise(
+        noise_model, blocks, gust_estimate, bound_record, design_model, measured, dt
+    )
     if bound_record.error_map.n_boxes > 0:
         update_uncertainty_change(noise_model, blocks, bound_record.error_map, u)
-    if gust.output.accounts_for_gusts:
-        gusts.begin_gust_sums_with_instant(gust, y[AIRSPEED], test_config.frame_share_per_instant * dt)
+    if gust_estimate.output.accounts_for_gusts:
+        gusts.begin_gust_sums_with_instant(
+            gust_estimate, y[AIRSPEED], test_config.frame_share_per_instant * dt
+        )
 
 
 @kernel
@@ -980,46 +1025,50 @@ def update_uncertainty_change(noise_model, blocks, error_map, u):
 
 @kernel
 def add_instant_to_gust_and_regressors(
-    test_config, noise_model, blocks, gust, bound_record, design, measured, u, dt
+    test_config, noise_model, blocks, gust_estimate, bound_record, design_model, measured, u, dt
 ):
     """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
-    if gust.output.accounts_for_gusts:
-        gusts.update_gust_and_sums(gust, design, measured.x, measured.y, u, measured.attitude, dt)
+    if gust_estimate.output.accounts_for_gusts:
+        gusts.update_gust_and_sums(
+            gust_estimate, design_model, measured.x, measured.y, u, measured.attitude, dt
+        )
     if test_config.uses_regressors:
         add_regressors(
             test_config.frame_share_per_instant,
             noise_model,
             blocks,
             bound_record.declared_errors,
-            design,
+            design_model,
             measured,
             u,
         )
 
 
 @kernel
-def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design, measured, u):
+def add_regressors(frame_share_per_instant, noise_model, blocks, declared_errors, design_model, measured, u):
     """Add this instant, a `frame_share_per_instant` of the frame, to all regressors of unknown constants."""
     y = measured.y
-    evaluate(design.moments, measured.x, y)
+    evaluate(design_model.moments, measured.x, y)
     add_coefficient_regressors(
-        frame_share_per_instant, noise_model.coefficient_regressor, blocks, design, y, u
+        frame_share_per_instant, noise_model.coefficient_regressor, blocks, design_model, y, u
     )
     if noise_model.has_reading_errors:
-        add_reading_regressors_and_model_noise(
-            frame_share_per_instant, noise_model, blocks, declared_errors, design, y, u
+        add_reading_regressors_and_fill_noise(
+            frame_share_per_instant, noise_model, blocks, declared_errors, design_model, y, u
         )
 
 
 @kernel
-def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, measured, dt):
-    """Fill drift intensity and model noise of each block: for the bounded uncertainty and the unmeasured
-    gust."""
+def fill_uncertainty_bound_drift_and_noise(
+    noise_model, blocks, gust_estimate, bound_record, design_model, measured, dt
+):
+    """Fill the bound on the uncertainty, and of each block the drift intensity and the model noise: for the
+    bounded uncertainty and the unmeasured gust."""
     uncertainty_bound, V = noise_model.uncertainty_bound, measured.y[AIRSPEED]
     uncertainty_bound[:] = 0.0
     add_published_bound(
         measured.x,
-        design,
+        design_model,
         bound_record.inertia_coupling_error_share,
         bound_record.constant_error_bound,
         bound_record.earth_rate_rad_s,
@@ -1042,9 +1091,13 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
         for i, axis in enumerate(block.axes[: block.n_axes]):
             for j in range(block.n_axes):
                 block.drift_intensity[i, j] = 0.0
-                if gust.output.accounts_for_gusts:
+                if gust_estimate.output.accounts_for_gusts:
                     gust_drift_intensity = gusts.unmeasured_gust_drift_intensity(
-                        gust, V, axis, block.axes[j], block_index == likelihood.MEAN_REVERTING_LATERAL_BLOCK
+                        gust_estimate,
+                        V,
+                        axis,
+                        block.axes[j],
+                        block_index == likelihood.MEAN_REVERTING_LATERAL_BLOCK,
                     )
                     block.drift_intensity[i, j] = block.gust_drift_intensity_factor * gust_drift_intensity
             uncertainty_bound_for_drift = max(
@@ -1068,29 +1121,35 @@ def fill_drift_and_model_noise(noise_model, blocks, gust, bound_record, design, 
 
 
 @kernel
-def add_coefficient_regressors(frame_share_per_instant, coefficient_regressor, blocks, design, y, u):
+def add_coefficient_regressors(
+    frame_share_per_instant, dimensionless_regressor_by_term, blocks, design_model, y, u
+):
     """Add this instant, a `frame_share_per_instant` of the frame, to the coefficients' regressors (n, 2)
     rad/s2."""
-    moment_table = design.moments
-    regressors(moment_table, moment_table.power, u, coefficient_regressor)
-    frame_share_of_dynamic_force = frame_share_per_instant * y[QDYN] * design.S
-    lateral_moment_per_coefficient = frame_share_of_dynamic_force * design.b
-    pitching_moment_per_coefficient = frame_share_of_dynamic_force * design.c
+    moment_table = design_model.moments
+    regressors(moment_table, moment_table.power, u, dimensionless_regressor_by_term)
+    frame_share_of_dynamic_force = frame_share_per_instant * y[QDYN] * design_model.S
+    lateral_moment_per_coefficient = frame_share_of_dynamic_force * design_model.b
+    pitching_moment_per_coefficient = frame_share_of_dynamic_force * design_model.c
     pitch_block = blocks[likelihood.PITCH_BLOCK]
     first_term_index = moment_table.free_from[1]
     for j in range(moment_table.surface_to[1] - first_term_index):
         pitch_block.regressor[j, 0] += (
-            design.Qm * pitching_moment_per_coefficient * coefficient_regressor[first_term_index + j]
+            design_model.Qm
+            * pitching_moment_per_coefficient
+            * dimensionless_regressor_by_term[first_term_index + j]
         )
     for lateral_block in blocks[LATERAL_BLOCK:]:
         n_roll_terms, first_term_index = moment_table.surface_to[0], moment_table.free_from[2]
         for j in range(n_roll_terms):
-            roll_moment_per_term_coefficient = lateral_moment_per_coefficient * coefficient_regressor[j]
-            lateral_block.regressor[j, 0] += design.Pl * roll_moment_per_term_coefficient
-            lateral_block.regressor[j, 1] += design.Rl * roll_moment_per_term_coefficient
+            roll_moment_per_term_coefficient = (
+                lateral_moment_per_coefficient * dimensionless_regressor_by_term[j]
+            )
+            lateral_block.regressor[j, 0] += design_model.Pl * roll_moment_per_term_coefficient
+            lateral_block.regressor[j, 1] += design_model.Rl * roll_moment_per_term_coefficient
         for j in range(moment_table.surface_to[2] - first_term_index):
             yaw_moment_per_term_coefficient = (
-                lateral_moment_per_coefficient * coefficient_regressor[first_term_index + j]
+                lateral_moment_per_coefficient * dimensionless_regressor_by_term[first_term_index + j]
             )
-            lateral_block.regressor[n_roll_terms + j, 0] += design.Pn * yaw_moment_per_term_coefficient
-            lateral_block.regressor[n_roll_terms + j, 1] += design.Rn * yaw_moment_per_term_coefficient
+            lateral_block.regressor[n_roll_terms + j, 0] += design_model.Pn * yaw_moment_per_term_coefficient
+            lateral_block.regressor[n_roll_terms + j, 1] += design_model.Rn * yaw_moment_per_term_coefficient

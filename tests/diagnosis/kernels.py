@@ -125,7 +125,7 @@ def of_stages(fdi, kernel):
         **dict.fromkeys(("abrupt", "fault_is_declared_constant"), fdi["config"]["abrupt"]),
         "diagnoses_all_types": fdi["config"]["diagnoses_all_types"],
         "n_substeps": fdi["config"]["n_substeps"],
-        **dict.fromkeys(("bank", "filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
+        **dict.fromkeys(("bank", "filter_bank", "detection_filter_bank"), fdi["bank"]), "fdae": fdi["fdae"],
         "innovation": fdi["bank"]["output"]["innovation"],
         **dict.fromkeys(("detected", "is_detected", "is_fault_detected"), fdi["verdict"]["detected"]),
         "innovation_bound": fdi["bound"]["frame_innovation_bound"],

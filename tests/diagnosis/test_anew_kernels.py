@@ -26,8 +26,8 @@ FILL = {
     "damping": ((3, 3), lambda out: model.rate_damping(design(), X, Y, U, np.full(MAX_MONOMIALS, 9.0), out)),
     "level axes": ((3, 3), lambda out: gusts.fill_level_to_body_rotation(0.3, 0.2, out)),
     "quaternion": ((4,), lambda out: redundancy.fill_quaternion(0.3, 0.2, 0.1, out)),
-    "turned": ((4,), lambda out: redundancy.advance_quaternion(Q, X, 0.02, out)),
-    "turned back": ((3,), lambda out: redundancy.rotate_to_turned_axes(X, 0.02, V, out)),
+    "turned": ((4,), lambda out: redundancy.fill_advanced_quaternion(Q, X, 0.02, out)),
+    "turned back": ((3,), lambda out: redundancy.fill_vector_in_turned_axes(X, 0.02, V, out)),
 }
 
 

@@ -54,7 +54,7 @@ def looks(monitor, readings, residuals):
     """Each look's readings, and the residual of the test that leads."""
     for signal, residual in zip(readings, residuals, strict=True):
         monitor["redundancy"]["test"]["residual"][monitor["output"]["alarm_test_index"]] = residual
-        sensor_monitor.count_identical_samples_and_find_jump(monitor, signal)
+        sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
         sensor_monitor.update_cleared_sensors(monitor, signal)
         monitor["memory"]["reading_two_samples_ago"] = monitor["redundancy"]["memory"]["previous_reading"]
         monitor["redundancy"]["memory"]["previous_reading"] = signal
@@ -73,7 +73,7 @@ def course(of, values):
 
 
 def test_which_instrument_a_test_of_the_flow_asks():
-    assert [sensor_monitor.flow_sensor_of_test(test) for test in OF] == list(OF.values())
+    assert [sensor_monitor.flow_sensor_index_of_test(test) for test in OF] == list(OF.values())
     flow = [test for test in range(13) if sensor_monitor.is_flow_test(test)]
     assert flow == [SPEED_TEST, ALPHA_FLOW_TEST, BETA_FLOW_TEST]
 
@@ -81,13 +81,13 @@ def test_which_instrument_a_test_of_the_flow_asks():
 def test_a_reading_that_is_the_same_is_counted_until_it_is_not():
     monitor, signal = new_watch(), level()
     for expected in (1, 2, 3):
-        sensor_monitor.count_identical_samples_and_find_jump(monitor, signal)
+        sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
         assert monitor["memory"]["n_identical_samples"][ALPHA] == expected
     assert sensor_monitor.is_frozen(monitor, ALPHA)
     monitor["config"]["min_frozen_samples"][ALPHA] = 4
     assert not sensor_monitor.is_frozen(monitor, ALPHA)
     signal[ALPHA] += 1e-15
-    sensor_monitor.count_identical_samples_and_find_jump(monitor, signal)
+    sensor_monitor.update_identical_counts_and_max_jump(monitor, signal)
     assert monitor["memory"]["n_identical_samples"][[ALPHA, BETA]].tolist() == [0, 4]
 
 
@@ -136,7 +136,7 @@ def test_what_accelerometers_have_leapt_is_forgotten_in_two_seconds_at_any_rate(
             monitor["memory"]["fading_max_accelerometer_jump"],
         ) = h, 3.0
         for _ in range(round(2.0 / h)):
-            sensor_monitor.count_identical_samples_and_find_jump(
+            sensor_monitor.update_identical_counts_and_max_jump(
                 monitor, monitor["redundancy"]["memory"]["previous_reading"].copy()
             )
         assert monitor["memory"]["fading_max_accelerometer_jump"] == pytest.approx(
@@ -329,7 +329,7 @@ def test_none_is_used_once_one_may_be_broken(fields, used):
     measured["inertial"] = 1
     for name, i in fields.items():
         holder(monitor, name)[name][i] = 1
-    sensor_monitor.mark_accelerometers_unusable(monitor, measured)
+    sensor_monitor.disable_accelerometers_if_suspect(monitor, measured)
     assert measured["inertial"] == used
 
 

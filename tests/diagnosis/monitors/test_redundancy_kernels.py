@@ -99,7 +99,7 @@ def test_a_prediction_turns_attitude_and_velocity_by_the_rates(seed):
         3.0,
         (2.0, 1.0),
     )
-    redundancy.predict_readings(relations)
+    redundancy.advance_motion_and_predict_readings(relations)
     assert relations["memory"]["acceleration_magnitude"] == pytest.approx(
         np.linalg.norm(1.5 * now - 0.5 * before)
     )
@@ -135,7 +135,7 @@ def test_what_each_angle_turns_the_axes_by(i):
 
 def test_axes_that_do_not_turn_leave_a_vector_as_it_is():
     out = np.zeros(3)
-    redundancy.rotate_to_turned_axes(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
+    redundancy.fill_vector_in_turned_axes(np.zeros(3), H, np.array([1.0, -2.0, 3.0]), out)
     assert out == pytest.approx([1.0, -2.0, 3.0])
 
 
@@ -222,9 +222,9 @@ def residuals(looks):
     relations["config"]["attitude_drift_rad_s"] = relations["config"]["max_gust_speed_mps"] = 0.0
     redundancy.store_sample(relations, looks[0], looks[0, AX:])
     relations["memory"]["previous_body_acceleration"] = relations["memory"]["body_acceleration"]
-    redundancy.predict_readings(relations)
+    redundancy.advance_motion_and_predict_readings(relations)
     redundancy.store_sample(relations, looks[1], looks[1, AX:])
-    redundancy.predict_readings(relations)
+    redundancy.advance_motion_and_predict_readings(relations)
     redundancy.fill_residuals(relations, looks[2])
     return relations, relations["test"]["residual"][:RPM_TEST].copy()
 
@@ -318,7 +318,7 @@ def test_filters_sum_what_was_with_what_each_pole_keeps():
     residual, rate, noise = rng.normal(size=frames), rng.uniform(1, 2, frames), rng.uniform(1, 2, frames)
     for k in range(frames):
         test["residual"], test["bound_per_s"], test["bound_per_sample"] = residual[k], rate[k], noise[k]
-        redundancy.filter_residual_and_its_bound(relations, test)
+        redundancy.filter_residual_and_update_bound_ratio(relations, test)
     weight = keep[:, None] ** np.arange(frames)[::-1]
     filtered = weight @ residual
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]

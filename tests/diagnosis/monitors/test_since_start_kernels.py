@@ -216,7 +216,7 @@ def test_in_steady_flight_nothing_shows_the_sideslip_or_the_airspeed():
 def test_tests_that_show_its_moves_do_not_speak_against_a_first_error(i, lead, by, explained):
     initial = new_watch(0.01)["initial_errors"]
     initial["is_refuted_by_test"][i, list(by)] = 1
-    assert initial_errors.initial_error_explains_alarm(initial, i, lead) == explained
+    assert initial_errors.initial_error_explains_exceeded_tests(initial, i, lead) == explained
 
 
 def test_what_the_airspeed_may_be_off_by_follows_from_the_dynamic_pressure():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.diagnosis.monitors.redundancy import (
-    ISOLATION_TIME_LIMIT_S,
     SENSOR_MONITOR_RECORD,
+    UNANTICIPATED_VERDICT_DELAY_S,
     sensor_monitor_finding,
 )
 from beaver_ftc.plant.instruments import SENSORS
@@ -28,7 +28,7 @@ def test_nothing_is_said_without_an_alarm_or_beside_a_surfaces(monitor):
     assert sensor_monitor_finding(monitor, 4.5) is None
 
 
-@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + ISOLATION_TIME_LIMIT_S])
+@pytest.mark.parametrize("t_s", [4.0, 4.5, 4.0 + UNANTICIPATED_VERDICT_DELAY_S])
 def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
     said = sensor_monitor_finding(monitor, t_s)
     assert said["candidates"] == (sensor_words(SENSORS[0]), sensor_words(SENSORS[2]))
@@ -36,9 +36,9 @@ def test_until_the_wait_is_over_the_suspects_are_candidates(monitor, t_s):
 
 
 def test_what_cannot_be_named_by_then_is_unanticipated(monitor):
-    said = sensor_monitor_finding(monitor, 4.01 + ISOLATION_TIME_LIMIT_S)
+    said = sensor_monitor_finding(monitor, 4.01 + UNANTICIPATED_VERDICT_DELAY_S)
     assert said["isolated"] == said["isolation_type"] == "unanticipated"
-    assert said["isolation_time_s"] == 4.0 + ISOLATION_TIME_LIMIT_S
+    assert said["isolation_time_s"] == 4.0 + UNANTICIPATED_VERDICT_DELAY_S
     assert said["candidates"] == ()
 
 

@@ -99,7 +99,7 @@ def with_shares(shares, **fields):
 )  # fmt: skip
 def test_of_the_looks_of_a_frame_the_test_furthest_towards_its_bound_is_kept(shares, substep, furthest):
     monitor = with_shares(shares, worst_test_index=5, worst_residual_bound_ratio=0.7, substep=substep)
-    watching.find_worst_test(monitor)
+    watching.update_worst_test_of_frame(monitor)
     assert (
         monitor["output"]["worst_test_index"],
         monitor["output"]["worst_residual_bound_ratio"],
@@ -110,7 +110,7 @@ def suspects(shares, lead=None, **fields):
     """Who can have brought the tests here."""
     monitor = with_shares(shares, **fields)
     monitor["output"]["alarm_test_index"] = max(shares, key=shares.get) if lead is None else lead
-    watching.latch_exceeded_tests(monitor)
+    watching.latch_exceeded_tests_and_refutations(monitor)
     watching.find_suspects(monitor)
     return set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist())
 
@@ -180,7 +180,7 @@ def test_an_airspeed_as_wrong_as_the_density_has_it_would_show_in_its_own_test(a
         DENSITY_TEST,
     )
     monitor["initial_errors"]["is_refuted_by_test"] = 1
-    assert watching.airspeed_error_would_exceed_own_test(monitor) == (who == {QDYN})
+    assert watching.airspeed_error_would_exceed_speed_test(monitor) == (who == {QDYN})
     watching.find_suspects(monitor)
     assert set(np.flatnonzero(monitor["output"]["is_suspect"]).tolist()) == who
     monitor["memory"]["n_identical_samples"][AIRSPEED] = 1
@@ -292,7 +292,7 @@ def detected_fdi(at_s=-1.0, isolated=NOT_ISOLATED):
 @pytest.mark.parametrize("isolated", [NOT_ISOLATED, 0, 1])
 def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     monitor, fdi = new_watch(), detected_fdi(9.6, isolated)
-    on(watching.raise_alarm, fdi, monitor, 10.0)
+    on(watching.raise_alarm_and_judge_surface_conclusion, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed"]
     assert monitor["output"]["alarmed_at_s"] == 9.6  # the same fault, seen first in the rates
     assert monitor["output"]["surface_was_isolated_at_alarm"] == (isolated >= 0)
@@ -309,24 +309,24 @@ def test_an_alarm_voids_what_a_moment_ago_was_made_of_it(isolated):
     assert (fdi["types"]["surface"]["accommodation"]["mode"] == -1).all()
     assert not fdi["fdae"]["network"]["memory"]["weights"].any()
     assert not fdi["fdae"]["network"]["output"].any()
-    on(watching.raise_alarm, detected_fdi(9.6, 1), monitor, 11.0)
+    on(watching.raise_alarm_and_judge_surface_conclusion, detected_fdi(9.6, 1), monitor, 11.0)
     assert monitor["output"]["alarmed_at_s"] == 9.6
 
 
 def test_a_surface_found_long_before_stays_found():
     monitor, fdi = new_watch(), detected_fdi(9.4, 1)
-    on(watching.raise_alarm, fdi, monitor, 10.0)
+    on(watching.raise_alarm_and_judge_surface_conclusion, fdi, monitor, 10.0)
     assert monitor["output"]["keeps_surface_conclusion"]
     assert monitor["output"]["alarmed_at_s"] == 10.0
     assert fdi["verdict"]["isolated_estimator"] == 1
     monitor, fdi = new_watch(), detected_fdi(9.5, 1)
-    on(watching.raise_alarm, fdi, monitor, 10.0)  # half a second is no long time
+    on(watching.raise_alarm_and_judge_surface_conclusion, fdi, monitor, 10.0)  # half a second is no long time
     assert not monitor["output"]["keeps_surface_conclusion"]
 
 
 def test_with_nothing_found_before_the_alarm_is_of_now():
     monitor, fdi = new_watch(), detected_fdi()
-    on(watching.raise_alarm, fdi, monitor, 10.0)
+    on(watching.raise_alarm_and_judge_surface_conclusion, fdi, monitor, 10.0)
     assert monitor["output"]["alarmed_at_s"] == 10.0
     assert not monitor["output"]["keeps_surface_conclusion"]
     assert not monitor["output"]["surface_was_isolated_at_alarm"]
@@ -550,10 +550,10 @@ def test_what_no_gyro_can_be_is_further_from_w_than_all_bounds(size, clear):
     test["filtered_bound"][FIRST_TURN_TEST + 1, 0] = 0.02
     limit = 0.02 + H * (0.3 + watching.RATE_DAMPING_RELATIVE_TOLERANCE * 0.5)
     test["residual"][FIRST_TURN_TEST + 1] = size * limit + H * 0.5
-    watching.rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
+    watching.update_turn_difference_and_rule_out_gyros(monitor)
     assert monitor["memory"]["gyros_excluded"] == clear
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx([size * limit] * 3)
-    watching.rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
+    watching.update_turn_difference_and_rule_out_gyros(monitor)
     kept = 1.0 + np.array([0.0, 0.9, 0.99])
     assert monitor["memory"]["filtered_turn_difference"][1] == pytest.approx(size * limit * kept)
     assert monitor["memory"]["filtered_turn_difference_bound"][1] == pytest.approx(
@@ -744,7 +744,7 @@ def test_what_is_replaced_is_shared_out_and_the_slipstream_is_that_of_what_it_is
         else:
             monitor["output"]["is_reading_unused"][i] = 1
     before = measured["signal"].copy()
-    watching.replace_isolated_readings(monitor, prediction, measured)
+    watching.replace_isolated_and_missing_readings(monitor, prediction, measured)
     assert np.flatnonzero(monitor["output"]["is_reading_unused"]).tolist() == sorted(broken)
     assert set(np.flatnonzero(measured["signal"] != before)) == set(broken)
     assert (measured["attitude"][1] != 9.0) == shared
@@ -805,7 +805,7 @@ def test_angles_are_held_against_angles_and_rates_against_rates():
 def test_suspicions_of_the_frame_before_are_gone():
     monitor = with_shares({CLIMB_TEST: 2.0}, alarm_test_index=CLIMB_TEST)
     monitor["output"]["is_suspect"] = 1
-    watching.latch_exceeded_tests(monitor)
+    watching.latch_exceeded_tests_and_refutations(monitor)
     watching.find_suspects(monitor)
     assert np.flatnonzero(monitor["output"]["is_suspect"]).tolist() == [ALTITUDE]
 
@@ -835,7 +835,7 @@ def test_what_is_named_is_replaced_and_flags_are_one():
     watching.isolate_sensor(monitor, CLIMB_TEST, 3.0)
     assert monitor["output"]["is_reading_unused"][CLIMB_TEST] == 1
     monitor = new_watch()
-    on(watching.raise_alarm, detected_fdi(9.4, 1), monitor, 10.0)
+    on(watching.raise_alarm_and_judge_surface_conclusion, detected_fdi(9.4, 1), monitor, 10.0)
     assert (monitor["output"]["keeps_surface_conclusion"], monitor["output"]["alarmed"]) == (1, 1)
 
 

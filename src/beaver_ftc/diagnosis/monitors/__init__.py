@@ -71,7 +71,8 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
         mean_thrust_arm_over_span(aircraft),
     )
     config["thrust_index"], config["yawing_moment_index"] = (
-        DPT + signal_names.index(name) for name in (THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME)
+        DPT + signal_names.index(signal_name)
+        for signal_name in (THRUST_SIGNAL_NAME, ENGINE_YAWING_MOMENT_SIGNAL_NAME)
     )
     config["yawing_moment_tolerance_per_thrust"] = MAX_CENTRE_OF_MASS_OFFSET_M / aircraft.geometry.span_m
 
@@ -80,8 +81,8 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
 def disable_if_differential_thrust(engine_monitor, lever_offsets):
     """Disable the monitor once a law has moved an engine apart; lever_offsets (n and more,): of each, in
     addition to the common one."""
-    for engine in range(engine_monitor.config.n_engines):
-        if lever_offsets[engine] != 0.0:
+    for engine_index in range(engine_monitor.config.n_engines):
+        if lever_offsets[engine_index] != 0.0:
             engine_monitor.memory.disabled_by_differential_thrust = 1
 
 

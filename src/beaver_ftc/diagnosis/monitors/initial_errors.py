@@ -18,7 +18,7 @@ samples, s; test t; and filter pole m
                                       b <- min(b + (1 - decay_slow) d, error_bound_at_start)
                                     and for each test, or pair of tests, that couples with the error
                                       b <- min(b, (r + B + 2 d W_tm)
-                                                  / (MIN_REMAINING_ERROR_EFFECT_SHARE C))
+                                                  / (ASSUMED_REMAINING_ERROR_EFFECT_SHARE C))
     error_change_bound              d: bound on the change of x within the memory of the slowest filter,
                                     d = min(r + B + b W_tm, error_bound_at_start), of the test that a change
                                     of x moves at once; for the airspeed r + B + b W_tm times (1 + b) / V
@@ -61,6 +61,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
+    AIRSPEED_DIVISOR_FLOOR_MPS,
     AIRSPEED_HYPOTHESIS,
     ALPHA,
     ALPHA_FLOW_TEST,
@@ -73,7 +74,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     FIRST_ANGLE_TEST,
     FIRST_TURN_TEST,
     MAX_PITCH_RAD,
-    MIN_AIRSPEED_MPS,
     MIN_DYNAMIC_PRESSURE_PA,
     N_INITIAL_ERROR_HYPOTHESES,
     PHI_HYPOTHESIS,
@@ -96,7 +96,7 @@ MIN_TEMPERATURE_RATIO_TO_SEA_LEVEL = (
     0.05  # temperature over that at sea level, below which none is extrapolated
 )
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
-MIN_REMAINING_ERROR_EFFECT_SHARE = 0.8
+ASSUMED_REMAINING_ERROR_EFFECT_SHARE = 0.8
 SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
 
 # Places in `signed_effect_per_unit_error`: effects of a unit of an error that are followed with their sign,
@@ -148,7 +148,7 @@ def set_error_bounds_at_start(initial_errors, readings):
     error_bound_at_start = initial_errors.error_bound_at_start
     error_bound_at_start[ALPHA_HYPOTHESIS] = chord_of_angle(abs(readings[ALPHA]) + MAX_FLOW_ANGLE_RAD)
     error_bound_at_start[BETA_HYPOTHESIS] = chord_of_angle(abs(readings[BETA]) + MAX_FLOW_ANGLE_RAD)
-    V = max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
+    V = max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     airspeed_in_standard_atmosphere = np.sqrt(  # by dynamic pressure and height, in the standard atmosphere
         2.0 * max(readings[QDYN], MIN_DYNAMIC_PRESSURE_PA) / standard_air_density(readings[ALTITUDE])
     )
@@ -177,23 +177,23 @@ def index_of_test_showing_error_change(hypothesis_index):
 
 
 @kernel
-def update_change_bounds_and_widen_error_bounds(redundancy, initial_errors):
+def update_recent_change_and_widen_bounds(redundancy, initial_errors):
     """Update d, the bound on each error's change within the memory of the slowest filter; and widen b by the
     part of it that this filter forgets in a sample."""
     share_forgotten_per_sample = 1.0 - redundancy.config.filter_decay[SLOWEST_POLE_INDEX]
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
         test_index = index_of_test_showing_error_change(i)
         error_bound_at_start = initial_errors.error_bound_at_start[i]
-        change_bound = (
+        recent_change_bound = (
             max_error_effect_allowed_by_residual(redundancy, test_index, SLOWEST_POLE_INDEX)
             + initial_errors.error_bound[i]
             * initial_errors.filtered_max_effect_per_unit_error[i, test_index, SLOWEST_POLE_INDEX]
         )
         if i == AIRSPEED_HYPOTHESIS:  # from m/s to a share of the truth, which is at least V / (1 + b)
-            change_bound *= (1.0 + initial_errors.error_bound[i]) / max(
-                redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS
+            recent_change_bound *= (1.0 + initial_errors.error_bound[i]) / max(
+                redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS
             )
-        initial_errors.error_change_bound[i] = min(change_bound, error_bound_at_start)
+        initial_errors.error_change_bound[i] = min(recent_change_bound, error_bound_at_start)
         widened_bound = (
             initial_errors.error_bound[i] + share_forgotten_per_sample * initial_errors.error_change_bound[i]
         )
@@ -209,21 +209,21 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     """
     previous_reading, h = redundancy.memory.previous_reading, redundancy.config.sample_time_s
     p, q, r = previous_reading[0], previous_reading[1], previous_reading[2]
-    V = max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
-    phi = previous_reading[PHI]
-    theta = previous_reading[THETA]
+    V = max(previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
+    previous_phi = previous_reading[PHI]
+    previous_theta = previous_reading[THETA]
     max_effect_per_unit = initial_errors.max_effect_per_unit_error
     signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
     max_effect_per_unit[:] = 0.0
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    theta_secant = 1.0 / np.cos(min(abs(theta), MAX_PITCH_RAD))
+    theta_secant = 1.0 / np.cos(min(abs(previous_theta), MAX_PITCH_RAD))
     max_theta_secant = 1.0 / np.cos(
-        min(abs(theta) + angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]), MAX_PITCH_RAD)
+        min(abs(previous_theta) + angle_of_chord(initial_errors.error_bound[THETA_HYPOTHESIS]), MAX_PITCH_RAD)
     )
     second_order_turn_rad2 = (h * (abs(p) + abs(q) + abs(r))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
     pitch_yaw_turn = h * np.hypot(q, r)
-    max_heading_turn = h * abs(q * np.sin(phi) + r * np.cos(phi)) * max_theta_secant
+    max_heading_turn = h * abs(q * np.sin(previous_phi) + r * np.cos(previous_phi)) * max_theta_secant
     for i in range(3):
         # Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
         # 2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
@@ -248,18 +248,18 @@ def fill_effects_per_unit_error(redundancy, initial_errors, readings):
     ) = (
         h * q,
         h * r,
-        h * (q * np.sin(phi) + r * np.cos(phi)),
+        h * (q * np.sin(previous_phi) + r * np.cos(previous_phi)),
     )
-    fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r)
+    fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r)
     # log V changes by (1 + x) times the change of the reading's logarithm: the density, with -2 log V, by x
     # times twice that.
-    log_airspeed_change = np.log(max(readings[AIRSPEED], MIN_AIRSPEED_MPS) / V)
+    log_airspeed_change = np.log(max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS) / V)
     max_effect_per_unit[AIRSPEED_HYPOTHESIS, DENSITY_TEST] = 2.0 * abs(log_airspeed_change)
     signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX] = 2.0 * log_airspeed_change
 
 
 @kernel
-def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
+def fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r):
     """Fill `max_effect_per_unit_error` and `signed_effect_per_unit_error` for the tests of speed, flow and
     climb, and by gravity.
 
@@ -267,16 +267,16 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     for the second order in h. x: the error of the row's hypothesis.
     """
     memory, h, g = redundancy.memory, redundancy.config.sample_time_s, redundancy.config.gravity_m_s2
-    reading, a = memory.previous_reading, memory.body_acceleration
+    previous_reading, a = memory.previous_reading, memory.body_acceleration
     max_effect_per_unit = initial_errors.max_effect_per_unit_error
     signed_effect_per_unit = initial_errors.signed_effect_per_unit_error
-    sin_alpha, cos_alpha = np.sin(reading[ALPHA]), np.cos(reading[ALPHA])
-    sin_beta, cos_beta = np.sin(reading[BETA]), np.cos(reading[BETA])
-    sin_phi, cos_phi = np.sin(reading[PHI]), np.cos(reading[PHI])
-    sin_theta, cos_theta = np.sin(reading[THETA]), np.cos(reading[THETA])
+    sin_alpha, cos_alpha = np.sin(previous_reading[ALPHA]), np.cos(previous_reading[ALPHA])
+    sin_beta, cos_beta = np.sin(previous_reading[BETA]), np.cos(previous_reading[BETA])
+    sin_phi, cos_phi = np.sin(previous_reading[PHI]), np.cos(previous_reading[PHI])
+    sin_theta, cos_theta = np.sin(previous_reading[THETA]), np.cos(previous_reading[THETA])
     # |beta| by its reading, and the largest one if beta is off; 1 / cos of each
-    sideslip_magnitude = abs(reading[BETA])
-    max_sideslip = abs(reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
+    sideslip_magnitude = abs(previous_reading[BETA])
+    max_sideslip = abs(previous_reading[BETA]) + angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS])
     beta_secant = 1.0 / np.cos(min(sideslip_magnitude, MAX_PITCH_RAD))
     max_beta_secant = 1.0 / np.cos(min(max_sideslip, MAX_PITCH_RAD))
     # m/s2: a across the flow, downwards and sideways; bound on |a| in the step
@@ -290,7 +290,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     flow_roll_rate, negative_flow_yaw_rate = p * cos_alpha + r * sin_alpha, p * sin_alpha - r * cos_alpha
     widened_step_s = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
     roll_yaw_rate = np.hypot(p, r)
-    predicted_climb_m = memory.predicted_reading[ALTITUDE] - reading[ALTITUDE]
+    predicted_climb_m = memory.predicted_reading[ALTITUDE] - previous_reading[ALTITUDE]
     # V' = a . v / V: the direction of v is turned by alpha, or beta, and changes by x at most
     max_effect_per_unit[ALPHA_HYPOTHESIS, SPEED_TEST] = max_effect_per_unit[BETA_HYPOTHESIS, SPEED_TEST] = (
         widened_step_s * a_max
@@ -352,7 +352,7 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX] = h * g * cos_theta * sin_phi
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
-    pitch_magnitude = abs(reading[THETA])
+    pitch_magnitude = abs(previous_reading[THETA])
     signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX] = (
         h
         * g
@@ -366,11 +366,15 @@ def fill_flow_effects_per_unit_error(redundancy, initial_errors, V, p, q, r):
     # alpha: altitude' = V cos(beta) vertical_length_in_symmetry_plane sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
-    max_mean_path_angle = abs(np.arctan2(sin_theta, cos_phi * cos_theta) - reading[ALPHA]) + (
-        0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
-    )
+    max_path_angle_midway_to_truth = abs(
+        np.arctan2(sin_theta, cos_phi * cos_theta) - previous_reading[ALPHA]
+    ) + (0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS]))
     signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX] = (
-        h * V * cos_beta * vertical_length_in_symmetry_plane * np.cos(min(max_mean_path_angle, 0.5 * np.pi))
+        h
+        * V
+        * cos_beta
+        * vertical_length_in_symmetry_plane
+        * np.cos(min(max_path_angle_midway_to_truth, 0.5 * np.pi))
     )
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + negative_flow_yaw_rate sin(e / 2)). beta
     # off by e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of
@@ -431,14 +435,14 @@ def tighten_error_bound(initial_errors, hypothesis_index, max_effect, min_effect
     if min_effect_per_unit_error > 0.0:
         initial_errors.error_bound[hypothesis_index] = min(
             initial_errors.error_bound[hypothesis_index],
-            max_effect / (MIN_REMAINING_ERROR_EFFECT_SHARE * min_effect_per_unit_error),
+            max_effect / (ASSUMED_REMAINING_ERROR_EFFECT_SHARE * min_effect_per_unit_error),
         )
 
 
 @kernel
-def max_error_effect_on_velocity(redundancy, initial_errors, hypothesis_index, pole_index):
+def max_error_effect_on_velocity_mps(redundancy, initial_errors, hypothesis_index, pole_index):
     """The bound of `max_error_effect_if_constant` on the velocity, m/s, in any direction."""
-    V = max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    V = max(redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     max_flow_angle_effect = np.hypot(
         max_error_effect_if_constant(
             redundancy, initial_errors, hypothesis_index, ALPHA_FLOW_TEST, pole_index
@@ -471,30 +475,30 @@ def max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, hypothesis_in
 def tighten_all_error_bounds(redundancy, initial_errors):
     """Lower the bound on each error to what the tests allow, filter by filter."""
     for m in range(redundancy.config.filter_decay.size):
-        filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, m]
+        filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, m]
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
             max_error_effect_on_pitch_yaw_turn(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
-                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
+                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_PITCH_RATE_INDEX],
+                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_YAW_RATE_INDEX],
             ),
         )
         tighten_error_bound(
             initial_errors,
             PHI_HYPOTHESIS,
-            max_error_effect_on_velocity(redundancy, initial_errors, PHI_HYPOTHESIS, m),
+            max_error_effect_on_velocity_mps(redundancy, initial_errors, PHI_HYPOTHESIS, m),
             np.hypot(
-                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX],
-                filtered_signed_effect_per_unit[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX],
+                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_GRAVITY_DOWN_INDEX],
+                filtered_signed_effects_at_pole[PHI_ERROR_EFFECT_BY_GRAVITY_SIDE_INDEX],
             ),
         )
         tighten_error_bound(
             initial_errors,
             THETA_HYPOTHESIS,
-            max_error_effect_on_velocity(redundancy, initial_errors, THETA_HYPOTHESIS, m),
-            filtered_signed_effect_per_unit[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX],
+            max_error_effect_on_velocity_mps(redundancy, initial_errors, THETA_HYPOTHESIS, m),
+            filtered_signed_effects_at_pole[THETA_ERROR_EFFECT_BY_GRAVITY_INDEX],
         )
         max_rotation_effect = np.hypot(
             max_error_effect_if_constant(redundancy, initial_errors, THETA_HYPOTHESIS, FIRST_TURN_TEST, m),
@@ -504,7 +508,7 @@ def tighten_all_error_bounds(redundancy, initial_errors):
             initial_errors,
             THETA_HYPOTHESIS,
             max_rotation_effect,
-            abs(filtered_signed_effect_per_unit[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX]),
+            abs(filtered_signed_effects_at_pole[THETA_ERROR_EFFECT_BY_HEADING_RATE_INDEX]),
         )
         tighten_vane_error_bounds(redundancy, initial_errors, m)
         tighten_airspeed_error_bound(redundancy, initial_errors, m)
@@ -513,20 +517,20 @@ def tighten_all_error_bounds(redundancy, initial_errors):
 @kernel
 def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     """Lower the bounds on the errors of incidence and sideslip to what climb and flow allow."""
-    filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
+    filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     max_half_alpha_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
         np.cos(max_half_alpha_error)
-        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
         - np.sin(max_half_alpha_error)
-        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX])
-        - filtered_signed_effect_per_unit[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX])
+        - filtered_signed_effects_at_pole[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(
         initial_errors,
         ALPHA_HYPOTHESIS,
         max_error_effect_if_constant(redundancy, initial_errors, ALPHA_HYPOTHESIS, CLIMB_TEST, pole_index),
-        filtered_signed_effect_per_unit[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX],
+        filtered_signed_effects_at_pole[ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX],
     )
     tighten_error_bound(
         initial_errors,
@@ -538,8 +542,8 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
-        - filtered_signed_effect_per_unit[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        - filtered_signed_effects_at_pole[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(
         initial_errors,
@@ -558,7 +562,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + b times smaller makes them
     larger by that. The density shows changes of the error in addition: those are in the airspeed's own test.
     """
-    filtered_signed_effect_per_unit = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
+    filtered_signed_effects_at_pole = initial_errors.filtered_signed_effect_per_unit_error[:, pole_index]
     max_reading_over_truth = 1.0 + initial_errors.error_bound[AIRSPEED_HYPOTHESIS]
     tighten_error_bound(
         initial_errors,
@@ -567,7 +571,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_error_effect_if_constant(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, ALPHA_FLOW_TEST, pole_index
         ),
-        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX]),
+        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_ALPHA_FLOW_INDEX]),
     )
     tighten_error_bound(
         initial_errors,
@@ -576,13 +580,13 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
         * max_error_effect_if_constant(
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, BETA_FLOW_TEST, pole_index
         ),
-        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX]),
+        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_BETA_FLOW_INDEX]),
     )
     max_error_change_effect_on_density = (
         2.0
         * max_reading_over_truth
         * max_error_effect_allowed_by_residual(redundancy, SPEED_TEST, pole_index)
-        / max(redundancy.memory.previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+        / max(redundancy.memory.previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     )
     tighten_error_bound(
         initial_errors,
@@ -591,7 +595,7 @@ def tighten_airspeed_error_bound(redundancy, initial_errors, pole_index):
             redundancy, initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, pole_index
         )
         + max_error_change_effect_on_density,
-        abs(filtered_signed_effect_per_unit[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX]),
+        abs(filtered_signed_effects_at_pole[AIRSPEED_ERROR_EFFECT_ON_DENSITY_INDEX]),
     )
 
 
@@ -601,7 +605,7 @@ def update_initial_error_bounds(redundancy, initial_errors, readings):
     if max_pitch_angle(redundancy, readings) > MAX_PITCH_RAD:  # the tests of the attitude restart
         initial_errors.filtered_signed_effect_per_unit_error[:] = 0.0
         return
-    update_change_bounds_and_widen_error_bounds(redundancy, initial_errors)
+    update_recent_change_and_widen_bounds(redundancy, initial_errors)
     fill_effects_per_unit_error(redundancy, initial_errors, readings)
     filter_effects_per_unit_error(redundancy, initial_errors)
     tighten_all_error_bounds(redundancy, initial_errors)
@@ -612,19 +616,19 @@ def exceeds_bound_with_initial_error(redundancy, initial_errors, hypothesis_inde
     """Whether a test's residual is larger than sound sensors and the error of a hypothesis explain: for a
     pole m, r > factor B + (b + d) W_tm. No hypothesis has an effect on the engine's tests and later ones."""
     test = redundancy.test[test_index]
-    error_bound_with_change = (
+    error_bound_with_recent_change = (
         initial_errors.error_bound[hypothesis_index] + initial_errors.error_change_bound[hypothesis_index]
     )
     if test_index >= RPM_TEST:
         return test.residual_bound_ratio > 1.0
     bound_factor = 1.0 + (
-        error_bound_with_change
+        error_bound_with_recent_change
         if hypothesis_index == AIRSPEED_HYPOTHESIS and test_index >= SPEED_TEST
         else 0.0
     )
     for m in range(redundancy.config.filter_decay.size):
         max_error_effect = (
-            error_bound_with_change
+            error_bound_with_recent_change
             * initial_errors.filtered_max_effect_per_unit_error[hypothesis_index, test_index, m]
         )
         if abs(test.filtered_residual[m]) > bound_factor * test.filtered_bound[m] + max_error_effect:
@@ -675,7 +679,7 @@ def test_reacts_to_error_change(hypothesis_index, test_index):
 
 
 @kernel
-def initial_error_explains_alarm(initial_errors, hypothesis_index, alarm_test_index):
+def initial_error_explains_exceeded_tests(initial_errors, hypothesis_index, alarm_test_index):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 

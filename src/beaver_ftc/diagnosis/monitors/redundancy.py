@@ -52,10 +52,10 @@ CLIMB_TEST = 10
 RPM_TEST = 11
 MANIFOLD_PRESSURE_TEST = 12
 N_TESTS_WITH_EQUATION = 13  # tests with an equation; then those of sensors that should equal another reading
-DUPLICATE_SENSOR_INDEX_AND_COUNTERPART = tuple(
+DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE = tuple(
     (SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None
 )
-N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_SENSOR_INDEX_AND_COUNTERPART)
+N_TESTS = N_TESTS_WITH_EQUATION + len(DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE)
 # The test in which a jump of a reading appears at once, as the rows of the sensors name it.
 TEST_INDEX_BY_NAME = {
     "roll": FIRST_TURN_TEST, "pitch": FIRST_TURN_TEST + 1, "yaw": FIRST_TURN_TEST + 2,
@@ -66,20 +66,27 @@ TEST_INDEX_BY_NAME = {
 # Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
-DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART], np.int64)
+DUPLICATE_SENSOR_INDEX = np.array([i for i, _ in DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE], np.int64)
 DUPLICATED_READING_INDEX = np.array(
-    [SENSORS.index(counterpart.reading) for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART],
+    [
+        SENSORS.index(counterpart_and_tolerance.reading)
+        for _, counterpart_and_tolerance in DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE
+    ],
     np.int64,
 )
 DUPLICATED_READING_TEST_INDEX = np.array(
     [
-        TEST_INDEX_BY_NAME[ROWS[SENSORS.index(counterpart.reading)].test]
-        for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART
+        TEST_INDEX_BY_NAME[ROWS[SENSORS.index(counterpart_and_tolerance.reading)].test]
+        for _, counterpart_and_tolerance in DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE
     ],
     np.int64,
 )
 DUPLICATE_TOLERANCE = np.array(
-    [counterpart.within for _, counterpart in DUPLICATE_SENSOR_INDEX_AND_COUNTERPART], float
+    [
+        counterpart_and_tolerance.within
+        for _, counterpart_and_tolerance in DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE
+    ],
+    float,
 )
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
@@ -95,7 +102,9 @@ MIN_FROZEN_SAMPLES_WITH_ROUNDING = 50  # the same with noise of more than a quar
 UNREACHABLE_FROZEN_SAMPLES = (
     1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 )
-ISOLATION_TIME_LIMIT_S = 1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
+UNANTICIPATED_VERDICT_DELAY_S = (
+    1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
+)
 P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
@@ -132,7 +141,8 @@ REDUNDANCY_RECORD = record(
         reading_error_bound=N_SENSORS, changing_reading_error_bound=N_SENSORS,
         attitude_drift_bound_rad=float, previous_error_bound=N_SENSORS, error_bound_two_samples_ago=N_SENSORS,
         # the sample before: readings; attitude; velocity m/s and acceleration m/s2, gravity included, in body
-        # axes; and the acceleration of the sample before that. predict_readings advances the last two vectors
+        # axes; and the acceleration of the sample before that. advance_motion_and_predict_readings advances
+        # the last two vectors
         previous_reading=N_SENSORS, previous_quaternion=4, body_velocity=3, body_acceleration=3,
         previous_body_acceleration=3,
         # m/s2: in the elapsed step, in the two steps before it; of previous_body_acceleration
@@ -177,7 +187,7 @@ MONITOR_MEMORY_RECORD = record(
     gyro_error_estimate=3, gyro_error_estimate_bound=3, previous_gyro_error_estimate_bound=3,
     previous_gyro_error_estimate=3,
     # a sensor with the reading that it should equal
-    has_duplicate_agreed=(int, max(len(DUPLICATE_SENSOR_INDEX_AND_COUNTERPART), 1)),
+    has_duplicate_agreed=(int, max(len(DUPLICATE_INDEX_COUNTERPART_AND_TOLERANCE), 1)),
     # by axis and pole, rad: filtered difference of the turn that the attitude and W show, and its bound;
     # beyond it no gyro can be broken
     gyros_excluded=int, filtered_turn_difference=(3, N_POLES), filtered_turn_difference_bound=(3, N_POLES),
@@ -213,9 +223,10 @@ SENSOR_MONITOR_RECORD = record(
 
 
 def configure_sensor_monitor(
-    monitor: np.void, scenario: Scenario, design_record: np.void, y: np.ndarray, enabled: bool
+    monitor: np.void, scenario: Scenario, design_model_record: np.void, y: np.ndarray, enabled: bool
 ) -> None:
-    """Fill the monitor's record at the trim: y, the measured signals there; design_record: of the designer.
+    """Fill the monitor's record at the trim: y, the measured signals there; design_model_record: of the
+    designer.
 
     A monitor that is not `enabled` has found nothing, and its record holds no more than that.
     """
@@ -232,7 +243,7 @@ def configure_sensor_monitor(
     )
     config["trim_reading"][3:7] = y[:4]
     config["rate_damping_per_s"] = acceleration_per_air_rotation(
-        DesignFunctions(np.array([design_record])), y
+        DesignFunctions(np.array([design_model_record])), y
     )
     monitor["memory"]["substep"] = scenario.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine_sensors"]:
@@ -330,13 +341,13 @@ def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | Non
     if output["isolated_sensor"] >= 0:
         finding["isolated"] = sensor_words(SENSORS[int(output["isolated_sensor"])])
         finding["isolation_time_s"] = float(output["isolated_at_s"])
-    elif t_s > finding["detection_time_s"] + ISOLATION_TIME_LIMIT_S:
+    elif t_s > finding["detection_time_s"] + UNANTICIPATED_VERDICT_DELAY_S:
         finding["isolated"] = finding["isolation_type"] = "unanticipated"
-        finding["isolation_time_s"] = finding["detection_time_s"] + ISOLATION_TIME_LIMIT_S
+        finding["isolation_time_s"] = finding["detection_time_s"] + UNANTICIPATED_VERDICT_DELAY_S
     else:
-        suspicion_by_sensor = zip(SENSORS, output["is_suspect"], strict=True)
+        sensor_names_and_suspicions = zip(SENSORS, output["is_suspect"], strict=True)
         finding["candidates"] = tuple(
-            sensor_words(name) for name, is_suspected in suspicion_by_sensor if is_suspected
+            sensor_words(name) for name, is_suspected in sensor_names_and_suspicions if is_suspected
         )
     return finding
 
@@ -346,7 +357,7 @@ EARTH_RATE_BOUND_RAD_S = 4e-5
 EARTH_ACCELERATION_BOUND_M_S2 = 0.03  # Coriolis, centrifugal, and gravity's change with place
 DENSITY_SCALE_HEIGHT_M = 6300.0  # over which the density falls by a factor e at most: in the stratosphere
 MAX_PITCH_RAD = 1.3  # beyond it, roll and heading cannot be distinguished: the attitude tests restart
-MIN_AIRSPEED_MPS = 1.0  # at least so much where an airspeed divides
+AIRSPEED_DIVISOR_FLOOR_MPS = 1.0  # at least so much where an airspeed divides
 MIN_DYNAMIC_PRESSURE_PA = 1.0  # the same of the dynamic pressure
 MIN_QDYN_PER_AIRSPEED_SQUARED = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
 MIN_PREDICTED_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
@@ -373,12 +384,13 @@ def fill_quaternion(phi, theta, psi, out):
 
 
 @kernel
-def advance_quaternion(quaternion, rates, duration_s, out):
-    """Fill out (4,): the unit quaternion (4,) after duration_s at body rates (3,) rad/s, one Euler step."""
+def fill_advanced_quaternion(previous_quaternion, rates, duration_s, out):
+    """Fill out (4,): the previous unit quaternion (4,) after duration_s at body rates (3,) rad/s: one Euler
+    step."""
     half_angle_x = 0.5 * duration_s * rates[0]
     half_angle_y = 0.5 * duration_s * rates[1]
     half_angle_z = 0.5 * duration_s * rates[2]
-    q = quaternion
+    q = previous_quaternion
     length_after_step = np.sqrt(
         1.0 + half_angle_x * half_angle_x + half_angle_y * half_angle_y + half_angle_z * half_angle_z
     )
@@ -414,21 +426,23 @@ def body_turn_per_euler_angle(redundancy, axis, angle_index):
 
 
 @kernel
-def rotate_to_turned_axes(rates, duration_s, vector, out):
+def fill_vector_in_turned_axes(rates, duration_s, vector_before_turn, out):
     """Fill out (3,): the components of a constant vector (3,) in body axes that have turned at rates (3,)
     rad/s for duration_s."""
     total_rate = np.sqrt(rates[0] ** 2 + rates[1] ** 2 + rates[2] ** 2)
     turn_angle = 2.0 * np.arctan(0.5 * duration_s * total_rate)
     sine_per_rate = np.sin(turn_angle) / total_rate if total_rate > 0.0 else 0.0
     versine_per_rate_squared = (1.0 - np.cos(turn_angle)) / total_rate**2 if total_rate > 0.0 else 0.0
-    rates_dot_vector = rates[0] * vector[0] + rates[1] * vector[1] + rates[2] * vector[2]
+    rates_dot_vector = (
+        rates[0] * vector_before_turn[0] + rates[1] * vector_before_turn[1] + rates[2] * vector_before_turn[2]
+    )
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        rates_cross_vector = rates[j] * vector[k] - rates[k] * vector[j]
+        rates_cross_vector = rates[j] * vector_before_turn[k] - rates[k] * vector_before_turn[j]
         out[i] = (
-            vector[i]
+            vector_before_turn[i]
             - sine_per_rate * rates_cross_vector
-            + versine_per_rate_squared * (rates[i] * rates_dot_vector - total_rate**2 * vector[i])
+            + versine_per_rate_squared * (rates[i] * rates_dot_vector - total_rate**2 * vector_before_turn[i])
         )
 
 
@@ -472,7 +486,7 @@ def vector_length(vector):
 
 
 @kernel
-def predict_readings(redundancy):
+def advance_motion_and_predict_readings(redundancy):
     """Fill predicted_reading (N_SENSORS,): attitude, flow and altitude now, from the sample before.
 
     Afterwards body_velocity is the predicted one, and previous_body_acceleration that of the sample before in
@@ -482,7 +496,7 @@ def predict_readings(redundancy):
     previous_rates = memory.previous_reading[:3]
     predicted_reading = memory.predicted_reading
     scratch_vector = memory.scratch[:3]
-    advance_quaternion(memory.previous_quaternion, previous_rates, h, memory.predicted_quaternion)
+    fill_advanced_quaternion(memory.previous_quaternion, previous_rates, h, memory.predicted_quaternion)
     q0 = memory.predicted_quaternion[0]
     q1 = memory.predicted_quaternion[1]
     q2 = memory.predicted_quaternion[2]
@@ -512,8 +526,8 @@ def predict_readings(redundancy):
     memory.acceleration_magnitude = vector_length(scratch_vector)
     for i in range(3):
         scratch_vector[i] = body_velocity[i] + h * scratch_vector[i]
-    rotate_to_turned_axes(previous_rates, h, scratch_vector, body_velocity)
-    rotate_to_turned_axes(previous_rates, h, memory.body_acceleration, memory.previous_body_acceleration)
+    fill_vector_in_turned_axes(previous_rates, h, scratch_vector, body_velocity)
+    fill_vector_in_turned_axes(previous_rates, h, memory.body_acceleration, memory.previous_body_acceleration)
     predicted_speed = vector_length(body_velocity)
     predicted_reading[AIRSPEED] = predicted_speed
     predicted_reading[ALPHA] = np.arctan2(body_velocity[2], body_velocity[0])
@@ -553,13 +567,13 @@ def max_pitch_angle(redundancy, readings):
 
 
 @kernel
-def extrapolated_error_bound(redundancy, sensor):
+def extrapolated_error_bound(redundancy, sensor_index):
     """Bound the error of 3/2 a - 1/2 a_before by the errors of the reading of a sensor in the two samples. A
     constant error counts once."""
     return (
-        ADAMS_BASHFORTH_WEIGHT * redundancy.memory.previous_error_bound[sensor]
-        + ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor]
-        - redundancy.config.constant_error_bound[sensor]
+        ADAMS_BASHFORTH_WEIGHT * redundancy.memory.previous_error_bound[sensor_index]
+        + ADAMS_BASHFORTH_SUBTRACTED_WEIGHT * redundancy.memory.error_bound_two_samples_ago[sensor_index]
+        - redundancy.config.constant_error_bound[sensor_index]
     )
 
 
@@ -635,13 +649,13 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
         rate_error_bound_by_attitude = (
             2.0 * max_pitch_secant * max_turn_rate * (previous_error_bound[PHI] + previous_error_bound[THETA])
         )
-        rate_error_bound = (
+        total_rate_error_bound = (
             EARTH_RATE_BOUND_RAD_S
             + (1.0 + max_pitch_secant * max_turn_angle) * gyro_error_bound_sum
             + rate_error_bound_by_attitude
         )
         tests[FIRST_ANGLE_TEST + i].bound_per_s, tests[FIRST_ANGLE_TEST + i].bound_per_sample = (
-            max_pitch_secant * rate_error_bound + config.attitude_drift_rad_s,
+            max_pitch_secant * total_rate_error_bound + config.attitude_drift_rad_s,
             changing_error_bound[PHI + i],
         )
     max_sin_theta = abs(np.sin(readings[THETA])) + changing_error_bound[THETA]
@@ -658,12 +672,12 @@ def bound_attitude_tests(redundancy, readings, max_turn_rate, gyro_error_bound_s
 
 
 @kernel
-def min_height_of_two_samples(redundancy, readings):
+def min_altitude_of_two_samples_m(redundancy, readings):
     """Lower bound on the height in this sample and the one before, m, within the altimeter's error."""
     memory = redundancy.memory
-    min_height = readings[ALTITUDE] - memory.reading_error_bound[ALTITUDE]
-    previous_min_height = memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE]
-    return max(min(min_height, previous_min_height), LEAST_HEIGHT_M)
+    min_altitude_m = readings[ALTITUDE] - memory.reading_error_bound[ALTITUDE]
+    previous_min_altitude_m = memory.previous_reading[ALTITUDE] - memory.previous_error_bound[ALTITUDE]
+    return max(min(min_altitude_m, previous_min_altitude_m), LEAST_HEIGHT_M)
 
 
 @kernel
@@ -678,7 +692,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
             readings[AIRSPEED] - reading_error_bound[AIRSPEED],
             previous_reading[AIRSPEED] - previous_error_bound[AIRSPEED],
         ),
-        MIN_AIRSPEED_MPS,
+        AIRSPEED_DIVISOR_FLOOR_MPS,
     )
     max_sideslip = max(
         abs(readings[BETA]) + reading_error_bound[BETA],
@@ -691,9 +705,9 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
     second_order_factor = 1.0 + config.sample_time_s * (
         2.0 * memory.acceleration_magnitude / min_airspeed + max_turn_rate
     )
-    gust_change_factor = np.sqrt(
+    gust_change_bound_inflation_factor = np.sqrt(
         max(readings[AIRSPEED] / config.max_airspeed_mps, 1.0)
-        * max(config.low_altitude_limit_m / min_height_of_two_samples(redundancy, readings), 1.0)
+        * max(config.low_altitude_limit_m / min_altitude_of_two_samples_m(redundancy, readings), 1.0)
     )
     flow_angle_rate_error_bound = (
         max_sideslip_secant**2
@@ -709,7 +723,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
         + max_sideslip_secant * gyro_error_bound_sum
     )
     tests[SPEED_TEST].residual_per_gust_speed_change, tests[SPEED_TEST].bound_per_sample = (
-        gust_change_factor,
+        gust_change_bound_inflation_factor,
         changing_error_bound[AIRSPEED],
     )
     tests[SPEED_TEST].bound_per_s = (
@@ -723,7 +737,7 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
             tests[test_index].bound_per_sample,
             tests[test_index].bound_per_s,
         ) = (
-            gust_change_factor * max_sideslip_secant / min_airspeed,
+            gust_change_bound_inflation_factor * max_sideslip_secant / min_airspeed,
             changing_error_bound[vane_index],
             second_order_factor * flow_angle_rate_error_bound,
         )
@@ -746,14 +760,14 @@ def bound_flow_tests(redundancy, readings, max_turn_rate, gyro_error_bound_sum):
 
 
 @kernel
-def log_change_error_bound(redundancy, readings, sensor):
+def log_change_error_bound(redundancy, readings, sensor_index):
     """Bound the apparent change of the logarithm of the reading of a sensor (qdyn or airspeed), by its
     constant error."""
-    constant_error_bound = redundancy.config.constant_error_bound[sensor]
-    previous_reading = redundancy.memory.previous_reading[sensor]
-    smaller_reading = max(min(readings[sensor], previous_reading), 1.0)
+    constant_error_bound = redundancy.config.constant_error_bound[sensor_index]
+    previous_reading = redundancy.memory.previous_reading[sensor_index]
+    smaller_reading = max(min(readings[sensor_index], previous_reading), 1.0)
     first_order_bound = constant_error_bound * abs(
-        1.0 / max(readings[sensor], 1.0) - 1.0 / max(previous_reading, 1.0)
+        1.0 / max(readings[sensor_index], 1.0) - 1.0 / max(previous_reading, 1.0)
     )
     return first_order_bound / max(
         1.0 - constant_error_bound / smaller_reading, MIN_READING_SHARE_LEFT_BY_ERROR
@@ -784,7 +798,7 @@ def bound_density_change_test(redundancy, readings):
     test.bound_per_sample += (
         2.0
         * changing_error_bound[AIRSPEED]
-        / max(readings[AIRSPEED] - reading_error_bound[AIRSPEED], MIN_AIRSPEED_MPS)
+        / max(readings[AIRSPEED] - reading_error_bound[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     )
 
 
@@ -809,7 +823,7 @@ def bound_residuals(redundancy, readings):
 
 
 @kernel
-def filter_residual_and_its_bound(redundancy, test):
+def filter_residual_and_update_bound_ratio(redundancy, test):
     """Pass one test's residual through its filters, and find its largest ratio to the bound."""
     config = redundancy.config
     test.residual_bound_ratio = 0.0
@@ -821,10 +835,10 @@ def filter_residual_and_its_bound(redundancy, test):
         test.filtered_bound_per_sample_part[m] = advance_gyro_error_bound(
             test.filtered_bound_per_sample_part[m], test.previous_bound_per_sample, decay
         )
-        per_sample_part = test.filtered_bound_per_sample_part[m] + test.bound_per_sample
+        filtered_per_sample_bound = test.filtered_bound_per_sample_part[m] + test.bound_per_sample
         test.filtered_bound[m] = (
             test.filtered_bound_per_s_part[m]
-            + per_sample_part
+            + filtered_per_sample_bound
             + test.residual_per_gust_speed_change * config.gust_change_bound_mps[m]
         )
         test.residual_bound_ratio = max(
@@ -856,17 +870,17 @@ def compare_engine_sensors(redundancy, readings):
 
 
 @kernel
-def compare_duplicate_sensors(redundancy, readings, is_fresh):
+def compare_duplicate_sensors(redundancy, readings, is_fresh_by_sampled_sensor):
     """Compare each sensor that should equal another reading with that reading, in the samples in which it is
-    `is_fresh` (sampled sensors,). If they differ by more than the errors of both and the tolerance of the two
-    quantities, one of the two is broken."""
+    fresh; is_fresh_by_sampled_sensor (sampled sensors,). If they differ by more than the errors of both and
+    the tolerance of the two quantities, one of the two is broken."""
     memory = redundancy.memory
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
         duplicate_sensor_index = DUPLICATE_SENSOR_INDEX[duplicate_index]
         duplicated_reading_index = DUPLICATED_READING_INDEX[duplicate_index]
         test = redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index]
         test.residual_bound_ratio = 0.0
-        if is_fresh[duplicate_sensor_index - N_IN_EQUATIONS]:
+        if is_fresh_by_sampled_sensor[duplicate_sensor_index - N_IN_EQUATIONS]:
             test.residual = readings[duplicate_sensor_index] - readings[duplicated_reading_index]
             if PHI <= duplicated_reading_index <= PSI:
                 test.residual = wrapped(test.residual)
@@ -905,7 +919,7 @@ def run_redundancy_tests(redundancy, readings, has_engine_sensors):
     config, memory = redundancy.config, redundancy.memory
     memory.attitude_drift_bound_rad += config.sample_time_s * config.attitude_drift_rad_s
     fill_reading_error_bounds(redundancy, readings)
-    predict_readings(redundancy)
+    advance_motion_and_predict_readings(redundancy)
     fill_residuals(redundancy, readings)
     bound_residuals(redundancy, readings)
     memory.first_acceleration_error_bound = 0.0
@@ -914,7 +928,7 @@ def run_redundancy_tests(redundancy, readings, has_engine_sensors):
         if is_too_steep and test_index < SPEED_TEST:
             restart_test(redundancy.test[test_index])
         else:
-            filter_residual_and_its_bound(redundancy, redundancy.test[test_index])
+            filter_residual_and_update_bound_ratio(redundancy, redundancy.test[test_index])
     if has_engine_sensors:
         compare_engine_sensors(redundancy, readings)
 

@@ -20,7 +20,7 @@ and that test is within its bound.
     outcome                sensor        surfaces
     a reading is missing   isolated      none is isolated
     one suspect            isolated      none is isolated
-    several, or none       not isolated  none is isolated; after ISOLATION_TIME_LIMIT_S the verdict is
+    several, or none       not isolated  none is isolated; after UNANTICIPATED_VERDICT_DELAY_S the verdict is
                                          "unanticipated"
     alarm long after that  isolated or   the conclusion about surfaces stays (MIN_SURFACE_ALARM_LEAD_S)
     of the surfaces        not, as above
@@ -53,7 +53,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import advance_residual_bound, bank_alarm_axis
 from beaver_ftc.diagnosis.monitors.initial_errors import (
-    initial_error_explains_alarm,
+    initial_error_explains_exceeded_tests,
     latch_refuted_hypotheses,
     max_error_effect_at_alarm,
     set_error_bounds_at_start,
@@ -63,6 +63,7 @@ from beaver_ftc.diagnosis.monitors.initial_errors import (
 from beaver_ftc.diagnosis.monitors.redundancy import (
     ADAMS_BASHFORTH_WEIGHT,
     AIRSPEED,
+    AIRSPEED_DIVISOR_FLOOR_MPS,
     AIRSPEED_HYPOTHESIS,
     ALPHA,
     ALPHA_FLOW_TEST,
@@ -82,7 +83,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_ERROR_REFUTED,
     GYRO_ERROR_UNDECIDED,
     MANIFOLD_PRESSURE_TEST,
-    MIN_AIRSPEED_MPS,
     MIN_FAULTY_FORCE_JUMP_M_S2,
     N_INITIAL_ERROR_HYPOTHESES,
     N_TESTS,
@@ -127,7 +127,7 @@ TIME_ROUNDING_S = 1e-9
 
 
 @kernel
-def flow_sensor_of_test(test_index):
+def flow_sensor_index_of_test(test_index):
     """The flow sensor that a test compares with the accelerometers."""
     if test_index == SPEED_TEST:
         return AIRSPEED
@@ -149,7 +149,7 @@ def is_flow_test(test_index):
 
 
 @kernel
-def count_identical_samples_and_find_jump(monitor, readings):
+def update_identical_counts_and_max_jump(monitor, readings):
     """Count the samples for which each reading (N_SENSORS,) has been the very same, and find the largest jump
     of an accelerometer from one sample to the next, m/s2, which fades within
     ACCELEROMETER_JUMP_FADE_TIME_S."""
@@ -168,9 +168,9 @@ def count_identical_samples_and_find_jump(monitor, readings):
 
 
 @kernel
-def is_frozen(monitor, sensor):
+def is_frozen(monitor, sensor_index):
     """Whether a sensor is frozen: no sound one gives the same reading for so many samples."""
-    return monitor.memory.n_identical_samples[sensor] >= monitor.config.min_frozen_samples[sensor]
+    return monitor.memory.n_identical_samples[sensor_index] >= monitor.config.min_frozen_samples[sensor_index]
 
 
 @kernel
@@ -183,9 +183,9 @@ def update_cleared_sensors(monitor, readings):
     is_within_jump_window = since_alarm_s < FLOW_JUMP_WINDOW_AFTER_ALARM_S - TIME_ROUNDING_S
     if is_within_jump_window and flow_reading_jumped(monitor, readings):
         clear_accelerometers(monitor)
-    sum_flow_residuals(monitor, readings)
-    flow_sensor = flow_sensor_of_test(alarm_test_index)
-    if is_frozen(monitor, flow_sensor) or (
+    update_flow_evidence_since_alarm(monitor, readings)
+    flow_sensor_index = flow_sensor_index_of_test(alarm_test_index)
+    if is_frozen(monitor, flow_sensor_index) or (
         alarm_test_index == SPEED_TEST and memory.tests_exceeded_since_alarm[DENSITY_TEST]
     ):
         clear_accelerometers(monitor)
@@ -197,7 +197,7 @@ def update_cleared_sensors(monitor, readings):
         or residual_sum_exceeds_reading_range(monitor)
         or flow_sensor_error_would_exceed_other_test(monitor, readings)
     ):
-        memory.is_cleared[flow_sensor] = 1
+        memory.is_cleared[flow_sensor_index] = 1
 
 
 @kernel
@@ -211,38 +211,43 @@ def flow_reading_jumped(monitor, readings):
     """Whether the residual exceeds any jump of an accelerometer in one sample, and the flow sensor's reading
     jumps with it."""
     alarm_test_index, redundancy, memory = monitor.output.alarm_test_index, monitor.redundancy, monitor.memory
-    flow_sensor = flow_sensor_of_test(alarm_test_index)
+    flow_sensor_index = flow_sensor_index_of_test(alarm_test_index)
     previous_reading = redundancy.memory.previous_reading
     alarm_test = redundancy.test[alarm_test_index]
     # residual for a velocity error of 1 m/s, and for an acceleration error of 1 m/s2 in one sample
     residual_per_velocity_error = (
-        1.0 if alarm_test_index == SPEED_TEST else 1.0 / max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+        1.0
+        if alarm_test_index == SPEED_TEST
+        else 1.0 / max(previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     )
     residual_per_acceleration_error = redundancy.config.sample_time_s * residual_per_velocity_error
     reading_second_difference = (
-        readings[flow_sensor]
-        - 2.0 * previous_reading[flow_sensor]
-        + memory.reading_two_samples_ago[flow_sensor]
+        readings[flow_sensor_index]
+        - 2.0 * previous_reading[flow_sensor_index]
+        + memory.reading_two_samples_ago[flow_sensor_index]
     )
     min_reading_jump = MIN_READING_JUMP_PER_RESIDUAL * abs(alarm_test.residual)
-    max_accelerometer_effect = (
+    max_accelerometer_jump_effect = (
         ADAMS_BASHFORTH_WEIGHT * memory.fading_max_accelerometer_jump * residual_per_acceleration_error
     )
     return (
         abs(alarm_test.residual)
         > alarm_test.filtered_bound[0] + MIN_FAULTY_FORCE_JUMP_M_S2 * residual_per_acceleration_error
-        and abs(reading_second_difference) >= min_reading_jump > max_accelerometer_effect
+        and abs(reading_second_difference) >= min_reading_jump > max_accelerometer_jump_effect
     )
 
 
 @kernel
-def sum_flow_residuals(monitor, readings):
+def update_flow_evidence_since_alarm(monitor, readings):
     """Add up, after the sample of the alarm, the residuals of the flow (3,), the part of sound sensors and
     that of an error that a reading has had from the start; and find the range of each reading."""
     redundancy, memory, initial_errors = monitor.redundancy, monitor.memory, monitor.initial_errors
     config = redundancy.config
     for j in range(3):
-        flow_reading, test = readings[flow_sensor_of_test(SPEED_TEST + j)], redundancy.test[SPEED_TEST + j]
+        flow_reading, test = (
+            readings[flow_sensor_index_of_test(SPEED_TEST + j)],
+            redundancy.test[SPEED_TEST + j],
+        )
         if memory.n_samples_since_alarm == 0:
             memory.min_flow_reading_since_alarm[j] = memory.max_flow_reading_since_alarm[j] = flow_reading
             memory.flow_bound_sum_since_alarm[j] = (  # noise of the first and of the last sample
@@ -285,14 +290,14 @@ def residual_sum_exceeds_reading_range(monitor):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     memory, j = monitor.memory, monitor.output.alarm_test_index - SPEED_TEST
     reading_range = memory.max_flow_reading_since_alarm[j] - memory.min_flow_reading_since_alarm[j]
-    max_explained_residual_sum = (
+    max_residual_sum_without_new_error = (
         memory.flow_bound_sum_since_alarm[j] + memory.initial_error_effect_sum_since_alarm[j]
     )
     return (
         reading_range > 0.0
         and abs(memory.flow_residual_sum_since_alarm[j])
         > MIN_RESIDUAL_SUM_PER_READING_RANGE * reading_range
-        + MIN_EFFECT_OVER_BOUND_TO_CLEAR * max_explained_residual_sum
+        + MIN_EFFECT_OVER_BOUND_TO_CLEAR * max_residual_sum_without_new_error
     )
 
 
@@ -315,7 +320,7 @@ def flow_sensor_error_would_exceed_other_test(monitor, readings):
             expected_residual = (
                 2.0
                 * (abs(speed_test.filtered_residual[m]) - speed_test.filtered_bound[m])
-                / max(readings[AIRSPEED], MIN_AIRSPEED_MPS)
+                / max(readings[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
             )
             expected_residual *= 1.0 - min(initial_errors.error_bound_at_alarm[flow_hypothesis_index], 1.0)
         if expected_residual > MIN_EFFECT_OVER_BOUND_TO_CLEAR * (
@@ -336,7 +341,7 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     flow_bound_sum_since_alarm = memory.flow_bound_sum_since_alarm
     alpha = previous_reading[ALPHA]
     beta = previous_reading[BETA]
-    V = max(previous_reading[AIRSPEED], MIN_AIRSPEED_MPS)
+    V = max(previous_reading[AIRSPEED], AIRSPEED_DIVISOR_FLOOR_MPS)
     # m/s: along the flow, across it downwards and sideways; then along the flow's projection on the plane of
     # symmetry
     spurious_velocity_along_flow = flow_residual_sum_since_alarm[0]
@@ -361,13 +366,13 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
     spurious_velocity_bound_if_healthy = flow_bound_sum_since_alarm[0] + V * (
         flow_bound_sum_since_alarm[1] + flow_bound_sum_since_alarm[2]
     )  # m/s, of sound sensors
-    frozen_accelerometer = NO_SENSOR
+    frozen_accelerometer_index = NO_SENSOR
     for i in range(3):
         largest_component_magnitude = max(largest_component_magnitude, abs(spurious_velocity[i]))
-        frozen_accelerometer = AX + i if is_frozen(monitor, AX + i) else frozen_accelerometer
+        frozen_accelerometer_index = AX + i if is_frozen(monitor, AX + i) else frozen_accelerometer_index
     for i in range(AX, N_IN_EQUATIONS):
-        may_be_cause = frozen_accelerometer == i or (
-            frozen_accelerometer < 0
+        may_be_cause = frozen_accelerometer_index == i or (
+            frozen_accelerometer_index < 0
             and abs(spurious_velocity[i - AX]) + spurious_velocity_bound_if_healthy
             >= MIN_SHARE_OF_LARGEST_VELOCITY_COMPONENT * largest_component_magnitude
         )
@@ -375,7 +380,7 @@ def suspect_accelerometers(monitor, gyro_explains_residual):
 
 
 @kernel
-def mark_accelerometers_unusable(monitor, measured):
+def disable_accelerometers_if_suspect(monitor, measured):
     """Mark the accelerometers as unusable once one of them may be broken."""
     for i in range(AX, N_IN_EQUATIONS):
         if monitor.output.is_reading_unused[i] or (monitor.output.alarmed and monitor.output.is_suspect[i]):
@@ -389,16 +394,16 @@ MIN_SHARE_OF_LARGEST_RESIDUAL = 0.03
 START_STAGE_SHOWING_GYRO_ERROR_CHANGE = 3
 MIN_SURFACE_ALARM_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_ERROR_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
-VANE_ESTIMATE_TIME_CONSTANT_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
+VANE_ESTIMATE_RETURN_TO_TRIM_TIME_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
 INITIAL_RATE_ESTIMATE_POLE_INDEX = 1
 
 # Gyro or attitude (judge_gyro_errors)
 RATE_DAMPING_RELATIVE_TOLERANCE = 0.2  # relative error of the damping away from trim, of W
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
-MAX_INNOVATION_PER_GYRO_ERROR_PER_S = 10.0
+MAX_INNOVATION_TO_GYRO_ERROR_RATIO_PER_S = 10.0
 GYRO_JUMP_TOLERANCE_SHARE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_FOLLOWED_GYRO_ERROR_SHARE = 0.7  # of a gyro's error, which W shows
+MIN_GYRO_ERROR_SHARE_IN_ESTIMATE = 0.7  # of a gyro's error, which W shows
 N_NOISY_SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
 MIN_TRANSIENT_NOISE_RATIO = (
     2.0  # of the size of a transient to the bound on noise: else noise may be all of it
@@ -414,12 +419,12 @@ FLOW_BOUND_FACTOR_FOR_FULLY_ACTING_GYRO = 2.0
 
 @kernel
 def check_sensors_and_replace_readings(
-    monitor, prediction, measured, surface_conclusion, filter_bank, bound_record, dt, t
+    monitor, acceleration_prediction, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
 ):
     """Test the sensors at t s, and replace in `measured` the readings of broken ones.
 
-    filter_bank: detection filters, with the innovation of the elapsed frame, of dt s; bound_record: with the
-    bound on that innovation. surface_conclusion: about the surfaces, so far.
+    detection_filter_bank: with the innovation of the elapsed frame, of dt s; bound_record: with the bound on
+    that innovation. surface_conclusion: about the surfaces, so far.
     """
     redundancy, initial_errors, readings = monitor.redundancy, monitor.initial_errors, measured.signal
     memory = monitor.memory
@@ -427,13 +432,13 @@ def check_sensors_and_replace_readings(
         begin_monitor(monitor, measured, t)
         return
     if memory.substep == 0:
-        update_gyro_error_estimate(monitor, filter_bank.output.innovation, bound_record.eta_bar, dt)
+        update_gyro_error_estimate(monitor, detection_filter_bank.output.innovation, bound_record.eta_bar, dt)
     run_redundancy_tests(redundancy, readings, monitor.config.has_engine_sensors)
     if N_TESTS > N_TESTS_WITH_EQUATION:
         compare_duplicate_sensors(redundancy, readings, measured.fresh)
-        latch_agreeing_duplicates(monitor, measured.fresh)
+        latch_duplicates_agreeing_before_alarm(monitor, measured.fresh)
     update_initial_error_bounds(redundancy, initial_errors, readings)
-    count_identical_samples_and_find_jump(monitor, readings)
+    update_identical_counts_and_max_jump(monitor, readings)
     if memory.substep == 0:
         memory.previous_apparent_gyro_error[:], memory.earlier_substep_gyro_error_peak[:] = (
             memory.apparent_gyro_error,
@@ -454,12 +459,12 @@ def check_sensors_and_replace_readings(
     if memory.start_stage < START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
         advance_start_stage_and_widen_gyro_error_bound(monitor)
     if monitor.config.attitude_is_noisy:
-        rule_out_gyros_if_dynamics_and_attitude_differ(monitor)
+        update_turn_difference_and_rule_out_gyros(monitor)
     raise_alarm_and_isolate_broken_sensor(
-        monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t
+        monitor, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
     )
-    replace_isolated_readings(monitor, prediction, measured)
-    mark_accelerometers_unusable(monitor, measured)
+    replace_isolated_and_missing_readings(monitor, acceleration_prediction, measured)
+    disable_accelerometers_if_suspect(monitor, measured)
     memory.reading_two_samples_ago[:] = redundancy.memory.previous_reading
     store_sample(redundancy, readings, measured.force)
     memory.substep = (memory.substep + 1) % monitor.config.substeps
@@ -502,23 +507,25 @@ def update_gyro_error_estimate(monitor, innovation, eta_bar, dt):
     memory, D = monitor.memory, monitor.config.rate_damping_per_s
     gyro_error = memory.gyro_error_estimate
     gyro_error_bound = memory.gyro_error_estimate_bound
-    previous_gyro_error = memory.previous_gyro_error_estimate
-    previous_gyro_error_bound = memory.previous_gyro_error_estimate_bound
-    previous_gyro_error_bound[:] = gyro_error_bound
-    previous_gyro_error[:] = gyro_error
+    previous_frame_gyro_error = memory.previous_gyro_error_estimate
+    previous_frame_gyro_error_bound = memory.previous_gyro_error_estimate_bound
+    previous_frame_gyro_error_bound[:] = gyro_error_bound
+    previous_frame_gyro_error[:] = gyro_error
     for i in range(3):
-        damping_deceleration, bound_growth_by_damping = 0.0, 0.0
+        damping_deceleration, bound_growth_rate_from_damping = 0.0, 0.0
         for j in range(3):
-            damping_deceleration += D[i, j] * previous_gyro_error[j]
-            bound_growth_by_damping += (-D[i, j] if i == j else abs(D[i, j])) * previous_gyro_error_bound[j]
+            damping_deceleration += D[i, j] * previous_frame_gyro_error[j]
+            bound_growth_rate_from_damping += (
+                -D[i, j] if i == j else abs(D[i, j])
+            ) * previous_frame_gyro_error_bound[j]
         gyro_error[i] += dt * (innovation[i] - damping_deceleration)
         gyro_error_bound[i] = max(
-            previous_gyro_error_bound[i] + dt * (eta_bar[i] + bound_growth_by_damping), 0.0
+            previous_frame_gyro_error_bound[i] + dt * (eta_bar[i] + bound_growth_rate_from_damping), 0.0
         )
 
 
 @kernel
-def rule_out_gyros_if_dynamics_and_attitude_differ(monitor):
+def update_turn_difference_and_rule_out_gyros(monitor):
     """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
     Where the attitude is noisy, a surface is isolated only after that.
@@ -526,9 +533,9 @@ def rule_out_gyros_if_dynamics_and_attitude_differ(monitor):
     memory, config = monitor.memory, monitor.redundancy.config
     for i in range(3):
         test = monitor.redundancy.test[FIRST_TURN_TEST + i]
-        estimate_error_bound = memory.gyro_error_estimate_bound[i] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(
-            memory.gyro_error_estimate[i]
-        )
+        gyro_estimate_error_bound = memory.gyro_error_estimate_bound[
+            i
+        ] + RATE_DAMPING_RELATIVE_TOLERANCE * abs(memory.gyro_error_estimate[i])
         for m, decay in enumerate(config.filter_decay):
             memory.filtered_turn_difference[i, m] = (
                 decay * memory.filtered_turn_difference[i, m]
@@ -536,7 +543,10 @@ def rule_out_gyros_if_dynamics_and_attitude_differ(monitor):
                 + config.sample_time_s * memory.gyro_error_estimate[i]
             )
             memory.filtered_turn_difference_bound[i, m] = advance_residual_bound(
-                memory.filtered_turn_difference_bound[i, m], estimate_error_bound, decay, config.sample_time_s
+                memory.filtered_turn_difference_bound[i, m],
+                gyro_estimate_error_bound,
+                decay,
+                config.sample_time_s,
             )
             if (
                 abs(memory.filtered_turn_difference[i, m])
@@ -547,39 +557,39 @@ def rule_out_gyros_if_dynamics_and_attitude_differ(monitor):
 
 @kernel
 def raise_alarm_and_isolate_broken_sensor(
-    monitor, measured, surface_conclusion, filter_bank, bound_record, dt, t
+    monitor, measured, surface_conclusion, detection_filter_bank, bound_record, dt, t
 ):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
     output, memory = monitor.output, monitor.memory
-    find_worst_test(monitor)
+    update_worst_test_of_frame(monitor)
     if output.isolated_sensor != NO_SENSOR:
         return
     for i in range(N_SENSORS):
         if measured.missing[i] and output.isolated_sensor == NO_SENSOR:
-            raise_alarm(monitor, surface_conclusion, t)
+            raise_alarm_and_judge_surface_conclusion(monitor, surface_conclusion, t)
             isolate_sensor(monitor, i, t)
     if output.isolated_sensor != NO_SENSOR:
         return
     if output.worst_residual_bound_ratio > 1.0 and not output.alarmed:
-        raise_alarm(monitor, surface_conclusion, t)
+        raise_alarm_and_judge_surface_conclusion(monitor, surface_conclusion, t)
         output.alarm_test_index = output.worst_test_index
         store_error_bounds_at_alarm(monitor.initial_errors)
     if output.alarmed:
         if memory.substep == 0 and memory.start_stage == START_STAGE_SHOWING_GYRO_ERROR_CHANGE:
-            judge_gyro_errors(monitor, filter_bank, bound_record, dt)
-        latch_exceeded_tests(monitor)
+            judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt)
+        latch_exceeded_tests_and_refutations(monitor)
         update_cleared_sensors(monitor, measured.signal)
         find_suspects(monitor)
-        n_suspects, last_suspect = 0, NO_SENSOR
+        n_suspects, last_suspect_index = 0, NO_SENSOR
         for i in range(N_SENSORS):
             if output.is_suspect[i]:
-                n_suspects, last_suspect = n_suspects + 1, i
+                n_suspects, last_suspect_index = n_suspects + 1, i
         if n_suspects == 1:
-            isolate_sensor(monitor, last_suspect, t)
+            isolate_sensor(monitor, last_suspect_index, t)
 
 
 @kernel
-def find_worst_test(monitor):
+def update_worst_test_of_frame(monitor):
     """Find the test with the largest ratio of residual to bound, of the samples of this frame."""
     output = monitor.output
     if monitor.memory.substep == 0:
@@ -593,7 +603,7 @@ def find_worst_test(monitor):
 
 
 @kernel
-def raise_alarm(monitor, surface_conclusion, t):
+def raise_alarm_and_judge_surface_conclusion(monitor, surface_conclusion, t):
     """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
     and stays detected. Otherwise the conclusion about surfaces is void."""
     output = monitor.output
@@ -610,14 +620,14 @@ def raise_alarm(monitor, surface_conclusion, t):
 
 
 @kernel
-def isolate_sensor(monitor, sensor, t):
+def isolate_sensor(monitor, sensor_index, t):
     """Isolate a sensor at t s."""
-    monitor.output.isolated_sensor, monitor.output.isolated_at_s = sensor, t
-    monitor.output.is_reading_unused[sensor] = 1
+    monitor.output.isolated_sensor, monitor.output.isolated_at_s = sensor_index, t
+    monitor.output.is_reading_unused[sensor_index] = 1
 
 
 @kernel
-def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
+def judge_gyro_errors(monitor, detection_filter_bank, bound_record, dt):
     """Decide, by axis, whether the error that the attitude shows is a gyro's, once that is certain.
 
         the innovation changes as by this jump of the gyro   the dynamics show an error   verdict
@@ -629,16 +639,16 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
     A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
     a gyro stays, and one that varies is not as small in every sample.
     """
-    memory, innovation = monitor.memory, filter_bank.output.innovation
-    alarm_axis = bank_alarm_axis(filter_bank)
+    memory, innovation = monitor.memory, detection_filter_bank.output.innovation
+    filter_bank_alarm_axis = bank_alarm_axis(detection_filter_bank)
     for i in range(3):
         if memory.gyro_error_verdict[i] != GYRO_ERROR_UNDECIDED:
             continue
         gyro_error_by_attitude = memory.apparent_gyro_error[i]
-        previous_gyro_error_by_attitude = memory.previous_apparent_gyro_error[i]
-        jump_acceleration = (gyro_error_by_attitude - previous_gyro_error_by_attitude) / dt  # rad/s2
-        jump_acceleration_tolerance = MAX_INNOVATION_PER_GYRO_ERROR_PER_S * max(
-            abs(gyro_error_by_attitude), abs(previous_gyro_error_by_attitude)
+        previous_frame_gyro_error_by_attitude = memory.previous_apparent_gyro_error[i]
+        jump_acceleration = (gyro_error_by_attitude - previous_frame_gyro_error_by_attitude) / dt  # rad/s2
+        jump_acceleration_tolerance = MAX_INNOVATION_TO_GYRO_ERROR_RATIO_PER_S * max(
+            abs(gyro_error_by_attitude), abs(previous_frame_gyro_error_by_attitude)
         ) + GYRO_JUMP_TOLERANCE_SHARE * abs(jump_acceleration)
         attitude_rate_noise_bound = (  # of gyro_error_by_attitude, rad/s, by the attitude's noise
             N_NOISY_SAMPLES_IN_JUMP
@@ -646,36 +656,36 @@ def judge_gyro_errors(monitor, filter_bank, bound_record, dt):
             / monitor.redundancy.config.sample_time_s
         )
         innovation_bound = bound_record.frame_innovation_bound[i] + RATE_ROUNDING
-        dynamics_show_error = (
+        dynamics_show_any_error = (
             abs(innovation[i]) > innovation_bound
-            or alarm_axis >= 0
+            or filter_bank_alarm_axis >= 0
             or abs(memory.gyro_error_estimate[i]) > memory.gyro_error_estimate_bound[i] + RATE_ROUNDING
         )
-        transient_peak = memory.earlier_substep_gyro_error_peak[i]
-        remaining_peak = max(
-            abs(previous_gyro_error_by_attitude),
+        earlier_gyro_error_peak = memory.earlier_substep_gyro_error_peak[i]
+        later_gyro_error_peak = max(
+            abs(previous_frame_gyro_error_by_attitude),
             memory.previous_substep_gyro_error_peak[i],
             abs(gyro_error_by_attitude),
         )
-        is_transient = (
-            remaining_peak < MAX_REMAINING_TRANSIENT_SHARE * transient_peak
-            and transient_peak > MIN_TRANSIENT_NOISE_RATIO * attitude_rate_noise_bound
+        gyro_error_is_transient = (
+            later_gyro_error_peak < MAX_REMAINING_TRANSIENT_SHARE * earlier_gyro_error_peak
+            and earlier_gyro_error_peak > MIN_TRANSIENT_NOISE_RATIO * attitude_rate_noise_bound
         )
         innovation_fits_gyro_jump = (
             abs(innovation[i] - jump_acceleration)
             <= innovation_bound + jump_acceleration_tolerance + attitude_rate_noise_bound / dt
         )
-        dynamics_may_follow_gyro_error = (
-            MIN_FOLLOWED_GYRO_ERROR_SHARE * abs(gyro_error_by_attitude)
+        estimate_may_contain_gyro_error = (
+            MIN_GYRO_ERROR_SHARE_IN_ESTIMATE * abs(gyro_error_by_attitude)
             <= memory.gyro_error_estimate_bound[i]
             + abs(memory.gyro_error_estimate[i])
             + attitude_rate_noise_bound
         )
         if not innovation_fits_gyro_jump or (
-            not dynamics_show_error and (is_transient or not dynamics_may_follow_gyro_error)
+            not dynamics_show_any_error and (gyro_error_is_transient or not estimate_may_contain_gyro_error)
         ):
             memory.gyro_error_verdict[i] = GYRO_ERROR_REFUTED
-        elif dynamics_show_error:
+        elif dynamics_show_any_error:
             memory.gyro_error_verdict[i] = GYRO_ERROR_CONFIRMED
 
 
@@ -696,7 +706,7 @@ def exceeds_bound_beyond_cross_coupling(monitor, test_index, first_test_index):
 
 
 @kernel
-def latch_exceeded_tests(monitor):
+def latch_exceeded_tests_and_refutations(monitor):
     """Record the tests that have exceeded their bounds since the alarm."""
     redundancy, tests_exceeded_since_alarm = monitor.redundancy, monitor.memory.tests_exceeded_since_alarm
     for test_index in range(N_TESTS):
@@ -731,32 +741,32 @@ def find_suspects(monitor):
         )  # its test need not show an error then
         is_suspect[AIRSPEED] = (
             tests_exceeded_since_alarm[SPEED_TEST] == 1
-            or not airspeed_error_would_exceed_own_test(monitor)
+            or not airspeed_error_would_exceed_speed_test(monitor)
             or airspeed_may_be_frozen
         )
-    is_suspect[QDYN] = alarm_test_index == DENSITY_TEST and is_only_exceeded_test(monitor, DENSITY_TEST)
+    is_suspect[QDYN] = alarm_test_index == DENSITY_TEST and no_other_test_exceeded(monitor, DENSITY_TEST)
     find_suspects_of_flow_test(monitor, ALPHA, ALPHA_FLOW_TEST, 1)
     find_suspects_of_flow_test(monitor, BETA, BETA_FLOW_TEST, 2)
-    is_suspect[ALTITUDE] = alarm_test_index == CLIMB_TEST and is_only_exceeded_test(monitor, CLIMB_TEST)
+    is_suspect[ALTITUDE] = alarm_test_index == CLIMB_TEST and no_other_test_exceeded(monitor, CLIMB_TEST)
     is_suspect[ENGINE_SPEED] = alarm_test_index == RPM_TEST
     is_suspect[MANIFOLD] = alarm_test_index == MANIFOLD_PRESSURE_TEST
     suspect_is_frozen = any_suspect_is_frozen(monitor)
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        if not suspect_is_frozen and initial_error_explains_alarm(
+        if not suspect_is_frozen and initial_error_explains_exceeded_tests(
             monitor.initial_errors, i, alarm_test_index
         ):
             is_suspect[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
 
 
 @kernel
-def latch_agreeing_duplicates(monitor, is_fresh):
+def latch_duplicates_agreeing_before_alarm(monitor, is_fresh_by_sampled_sensor):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
     for duplicate_index in range(DUPLICATE_SENSOR_INDEX.size):
         agrees_with_duplicate = (
             monitor.redundancy.test[N_TESTS_WITH_EQUATION + duplicate_index].residual_bound_ratio <= 1.0
         )
         if (
-            is_fresh[DUPLICATE_SENSOR_INDEX[duplicate_index] - N_IN_EQUATIONS]
+            is_fresh_by_sampled_sensor[DUPLICATE_SENSOR_INDEX[duplicate_index] - N_IN_EQUATIONS]
             and agrees_with_duplicate
             and not monitor.output.alarmed
         ):
@@ -795,7 +805,7 @@ def suspect_disagreeing_sensors(monitor, duplicate_index):
 
 
 @kernel
-def is_only_exceeded_test(monitor, test_index):
+def no_other_test_exceeded(monitor, test_index):
     """Whether no other test has exceeded its bound: the sensor of this one takes part in no other."""
     for other_test_index in range(RPM_TEST):
         if other_test_index != test_index and monitor.memory.tests_exceeded_since_alarm[other_test_index]:
@@ -875,16 +885,18 @@ def gyro_error_may_be_hidden(monitor, flow_test_index, gyro_index, acts_fully_on
 
 
 @kernel
-def airspeed_error_would_exceed_own_test(monitor):
+def airspeed_error_would_exceed_speed_test(monitor):
     """Whether the airspeed error that the density shows would exceed the bound of the airspeed's own test."""
     density_test, speed_test = monitor.redundancy.test[DENSITY_TEST], monitor.redundancy.test[SPEED_TEST]
     max_airspeed_reading_over_truth = 1.0 + monitor.initial_errors.error_bound_at_alarm[AIRSPEED_HYPOTHESIS]
     for m in range(density_test.filtered_residual.size):
-        unexplained_residual = abs(density_test.filtered_residual[m]) - max_error_effect_at_alarm(
-            monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m
-        )
+        residual_beyond_initial_error_effect = abs(
+            density_test.filtered_residual[m]
+        ) - max_error_effect_at_alarm(monitor.initial_errors, AIRSPEED_HYPOTHESIS, DENSITY_TEST, m)
         # a relative change of the airspeed changes log(density) by twice as much
-        airspeed_error_mps = 0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * unexplained_residual
+        airspeed_error_mps = (
+            0.5 * monitor.redundancy.memory.previous_reading[AIRSPEED] * residual_beyond_initial_error_effect
+        )
         if (
             airspeed_error_mps
             > MAX_HIDDEN_ERROR_PER_TEST_BOUND * max_airspeed_reading_over_truth * speed_test.filtered_bound[m]
@@ -912,7 +924,7 @@ def suspect_gyros_and_attitude(monitor):
             no_other_axis_exceeded and gyro_error_verdict[i] != GYRO_ERROR_REFUTED and not any_angle_is_frozen
         )
         angle_explains_turning = angle_error_explains_turn_tests(monitor, i)
-        may_be_only_this_angle = no_other_angle_test_exceeded(monitor, i) and (
+        may_be_only_this_angle = angle_error_explains_other_angle_tests(monitor, i) and (
             tests_exceeded_since_alarm[FIRST_ANGLE_TEST + i] == 1 or angle_explains_turning
         )
         angle_may_be_wrong = (
@@ -927,7 +939,7 @@ def suspect_gyros_and_attitude(monitor):
 
 
 @kernel
-def no_other_angle_test_exceeded(monitor, angle_index):
+def angle_error_explains_other_angle_tests(monitor, angle_index):
     """Whether no test of another angle (0, 1, 2: phi, theta, psi) shows an error that one of this angle from
     the start does not explain."""
     for j in range(3):
@@ -994,7 +1006,7 @@ def allows_surface_isolation(monitor, surface_alarm_is_from_earlier_frame):
     return (
         surface_alarm_is_from_earlier_frame == 1
         and (monitor.memory.gyros_excluded == 1 or not monitor.config.attitude_is_noisy)
-        and not flow_sensor_is_frozen(monitor)
+        and not any_flow_sensor_is_frozen(monitor)
     )
 
 
@@ -1006,7 +1018,7 @@ def surface_alarm_may_be_initial_error(monitor, detected_at_s):
 
 
 @kernel
-def flow_sensor_is_frozen(monitor):
+def any_flow_sensor_is_frozen(monitor):
     """Whether a flow sensor is frozen: a surface that moves the aircraft moves its reading. In symmetric
     flight a sideslip of zero stays zero."""
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
@@ -1022,7 +1034,7 @@ def has_alarm(monitor):
 
 
 @kernel
-def replace_isolated_readings(monitor, prediction, measured):
+def replace_isolated_and_missing_readings(monitor, acceleration_prediction, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: then none of them is used."""
     readings, any_reading_replaced, slipstream_input_replaced = measured.signal, False, False
@@ -1030,7 +1042,7 @@ def replace_isolated_readings(monitor, prediction, measured):
         if measured.missing[i]:
             monitor.output.is_reading_unused[i] = 1
         if monitor.output.is_reading_unused[i] and i < AX:
-            readings[i] = estimate_reading(monitor, prediction, readings, i)
+            readings[i] = estimate_reading(monitor, acceleration_prediction, readings, i)
             any_reading_replaced = True
             slipstream_input_replaced = slipstream_input_replaced or i in (
                 AIRSPEED,
@@ -1045,29 +1057,29 @@ def replace_isolated_readings(monitor, prediction, measured):
 
 
 @kernel
-def estimate_reading(monitor, prediction, readings, sensor):
+def estimate_reading(monitor, acceleration_prediction, readings, sensor_index):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
     memory = monitor.redundancy.memory
-    if sensor < 3:
-        return estimate_rate_from_attitude(monitor, prediction, sensor)
-    if sensor in (ALPHA, BETA):
+    if sensor_index < 3:
+        return estimate_rate_from_attitude(monitor, acceleration_prediction, sensor_index)
+    if sensor_index in (ALPHA, BETA):
         return memory.predicted_reading[
-            sensor
-        ] + monitor.redundancy.config.sample_time_s / VANE_ESTIMATE_TIME_CONSTANT_S * (
-            monitor.config.trim_reading[sensor] - memory.predicted_reading[sensor]
+            sensor_index
+        ] + monitor.redundancy.config.sample_time_s / VANE_ESTIMATE_RETURN_TO_TRIM_TIME_S * (
+            monitor.config.trim_reading[sensor_index] - memory.predicted_reading[sensor_index]
         )
     previous_density = 2.0 * memory.previous_reading[QDYN] / memory.previous_reading[AIRSPEED] ** 2
-    if sensor == AIRSPEED:
-        return np.sqrt(max(2.0 * readings[QDYN] / previous_density, MIN_AIRSPEED_MPS**2))
-    if sensor == QDYN:
+    if sensor_index == AIRSPEED:
+        return np.sqrt(max(2.0 * readings[QDYN] / previous_density, AIRSPEED_DIVISOR_FLOOR_MPS**2))
+    if sensor_index == QDYN:
         return 0.5 * previous_density * readings[AIRSPEED] ** 2
-    if sensor >= ENGINE_SPEED:
-        return memory.commanded_engine_readings[sensor - ENGINE_SPEED]
-    return memory.predicted_reading[sensor]
+    if sensor_index >= ENGINE_SPEED:
+        return memory.commanded_engine_readings[sensor_index - ENGINE_SPEED]
+    return memory.predicted_reading[sensor_index]
 
 
 @kernel
-def estimate_rate_from_attitude(monitor, prediction, axis):
+def estimate_rate_from_attitude(monitor, acceleration_prediction, axis):
     """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
     change since.
 
@@ -1076,10 +1088,10 @@ def estimate_rate_from_attitude(monitor, prediction, axis):
     config = monitor.redundancy.config
     memory = monitor.redundancy.memory
     test = monitor.redundancy.test[FIRST_TURN_TEST + axis]
-    u = prediction.u_before if monitor.memory.substep == 0 else prediction.u
-    predicted_acceleration = prediction.f[axis]
+    u = acceleration_prediction.u_before if monitor.memory.substep == 0 else acceleration_prediction.u
+    predicted_acceleration = acceleration_prediction.f[axis]
     for s in range(u.size):
-        predicted_acceleration += prediction.G[axis, s] * u[s]
+        predicted_acceleration += acceleration_prediction.G[axis, s] * u[s]
     angle_correction = monitor.config.replaced_rate_correction_share * test.residual  # rad
     if not monitor.memory.is_rate_replaced[axis] and monitor.config.replaced_rate_correction_share < 1.0:
         angle_correction = (

@@ -344,7 +344,7 @@ def test_a_whole_look_finds_sound_instruments_sound_and_a_wrong_one_wrong(engine
     )
     redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     relations["test"]["filtered_bound_per_sample_part"] = 1e-6
-    redundancy.run_redundancy_tests(relations, signal, engine)
+    redundancy.run_tests_with_equation(relations, signal, engine)
     assert (relations["test"]["residual_bound_ratio"][:CLIMB_TEST] < 1.0).all()
     # 100 rpm too fast where 10 are declared, 0.5 inHg too low where a quarter is
     shares = relations["test"]["residual_bound_ratio"][[RPM_TEST, MANIFOLD_PRESSURE_TEST]]
@@ -358,7 +358,7 @@ def test_a_reading_that_jumps_fails_its_own_test():
     relations, signal = new_step(), reading(rates=np.zeros(3), attitude=(0, 0.1, 0))
     redundancy.store_sample(relations, signal, np.array([GRAVITY * np.sin(0.1), 0.0, -GRAVITY * np.cos(0.1)]))
     signal[ALTITUDE] += 5.0
-    redundancy.run_redundancy_tests(relations, signal, False)
+    redundancy.run_tests_with_equation(relations, signal, False)
     assert np.flatnonzero(relations["test"]["residual_bound_ratio"] > 1.0).tolist() == [CLIMB_TEST]
 
 
@@ -446,7 +446,7 @@ def test_sound_instruments_stay_within_every_bound(seed, h):
         if k == 0:
             redundancy.start_redundancy_tests(relations, reading, reading[AX:])
         else:
-            redundancy.run_redundancy_tests(relations, reading, True)
+            redundancy.run_tests_with_equation(relations, reading, True)
             redundancy.store_sample(relations, reading, reading[AX:])
         nearest = np.maximum(nearest, relations["test"]["residual_bound_ratio"])
     assert (nearest <= 1.0).all(), nearest
@@ -460,7 +460,7 @@ def test_near_the_vertical_attitude_is_not_compared_and_its_tests_begin_anew():
     shares = []
     for pitch in (1.28, 1.31, 1.28, 1.25):
         signal[THETA] = pitch
-        redundancy.run_redundancy_tests(relations, signal, False)
+        redundancy.run_tests_with_equation(relations, signal, False)
         redundancy.store_sample(relations, signal, signal[AX:])
         shares.append(relations["test"]["residual_bound_ratio"][FIRST_ANGLE_TEST + 1])
     assert shares[0] > 1.0  # 0.03 rad in a look, and no rates
@@ -516,7 +516,7 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
         if k == 0:
             redundancy.start_redundancy_tests(relations, signal, signal[AX:])
         else:
-            redundancy.run_redundancy_tests(relations, signal, False)
+            redundancy.run_tests_with_equation(relations, signal, False)
             redundancy.store_sample(relations, signal, signal[AX:])
         assert (
             relations["test"]["residual_bound_ratio"][FIRST_TURN_TEST : FIRST_TURN_TEST + 3] <= 1.0

@@ -130,7 +130,7 @@ def looks(signal, h):
     redundancy.store_sample(monitor["redundancy"], signal[0], signal[0, AX:])
     fired = np.zeros(N_TESTS, int)
     for k in range(1, len(signal)):
-        redundancy.run_redundancy_tests(monitor["redundancy"], signal[k], 0)
+        redundancy.run_tests_with_equation(monitor["redundancy"], signal[k], 0)
         initial_errors.update_initial_error_bounds(
             monitor["redundancy"], monitor["initial_errors"], signal[k]
         )

@@ -204,9 +204,9 @@ def test_the_rates_decide_between_a_gyro_and_the_attitude(say, who):
 
 def test_an_angle_shows_what_the_axis_furthest_beyond_its_bound_does():
     monitor = with_shares({FIRST_TURN_TEST: 0.2, FIRST_TURN_TEST + 1: 0.5, FIRST_TURN_TEST + 2: 0.3})
-    assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [1, 1, 1]
+    assert [watching.axis_of_worst_turn_test(monitor, i) for i in range(3)] == [1, 1, 1]
     monitor = with_shares({FIRST_TURN_TEST: 0.5, FIRST_TURN_TEST + 1: 0.5, FIRST_TURN_TEST + 2: 0.5})
-    assert [watching.axis_of_largest_turn_residual(monitor, i) for i in range(3)] == [0, 1, 2]
+    assert [watching.axis_of_worst_turn_test(monitor, i) for i in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize("known", [0, 1])

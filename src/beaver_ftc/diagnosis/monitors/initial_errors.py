@@ -110,8 +110,8 @@ SLOWEST_POLE_INDEX = 2  # index in redundancy.FILTER_POLES_PER_S
     THETA_ERROR_EFFECT_BY_GRAVITY_INDEX,  # h g cos(largest mean of reading and truth)
     # h V cos(beta) |(sin(theta), cos(phi) cos(theta))| cos(largest mean of an angle)
     ALPHA_ERROR_EFFECT_ON_CLIMB_INDEX,
-    VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX,  # h (p cos(alpha) + r sin(alpha))
-    VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX,  # h (p sin(alpha) - r cos(alpha))
+    VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX,  # h (p cos(alpha) + r sin(alpha))
+    VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX,  # h (p sin(alpha) - r cos(alpha))
     # of the effect of alpha on BETA_FLOW, of beta on ALPHA_FLOW: bound on the part of the force
     ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
     BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX,
@@ -379,8 +379,8 @@ def fill_flow_and_climb_effects(redundancy, initial_errors, V, p, q, r):
     # alpha off by e: beta' changes by x (flow_roll_rate cos(e / 2) + negative_flow_yaw_rate sin(e / 2)). beta
     # off by e: alpha' changes by x cos(e / 2) flow_roll_rate over both cosines. The part of the force, of
     # either sign, is an uncertainty of both
-    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX] = h * flow_roll_rate
-    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX] = h * negative_flow_yaw_rate
+    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX] = h * flow_roll_rate
+    signed_effect_per_unit[VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX] = h * negative_flow_yaw_rate
     signed_effect_per_unit[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = h * abs(sin_beta) * a_max / V
     signed_effect_per_unit[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX] = (
         h * np.sin(min(max_sideslip, 0.5 * np.pi)) * beta_secant * max_beta_secant * abs(a_normal) / V
@@ -521,9 +521,9 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     max_half_alpha_error = 0.5 * angle_of_chord(initial_errors.error_bound[ALPHA_HYPOTHESIS])
     min_effect_per_unit_error = (
         np.cos(max_half_alpha_error)
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX])
         - np.sin(max_half_alpha_error)
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_YAW_RATE_INDEX])
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_YAW_RATE_INDEX])
         - filtered_signed_effects_at_pole[ALPHA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(
@@ -542,7 +542,7 @@ def tighten_vane_error_bounds(redundancy, initial_errors, pole_index):
     )
     min_effect_per_unit_error = (
         np.cos(0.5 * angle_of_chord(initial_errors.error_bound[BETA_HYPOTHESIS]))
-        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_ROLL_RATE_INDEX])
+        * abs(filtered_signed_effects_at_pole[VANE_ERROR_EFFECT_BY_FLOW_ROLL_RATE_INDEX])
         - filtered_signed_effects_at_pole[BETA_EFFECT_UNCERTAINTY_BY_FORCE_INDEX]
     )
     tighten_error_bound(

@@ -252,7 +252,9 @@ def configure_sensor_monitor(
             initial_state.manifold_pressure_inhg,
         )
     configure_redundancy_tests(monitor["redundancy"]["config"], declared, scenario)
-    configure_declared_errors(monitor, declared, monitor["redundancy"]["config"]["sample_time_s"])
+    configure_error_bounds_and_frozen_limits(
+        monitor, declared, monitor["redundancy"]["config"]["sample_time_s"]
+    )
 
 
 def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Scenario) -> None:
@@ -269,8 +271,11 @@ def configure_redundancy_tests(config: np.void, declared: Declared, scenario: Sc
     config["max_vertical_wind_mps"] = declared.vertical_wind_mps
 
 
-def configure_declared_errors(monitor: np.void, declared: Declared, sample_time_s: float) -> None:
-    """Fill the declared errors of the readings; a sample is a JSBSim frame."""
+def configure_error_bounds_and_frozen_limits(
+    monitor: np.void, declared: Declared, sample_time_s: float
+) -> None:
+    """Fill the declared errors of the readings, and from how many identical samples each is frozen; a sample
+    is a JSBSim frame."""
     redundancy_config = monitor["redundancy"]["config"]
     monitor_config = monitor["config"]
     sensor_errors = declared.sensors
@@ -914,7 +919,7 @@ def start_redundancy_tests(redundancy, readings, specific_force):
 
 
 @kernel
-def run_redundancy_tests(redundancy, readings, has_engine_sensors):
+def run_tests_with_equation(redundancy, readings, has_engine_sensors):
     """Compare this sample of the readings (N_SENSORS,) with the one before."""
     config, memory = redundancy.config, redundancy.memory
     memory.attitude_drift_bound_rad += config.sample_time_s * config.attitude_drift_rad_s

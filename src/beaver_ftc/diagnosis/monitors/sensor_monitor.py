@@ -96,7 +96,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     UNREACHABLE_FROZEN_SAMPLES,
     body_turn_per_euler_angle,
     compare_duplicate_sensors,
-    run_redundancy_tests,
+    run_tests_with_equation,
     set_attitude_drift_bound,
     start_redundancy_tests,
     store_sample,
@@ -433,7 +433,7 @@ def check_sensors_and_replace_readings(
         return
     if memory.substep == 0:
         update_gyro_error_estimate(monitor, detection_filter_bank.output.innovation, bound_record.eta_bar, dt)
-    run_redundancy_tests(redundancy, readings, monitor.config.has_engine_sensors)
+    run_tests_with_equation(redundancy, readings, monitor.config.has_engine_sensors)
     if N_TESTS > N_TESTS_WITH_EQUATION:
         compare_duplicate_sensors(redundancy, readings, measured.fresh)
         latch_duplicates_agreeing_before_alarm(monitor, measured.fresh)
@@ -750,9 +750,9 @@ def find_suspects(monitor):
     is_suspect[ALTITUDE] = alarm_test_index == CLIMB_TEST and no_other_test_exceeded(monitor, CLIMB_TEST)
     is_suspect[ENGINE_SPEED] = alarm_test_index == RPM_TEST
     is_suspect[MANIFOLD] = alarm_test_index == MANIFOLD_PRESSURE_TEST
-    suspect_is_frozen = any_suspect_is_frozen(monitor)
+    has_frozen_suspect = any_suspect_is_frozen(monitor)
     for i in range(N_INITIAL_ERROR_HYPOTHESES):
-        if not suspect_is_frozen and initial_error_explains_exceeded_tests(
+        if not has_frozen_suspect and initial_error_explains_exceeded_tests(
             monitor.initial_errors, i, alarm_test_index
         ):
             is_suspect[(ALPHA, BETA, AIRSPEED, PHI, THETA)[i]] = 1
@@ -929,7 +929,7 @@ def suspect_gyros_and_attitude(monitor):
         )
         angle_may_be_wrong = (
             may_be_only_this_angle
-            and gyro_error_verdict[axis_of_largest_turn_residual(monitor, i)] != GYRO_ERROR_CONFIRMED
+            and gyro_error_verdict[axis_of_worst_turn_test(monitor, i)] != GYRO_ERROR_CONFIRMED
         )
         n_identical_samples = memory.n_identical_samples[PHI + i]
         min_frozen_samples = monitor.config.min_frozen_samples[PHI + i]
@@ -984,7 +984,7 @@ def angle_error_explains_turn_tests(monitor, angle_index):
 
 
 @kernel
-def axis_of_largest_turn_residual(monitor, default_axis):
+def axis_of_worst_turn_test(monitor, default_axis):
     """The body axis (0, 1, 2) whose test of turning has the largest ratio of residual to bound; default_axis
     if none is larger than its own."""
     axis, tests = default_axis, monitor.redundancy.test
@@ -1061,7 +1061,7 @@ def estimate_reading(monitor, acceleration_prediction, readings, sensor_index):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
     memory = monitor.redundancy.memory
     if sensor_index < 3:
-        return estimate_rate_from_attitude(monitor, acceleration_prediction, sensor_index)
+        return estimate_rate_and_mark_replaced(monitor, acceleration_prediction, sensor_index)
     if sensor_index in (ALPHA, BETA):
         return memory.predicted_reading[
             sensor_index
@@ -1079,7 +1079,7 @@ def estimate_reading(monitor, acceleration_prediction, readings, sensor_index):
 
 
 @kernel
-def estimate_rate_from_attitude(monitor, acceleration_prediction, axis):
+def estimate_rate_and_mark_replaced(monitor, acceleration_prediction, axis):
     """Body rate about an axis (0, 1, 2), rad/s: that of the attitude by the sample before, and the model's
     change since.
 

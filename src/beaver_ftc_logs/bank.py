@@ -57,7 +57,7 @@ class HypothesisBank(NamedTuple):
     response_share_scaled_by_group_gain: Floats
 
     @property
-    def no_response_index(self) -> int:
+    def no_response_hypothesis_index(self) -> int:
         """Index of the hypothesis that nothing answers the commands: on the ground, or everything lost."""
         return len(self.hypothesis_kind) - 1
 
@@ -249,7 +249,7 @@ def build_trim_and_gain_state_model(model: Model) -> TrimAndGainStateModel:
     )
     deviation_retention = np.exp(-1.0 / (model.rate_hz * return_times_s))
     random_walk_variance = (1.0 - deviation_retention**2) * np.diag(initial_covariance)
-    random_walk_variance[:3] = residual_variance * np.array(settings.trim_random_walk_sd) ** 2
+    random_walk_variance[:3] = residual_variance * np.array(settings.trim_walk_sd_per_sample) ** 2
     max_deviation_in_sd = np.array(
         [settings.max_trim_deviation_in_sd] * 3 + [settings.max_gain_deviation_in_sd] * (1 + n_groups)
     )

@@ -95,7 +95,7 @@ def diagnose(samples: Samples, model: Model) -> DiagnosisRows:
     bank = build_hypothesis_bank(model)
     samples_without_frozen_or_clipped_rates = trust.with_rates_unknown_where_frozen_or_clipped(samples, model)
     posterior, _, _ = hypothesis_posterior(samples_without_frozen_or_clipped_rates, model, bank)
-    has_no_response = posterior[:, bank.no_response_index] > _MAX_NO_RESPONSE_PROBABILITY
+    has_no_response = posterior[:, bank.no_response_hypothesis_index] > _MAX_NO_RESPONSE_PROBABILITY
     rows = diagnosis_rows_from_posterior(samples, model, bank, posterior)
     if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
         rows = _withdraw_contradicted_isolation(
@@ -270,10 +270,10 @@ def diagnosis_rows_from_posterior(
     samples: Samples, model: Model, bank: HypothesisBank, posterior: Floats
 ) -> DiagnosisRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
-    no_response_probability = posterior[:, bank.no_response_index]
+    no_response_probability = posterior[:, bank.no_response_hypothesis_index]
     fault_probability = posterior[:, bank.is_fault_hypothesis].sum(axis=1)
     posterior_given_response = (
-        posterior[:, : bank.no_response_index]
+        posterior[:, : bank.no_response_hypothesis_index]
         / np.maximum(1.0 - no_response_probability, MIN_DIVISOR)[:, None]
     )
     is_health_or_no_response_likelier = posterior[:, 0] + no_response_probability > 0.5
@@ -339,7 +339,7 @@ def _group_effectiveness_and_bounds(
         level_probability = (
             level_probability
             / _group_level_distribution(
-                bank, bank.prior_probability[None, : bank.no_response_index], group_index
+                bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], group_index
             )[1]
         )
         level_probability /= level_probability.sum(axis=1, keepdims=True)
@@ -375,7 +375,7 @@ def _group_level_distribution(
 ) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
     levels, level_index_of_hypothesis = np.unique(
-        bank.effectiveness[: bank.no_response_index, group_index], return_inverse=True
+        bank.effectiveness[: bank.no_response_hypothesis_index, group_index], return_inverse=True
     )
     level_probability = np.zeros((len(probability_given_response), len(levels)))
     for hypothesis_index, level_index in enumerate(level_index_of_hypothesis):

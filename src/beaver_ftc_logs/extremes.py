@@ -103,9 +103,9 @@ def _excess_overdispersion(excesses_and_hours_by_flight: Sequence[PeaksAndHours]
     """Chi-square per degree of freedom of the sums of excess of the held-out flights, at least 1. A sum of
     exponential excesses at Poisson times has twice the variance that their number alone would give."""
     excess_sum_by_flight = np.array([excesses.sum() for excesses, _ in excesses_and_hours_by_flight])
-    hours = np.array([hours for _, hours in excesses_and_hours_by_flight])
+    hours_by_flight = np.array([hours for _, hours in excesses_and_hours_by_flight])
     n_peaks_over_level = sum(len(excesses) for excesses, _ in excesses_and_hours_by_flight)
-    hours_share_by_flight = hours / hours.sum()
+    hours_share_by_flight = hours_by_flight / hours_by_flight.sum()
     if len(excesses_and_hours_by_flight) < 2 or excess_sum_by_flight.sum() <= 0.0:
         return 1.0
     expected_excess_sum_by_flight = hours_share_by_flight * excess_sum_by_flight.sum()
@@ -124,15 +124,17 @@ def expected_false_alarms_per_hour(tail: PeakTail, threshold: float) -> Expected
         * _peaks_per_hour_quantiles(tail)[None, :]
     ).ravel()
     order_by_rate = np.argsort(false_alarm_rates)
-    rate_probabilities = np.repeat(grid_probabilities, len(_PEAK_RATE_QUANTILE_PROBABILITIES)) / len(
+    probability_of_each_rate = np.repeat(grid_probabilities, len(_PEAK_RATE_QUANTILE_PROBABILITIES)) / len(
         _PEAK_RATE_QUANTILE_PROBABILITIES
     )
-    quantile_index = np.searchsorted(
-        np.cumsum(rate_probabilities[order_by_rate]),
+    bound_indices = np.searchsorted(
+        np.cumsum(probability_of_each_rate[order_by_rate]),
         np.array(_CREDIBLE_INTERVAL_PROBABILITIES) - _PROBABILITY_ROUNDING,
     )
-    low, high = false_alarm_rates[order_by_rate][np.minimum(quantile_index, len(false_alarm_rates) - 1)]
-    return ExpectedFalseAlarmsPerHour(float(false_alarm_rates @ rate_probabilities), float(low), float(high))
+    low, high = false_alarm_rates[order_by_rate][np.minimum(bound_indices, len(false_alarm_rates) - 1)]
+    return ExpectedFalseAlarmsPerHour(
+        float(false_alarm_rates @ probability_of_each_rate), float(low), float(high)
+    )
 
 
 def threshold_for_false_alarms(tail: PeakTail, false_alarms_per_hour: float) -> float:

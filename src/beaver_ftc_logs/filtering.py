@@ -52,10 +52,10 @@ def hypothesis_posterior(
     """
     if model.noise_models and not samples.noise_ma_coefficients:
         return _posterior_averaged_over_noise_models(samples, model, bank)
-    model_with_noise_model = model.with_noise_model(samples.noise_ma_coefficients)
+    model_with_noise_covariance = model.with_covariance_of_noise_model(samples.noise_ma_coefficients)
     command_delay_offset_candidates_s = model.settings.command_delay_offset_candidates_s
     bank_runs = [
-        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_model, bank)
+        _run_bank_on_flight(_with_command_delay(samples, delay_s), model_with_noise_covariance, bank)
         for delay_s in command_delay_offset_candidates_s
     ]
     return _average_bank_runs(
@@ -91,7 +91,7 @@ def _posterior_averaged_over_noise_models(
     bank_runs = [
         _run_bank_on_flight(
             first_samples(flight, n_samples),
-            model_with_one_noise_model.with_noise_model(flight.noise_ma_coefficients),
+            model_with_one_noise_model.with_covariance_of_noise_model(flight.noise_ma_coefficients),
             bank,
         )
         for (flight, model_with_one_noise_model), n_samples in zip(
@@ -288,7 +288,7 @@ def run_bank(
     n_samples = len(rates_unexplained_by_past)
     n_hypotheses = len(bank.transition_share)
     n_states = len(state_model.initial_mean)
-    no_response_index = n_hypotheses - 1
+    no_response_hypothesis_index = n_hypotheses - 1
     hypothesis_probabilities = bank.prior_probability.copy()
     state_means = np.zeros((n_hypotheses, n_states))
     state_covariances = np.zeros((n_hypotheses, n_states, n_states))
@@ -304,7 +304,7 @@ def run_bank(
             hypothesis_probabilities, state_means, state_covariances, bank, state_model.random_walk_variance
         )
         _relax_to_model(state_means, state_covariances, state_model)
-        state_means[no_response_index], state_covariances[no_response_index] = (
+        state_means[no_response_hypothesis_index], state_covariances[no_response_hypothesis_index] = (
             state_model.initial_mean,
             state_model.initial_covariance,
         )  # while nothing answers, nothing is learnt
@@ -327,7 +327,7 @@ def run_bank(
                 state_model.initial_mean + state_model.max_deviation,
             )
             noise_variance_scale *= np.exp(
-                (1.0 - hypothesis_probabilities[no_response_index])
+                (1.0 - hypothesis_probabilities[no_response_hypothesis_index])
                 * (mean_clipped_squared_residual / 3.0 - _MEAN_CLIPPED_SQUARED_RESIDUAL_PER_AXIS)
                 / noise.scale_memory_samples
             )
@@ -361,14 +361,14 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
                     + (state_means[h, i] - mixed_mean[i]) * (state_means[h, j] - mixed_mean[j])
                 )
     prior_probabilities = np.empty(n_hypotheses)
-    prior_sum = 0.0
+    prior_probability_sum = 0.0
     for h in range(n_hypotheses):
         prior_probabilities[h] = (
             stay_probability * probabilities[h]
             + bank.change_probability_per_sample * bank.transition_share[h]
         )
-        prior_sum += prior_probabilities[h]
-        _merge_gaussians(
+        prior_probability_sum += prior_probabilities[h]
+        _merge_gaussians_and_add_variances(
             stay_probability * probabilities[h] / prior_probabilities[h],
             state_means[h],
             state_covariances[h],
@@ -377,11 +377,11 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
             bank.rate_offset_variance[h],
             random_walk_variance,
         )
-    return prior_probabilities / prior_sum
+    return prior_probabilities / prior_probability_sum
 
 
 @kernel
-def _merge_gaussians(
+def _merge_gaussians_and_add_variances(
     own_weight,
     state_mean,
     state_covariance,
@@ -450,7 +450,7 @@ def _correct_hypotheses(
     noise_covariance = noise.covariance * noise_variance_scale
     t_degrees_of_freedom = noise.t_degrees_of_freedom
     for h in range(n_hypotheses):
-        sensitivity = _state_sensitivity(
+        sensitivity = _rate_sensitivity_to_states(
             bank.effectiveness[h],
             bank.response_share_scaled_by_group_gain[h],
             group_responses,
@@ -502,7 +502,7 @@ def _correct_hypotheses(
 
 
 @kernel
-def _state_sensitivity(
+def _rate_sensitivity_to_states(
     effectiveness, response_share_scaled_by_group_gain, group_responses, intercept_rad_s, n_states
 ):
     """Sensitivity of the unexplained rates to the states, (N, 3): to the trim; to the common gain, which

@@ -59,30 +59,34 @@ def fault_events(rows: DiagnosisRows, surfaces: list[str]) -> list[Document]:
     What lasts less than MAX_BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone
     is brief. This is hindsight, for the reader; the rows have none.
     """
-    _, name_index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
-    verdict_columns = np.column_stack([name_index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
-    verdict_runs = _join_brief_events(rows, constant_stretches(verdict_columns))
+    _, name_index_by_row = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
+    verdict_columns = np.column_stack(
+        [name_index_by_row, rows.faulty, rows.faulty[:, None] * rows.effectiveness]
+    )
+    verdict_runs = _join_brief_and_alike_runs(rows, constant_stretches(verdict_columns))
     return [
         _fault_event_entry(rows, begin, end, surfaces) for begin, end in verdict_runs if rows.faulty[begin]
     ]
 
 
-def _join_brief_events(rows: DiagnosisRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _join_brief_and_alike_runs(
+    rows: DiagnosisRows, constant_verdict_runs: list[tuple[int, int]]
+) -> list[tuple[int, int]]:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
     joined_runs: list[tuple[int, int]] = []
-    for begin, end in runs:
+    for begin, end in constant_verdict_runs:
         previous_run = joined_runs[-1] if joined_runs else (begin, begin)
-        may_join_previous_run = (
+        is_brief_or_continues_previous_run = (
             _is_brief(rows, begin, end)
             or _is_brief_and_unnamed(rows, *previous_run)
-            or _have_same_verdict(rows, previous_run[0], begin)
+            or _have_same_surfaces_and_effectiveness(rows, previous_run[0], begin)
         )
         if (
             previous_run[0] < begin
             and rows.faulty[previous_run[0]]
             and rows.faulty[begin]
-            and may_join_previous_run
+            and is_brief_or_continues_previous_run
         ):
             joined_runs[-1] = (previous_run[0], end)
         else:
@@ -98,7 +102,7 @@ def _is_brief_and_unnamed(rows: DiagnosisRows, begin: int, end: int) -> bool:
     return rows.isolated_surfaces[begin] == UNKNOWN_SURFACE and begin < end and _is_brief(rows, begin, end)
 
 
-def _have_same_verdict(rows: DiagnosisRows, first_row: int, second_row: int) -> bool:
+def _have_same_surfaces_and_effectiveness(rows: DiagnosisRows, first_row: int, second_row: int) -> bool:
     return rows.isolated_surfaces[first_row] == rows.isolated_surfaces[second_row] and bool(
         (rows.effectiveness[first_row] == rows.effectiveness[second_row]).all()
     )
@@ -109,12 +113,15 @@ def _fault_event_entry(rows: DiagnosisRows, begin: int, end: int, surfaces: list
     names, n_rows_of_name = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     main_name = str(names[n_rows_of_name.argmax()])
     reported_surfaces = surfaces if main_name in (UNKNOWN_SURFACE, ENGINE) else main_name.split("+")
-    effectiveness_arrays = {
+    effectiveness_columns_by_key = {
         "estimate": rows.effectiveness,
         "low": rows.effectiveness_low,
         "high": rows.effectiveness_high,
     }
-    medians = {key: np.median(values[begin:end], axis=0) for key, values in effectiveness_arrays.items()}
+    medians = {
+        key: np.median(effectiveness_column[begin:end], axis=0)
+        for key, effectiveness_column in effectiveness_columns_by_key.items()
+    }
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
@@ -151,7 +158,7 @@ def as_text(verdict: Document) -> str:
         lines.append(
             f"  and {n_brief} brief alarm{'s' if n_brief > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s"
         )
-    lines += [f"  {sentence}" for sentence in (*verdict["can_separate"], *verdict["notes"])]
+    lines += [f"  {sentence_or_note}" for sentence_or_note in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():
         lines.append(f"  {key}: {value:.3f}" if isinstance(value, float) else f"  {key}: {value}")
     return "\n".join(lines)
@@ -299,13 +306,13 @@ def _smallest_detectable_losses(
     information_by_horizon = {
         f"{horizon_s:g}": information_per_s * horizon_s for horizon_s in DETECTION_HORIZONS_S
     }
-    loss_by_horizon = {
+    loss_or_inf_by_horizon = {
         horizon_s_text: np.sqrt(2.0 * required_log_odds / information) if information > 0.0 else np.inf
         for horizon_s_text, information in information_by_horizon.items()
     }
     return {
         horizon_s_text: float(loss) if loss <= 1.0 else None
-        for horizon_s_text, loss in loss_by_horizon.items()
+        for horizon_s_text, loss in loss_or_inf_by_horizon.items()
     }
 
 

@@ -70,7 +70,7 @@ _GAIN_ERROR_WINDOW_S, AUTOREGRESSIVE_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
 seed 11."""
-_MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _THRESHOLD_FACTOR_OTHER_LAWS = 0.4, 2.0
+_MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS, _LORDEN_BOUND_FACTOR_OTHER_LAWS = 0.4, 2.0
 """A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
 then tells less than the fit knows. And so many times the evidence of theory raises an alarm. Chosen in the
 same way, the first on seed 1 of five aircraft."""
@@ -86,9 +86,9 @@ _RANK_TOLERANCE = 1e-9
 _N_HELD_OUT_TESTED_FOR_COLUMN_MISTAKES = 4
 """Number of held-out flights that are also read with each mistake in their columns. The largest gain in
 likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
-_MAX_CROSS_VALIDATION_SPLITS, _MAX_GAIN_SD = 12, 0.33
+_MAX_CROSS_VALIDATION_SPLITS, _MAX_GROUP_GAIN_STANDARD_ERROR = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
-_MAX_COLUMN_GAIN_SD = 1e3
+_MAX_COLUMN_GAIN_STANDARD_ERROR = 1e3
 _N_PRIOR_EFFECTIVENESS_CHANGES = 20
 """Changes that count as seen before the labels are read, half of them repairs."""
 _CREDIBLE_MASS_CANDIDATES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
@@ -142,12 +142,12 @@ def is_usable_for_fit(samples: Samples) -> NDArray[np.bool_]:
     is_surface_labelled = np.isfinite(samples.labels).any(axis=0)
     if not is_surface_labelled.any():
         return is_usable
-    labels = samples.labels[:, is_surface_labelled]
-    is_usable &= np.isfinite(labels).all(axis=1)
-    for begin, end in constant_stretches(labels):
-        is_short_stretch = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
+    labels_of_labelled_surfaces = samples.labels[:, is_surface_labelled]
+    is_usable &= np.isfinite(labels_of_labelled_surfaces).all(axis=1)
+    for begin, end in constant_stretches(labels_of_labelled_surfaces):
+        is_stretch_too_short = (end - begin) * samples.dt_s < MIN_LABEL_DURATION_S
         n_margin_samples = round(UNFITTED_LABEL_CHANGE_MARGIN_S / samples.dt_s)
-        is_usable[begin : end if is_short_stretch else begin + n_margin_samples] = False
+        is_usable[begin : end if is_stretch_too_short else begin + n_margin_samples] = False
         is_usable[max(end - n_margin_samples, begin) : end] = False
     return is_usable
 
@@ -193,14 +193,14 @@ def _with_covariance_inflation(
     return model.model_copy(update={"noise_models": noise_models})
 
 
-def _cross_validation_fits(
+def _fold_models_and_held_out_flights(
     usable_flights: Sequence[FlightWithUsableRows],
     model: Model,
     effect_share_explained_by_others: list[float],
 ) -> Iterator[tuple[Model, Sequence[FlightWithUsableRows]]]:
     """For each split, a model fitted to some of the flights, with the standard errors of its gains, and the
     held-out flights. effect_share_explained_by_others: of all flights, as in `FittedRanges`."""
-    for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
+    for fitted_flights, held_out_flights in _fitted_and_held_out_by_split(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         rate_regression = fit_least_squares_of_order(
             fitted_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
@@ -319,16 +319,16 @@ def stacked_regression_data(
     weighted_regressors_by_flight, weighted_rates_by_flight, stretch_numbers_by_flight = [], [], []
     for flight_index, usable_flight in enumerate(usable_flights):
         samples, n_signal_lags = usable_flight.samples, vehicle.n_signal_lags(n_rate_lags)
-        past_regressors, lagged_group_commands, is_predictable = regression.build_regressors(
+        lagged_rates_and_signals, lagged_group_commands, is_predictable = regression.build_regressors(
             samples, surface_groups, n_rate_lags, n_command_lags, True, n_signal_lags
         )
         is_usable = usable_flight.is_usable & is_predictable
         is_usable[:max_lag] = False
-        n_samples = len(past_regressors)
+        n_samples = len(lagged_rates_and_signals)
         weighted_regressors_by_flight.append(
             samples.fit_weight
             * np.column_stack(
-                [np.ones(n_samples), past_regressors, lagged_group_commands.reshape(n_samples, -1)]
+                [np.ones(n_samples), lagged_rates_and_signals, lagged_group_commands.reshape(n_samples, -1)]
             )[is_usable]
         )
         weighted_rates_by_flight.append(samples.fit_weight * samples.rates[is_usable])
@@ -382,7 +382,7 @@ def _fit_noise_models(usable_flights: Sequence[FlightWithUsableRows], model: Mod
         {usable_flight.samples.noise_ma_coefficients for usable_flight in usable_flights} - {()}
     ):
         rows_and_residuals = [
-            one_step_residuals(model, usable_flight)
+            rows_and_one_step_residuals(model, usable_flight)
             for usable_flight in usable_flights
             if usable_flight.samples.noise_ma_coefficients == noise_ma_coefficients
         ]
@@ -398,7 +398,7 @@ def _fit_noise_model(
     residual_runs = [
         residual[begin:end]
         for rows, residual in rows_and_residuals
-        for begin, end in _runs_of_consecutive_rows(rows)
+        for begin, end in _begins_and_ends_of_consecutive_rows(rows)
     ]
     target_residuals = [run[AUTOREGRESSIVE_ORDER:] for run in residual_runs]
     if sum(map(len, target_residuals)) < 10 * 3 * AUTOREGRESSIVE_ORDER:
@@ -458,9 +458,9 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
         else {}
     )
     if not fault_levels_by_group:
-        trim_random_walk_sd = _estimate_trim_random_walk_sd(usable_flights, model)
+        trim_walk_sd_per_sample = _estimate_trim_walk_sd_per_sample(usable_flights, model)
         model_with_trim_drift = model.model_copy(
-            update={"settings": FilterSettings(trim_walk=trim_random_walk_sd, **other_laws_settings)}
+            update={"settings": FilterSettings(trim_walk=trim_walk_sd_per_sample, **other_laws_settings)}
         )
         max_effective_sample_share = (
             (1.0 if may_air_move else _MAX_EFFECTIVE_SAMPLE_SHARE_OTHER_LAWS)
@@ -475,7 +475,7 @@ def estimate_filter_settings(usable_flights: Sequence[FlightWithUsableRows], mod
             **alarm_settings,
             **other_laws_settings,
             power=effective_sample_share,
-            trim_walk=trim_random_walk_sd,
+            trim_walk=trim_walk_sd_per_sample,
             delays_s=command_delay_offset_candidates_s,
         )
     return FilterSettings(
@@ -503,12 +503,14 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
     so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
     that is as believed.
     """
-    samples_and_usable = [
+    samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
-    normalized_squared_error_sum = n_gains = float(len(model.groups))
-    for fold_model, held_out_flights in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
+    normalized_squared_gain_error_sum = n_gains = float(len(model.groups))
+    for fold_model, held_out_flights in _fold_models_and_held_out_flights(
+        usable_flights,
+        model,
+        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
     ):
         group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         for held_out in held_out_flights:
@@ -516,24 +518,28 @@ def gain_error_overdispersion(usable_flights: Sequence[FlightWithUsableRows], mo
             group_responses = group_responses.sum(axis=3)[:, :, group_has_known_effect].reshape(
                 residual.size, -1
             )
-            normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+            normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                 group_responses, residual.ravel(), _prior_gain_covariance(fold_model, group_has_known_effect)
             )
-            normalized_squared_error_sum = normalized_squared_error_sum + normalized_squared_error
+            normalized_squared_gain_error_sum = (
+                normalized_squared_gain_error_sum + normalized_squared_gain_error
+            )
             n_gains = n_gains + n_determined_gains
-    return normalized_squared_error_sum / n_gains
+    return normalized_squared_gain_error_sum / n_gains
 
 
 def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
-    samples_and_usable = [
+    samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
     window_inflations_by_ma_coefficients: dict[tuple[float, ...], list[float]] = {}
-    for fold_model, held_out_flights in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
+    for fold_model, held_out_flights in _fold_models_and_held_out_flights(
+        usable_flights,
+        model,
+        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
     ):
         group_has_known_effect = np.array(trust.is_group_effect_known(fold_model))
         prior_gain_covariance: Floats = np.asarray(
@@ -546,7 +552,7 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
             for window_rows in np.array_split(np.arange(len(residual)), n_windows):
                 window_responses = _without_mean(group_responses[window_rows])
                 window_residual = _without_mean(residual[window_rows])
-                normalized_squared_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
+                normalized_squared_gain_error, n_determined_gains = _normalized_squared_gain_error_and_rank(
                     window_responses.reshape(window_residual.size, -1),
                     window_residual.ravel(),
                     prior_gain_covariance,
@@ -555,7 +561,7 @@ def _with_inflated_noise(usable_flights: Sequence[FlightWithUsableRows], model: 
                     held_out.samples.noise_ma_coefficients, []
                 ).append(
                     min(
-                        normalized_squared_error / max(n_determined_gains, 1),
+                        normalized_squared_gain_error / max(n_determined_gains, 1),
                         _MAX_WINDOW_COVARIANCE_INFLATION,
                     )
                 )
@@ -599,14 +605,14 @@ def _normalized_squared_gain_error_and_rank(
     identity_plus_prior_times_information = (
         np.eye(len(gain_errors)) + prior_gain_covariance @ information
     )  # singular by rounding where nothing tells a gain
-    normalized_squared_error = max(
+    normalized_squared_gain_error = max(
         float(
             score_vector
             @ np.linalg.lstsq(identity_plus_prior_times_information, gain_errors, rcond=_RANK_TOLERANCE)[0]
         ),
         0.0,
     )
-    return normalized_squared_error, int(
+    return normalized_squared_gain_error, int(
         np.linalg.matrix_rank(information, tol=_RANK_TOLERANCE * np.trace(information))
     )
 
@@ -616,10 +622,14 @@ def _standardized_responses_and_residual(
 ) -> tuple[Floats, Floats]:
     """Return the effect of each axis of each group's answer on the residuals (n, 3) of a part, (n, 3, G, 3),
     both in sd of the noise, without means."""
-    _, residual, rate_responses = time_whitened_residual_and_responses(model, held_out)
+    _, residual, rate_responses = rows_whitened_residual_and_responses(model, held_out)
     whitening_matrix = np.linalg.inv(
         np.linalg.cholesky(
-            np.array(model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance)
+            np.array(
+                model.with_covariance_of_noise_model(
+                    held_out.samples.noise_ma_coefficients
+                ).residual_covariance
+            )
         )
     ).T
     standardized_responses = np.einsum("nga,ab->nbga", rate_responses, whitening_matrix)
@@ -632,7 +642,7 @@ def _without_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _estimate_trim_random_walk_sd(
+def _estimate_trim_walk_sd_per_sample(
     usable_flights: Sequence[FlightWithUsableRows], model: Model
 ) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
@@ -642,40 +652,47 @@ def _estimate_trim_random_walk_sd(
     """
     squared_difference_sums = np.zeros((2, 3))
     n_differences = np.zeros(2)
-    span_samples = np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz)
-    for fitted_flights, held_out_flights in _cross_validation_splits(usable_flights):
+    span_lengths_samples = np.round(np.array(_TRIM_DRIFT_AVERAGING_SPANS_S) * model.rate_hz)
+    for fitted_flights, held_out_flights in _fitted_and_held_out_by_split(usable_flights):
         fold_model = fit_with_same_order(fitted_flights, model)
         for held_out in held_out_flights:
-            rows, residual, _ = time_whitened_residual_and_responses(fold_model, held_out)
+            rows, residual, _ = rows_whitened_residual_and_responses(fold_model, held_out)
             noise_covariance = np.array(
-                fold_model.with_noise_model(held_out.samples.noise_ma_coefficients).residual_covariance
+                fold_model.with_covariance_of_noise_model(
+                    held_out.samples.noise_ma_coefficients
+                ).residual_covariance
             )
             standardized_residual = residual / np.sqrt(np.maximum(np.diag(noise_covariance), MIN_DIVISOR))
-            for begin, end in _runs_of_consecutive_rows(rows):
-                for i, span in enumerate(span_samples.astype(int).tolist()):
+            for begin, end in _begins_and_ends_of_consecutive_rows(rows):
+                for i, n_span_samples in enumerate(span_lengths_samples.astype(int).tolist()):
                     span_means = (
-                        standardized_residual[begin:end][: (end - begin) // span * span]
-                        .reshape(-1, span, 3)
+                        standardized_residual[begin:end][: (end - begin) // n_span_samples * n_span_samples]
+                        .reshape(-1, n_span_samples, 3)
                         .mean(axis=1)
                     )
                     squared_difference_sums[i] += (np.diff(span_means, axis=0) ** 2).sum(axis=0)
                     n_differences[i] += max(len(span_means) - 1, 0)
-    default_random_walk_sd = np.array(FilterSettings().trim_random_walk_sd)
+    default_trim_walk_sd_per_sample = np.array(FilterSettings().trim_walk_sd_per_sample)
     if not n_differences.all():
-        return default_random_walk_sd.tolist()
+        return default_trim_walk_sd_per_sample.tolist()
     short_span_difference_variance, long_span_difference_variance = (
         squared_difference_sums / n_differences[:, None]
     )
-    short_span, long_span = span_samples
+    short_span_samples, long_span_samples = span_lengths_samples
     random_walk_variance = (
         1.5
-        * (long_span * long_span_difference_variance - short_span * short_span_difference_variance)
-        / (long_span**2 - short_span**2)
+        * (
+            long_span_samples * long_span_difference_variance
+            - short_span_samples * short_span_difference_variance
+        )
+        / (long_span_samples**2 - short_span_samples**2)
     )
-    return np.maximum(np.sqrt(np.maximum(random_walk_variance, 0.0)), default_random_walk_sd).tolist()
+    return np.maximum(
+        np.sqrt(np.maximum(random_walk_variance, 0.0)), default_trim_walk_sd_per_sample
+    ).tolist()
 
 
-def _runs_of_consecutive_rows(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
+def _begins_and_ends_of_consecutive_rows(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
     """Begin and end of what of increasing places follows one another."""
     run_edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
     return list(pairwise(run_edges))
@@ -724,15 +741,17 @@ def add_fitted_ranges_and_alarm_threshold(
 ) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out: how noisy they were,
     and at which evidence of a fault they would alarm as often as declared."""
-    samples_and_usable = [
+    samples_and_is_usable_by_flight = [
         (usable_flight.samples, usable_flight.is_usable) for usable_flight in usable_flights
     ]
     max_noise_variance_scale = 1.0
     max_sample_log_likelihood_gain_of_mistake = 0.0
     held_out_peaks_and_hours = list[extremes.PeaksAndHours]()
     squared_gain_deviations = list[Floats]()
-    for fold_model, held_out_flights in _cross_validation_fits(
-        usable_flights, model, trust.effect_share_explained_by_others(samples_and_usable, model).tolist()
+    for fold_model, held_out_flights in _fold_models_and_held_out_flights(
+        usable_flights,
+        model,
+        trust.effect_share_explained_by_others(samples_and_is_usable_by_flight, model).tolist(),
     ):
         for held_out in held_out_flights:
             held_out_max_noise_variance_scale, peaks_and_hours = _noise_scale_and_healthy_alarm_peaks(
@@ -746,7 +765,9 @@ def add_fitted_ranges_and_alarm_threshold(
                 )
             held_out_peaks_and_hours.append(peaks_and_hours)
             if len(usable_flights) > 1 and model.vehicle.other_laws:
-                squared_gain_deviations.append(_squared_gain_deviation_beyond_noise(fold_model, held_out))
+                squared_gain_deviations.append(
+                    _squared_group_gain_deviations_beyond_noise(fold_model, held_out)
+                )
     rate_regression = fit_least_squares_of_order(
         usable_flights, model.vehicle, model.n_rate_lags, model.n_command_lags
     )
@@ -757,14 +778,14 @@ def add_fitted_ranges_and_alarm_threshold(
         )
     gain_standard_errors = np.minimum(
         np.sqrt(group_gain_standard_error(rate_regression, model) ** 2 + gain_variance_between_laws),
-        _MAX_GAIN_SD,
+        _MAX_GROUP_GAIN_STANDARD_ERROR,
     )
-    column_gain_standard_errors = gain_standard_error_by_column(
+    standard_error_by_rate_or_signal = gain_standard_error_by_column(
         rate_regression, model, float(gain_variance_between_laws.max())
     )
     fitted_ranges = trust.compute_fitted_ranges(
-        samples_and_usable, model, gain_standard_errors, max_noise_variance_scale
-    ).model_copy(update={"gain_standard_error_by_column": column_gain_standard_errors})
+        samples_and_is_usable_by_flight, model, gain_standard_errors, max_noise_variance_scale
+    ).model_copy(update={"gain_standard_error_by_column": standard_error_by_rate_or_signal})
     requested_false_alarms_per_hour = model.vehicle.false_alarms_per_hour
     target_false_alarms_per_hour = (
         _DEFAULT_FALSE_ALARMS_PER_HOUR
@@ -783,10 +804,10 @@ def add_fitted_ranges_and_alarm_threshold(
             f"identify: false_alarms_per_hour {requested_false_alarms_per_hour:g}: {reason}, allowed: "
             f"{missing_minutes:.0f} min more"
         )
-    can_set_threshold = bool(peak_tail or model.vehicle.other_laws)
+    has_tail_or_other_laws = bool(peak_tail or model.vehicle.other_laws)
     alarm_threshold = (
         _choose_alarm_threshold(peak_tail, target_false_alarms_per_hour, model)
-        if target_false_alarms_per_hour and can_set_threshold
+        if target_false_alarms_per_hour and has_tail_or_other_laws
         else None
     )
     alarm_settings = {
@@ -820,12 +841,12 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
         return np.zeros(len(model.groups))
     unmodelled_variance_share = 0.0
     for noise_model in model.noise_models:
-        flight_residuals = [
-            one_step_residuals(model, usable_flight)[1]
+        residuals_by_flight = [
+            rows_and_one_step_residuals(model, usable_flight)[1]
             for usable_flight in usable_flights
             if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
         ]
-        residuals, n_samples = np.vstack(flight_residuals), sum(map(len, flight_residuals))
+        residuals, n_samples = np.vstack(residuals_by_flight), sum(map(len, residuals_by_flight))
         variance_share_explained_by_chance = (
             3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
         )
@@ -842,25 +863,25 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
     )
     return np.minimum(
         np.sqrt(3.0 * unmodelled_variance_share / np.maximum(unexplained_effect_power, MIN_DIVISOR)),
-        _MAX_GAIN_SD,
+        _MAX_GROUP_GAIN_STANDARD_ERROR,
     )
 
 
-def _squared_gain_deviation_beyond_noise(model: Model, held_out: FlightWithUsableRows) -> Floats:
+def _squared_group_gain_deviations_beyond_noise(model: Model, held_out: FlightWithUsableRows) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
     group_responses, residual = _standardized_responses_and_residual(model, held_out)
     group_responses = group_responses.sum(axis=3).reshape(residual.size, -1)
-    squared_deviation = np.full(group_responses.shape[1], np.nan)
+    squared_deviations_beyond_noise = np.full(group_responses.shape[1], np.nan)
     group_has_known_effect = np.array(trust.is_group_effect_known(model)) & (group_responses.any(axis=0))
     information = group_responses[:, group_has_known_effect].T @ group_responses[:, group_has_known_effect]
     gain_error_covariance = np.linalg.pinv(information, rcond=_RANK_TOLERANCE, hermitian=True)
     gain_errors = gain_error_covariance @ (group_responses[:, group_has_known_effect].T @ residual.ravel())
     if group_has_known_effect.any():  # a part without a residual shows the effect of no group
-        squared_deviation[group_has_known_effect] = np.maximum(
+        squared_deviations_beyond_noise[group_has_known_effect] = np.maximum(
             gain_errors**2 - np.diag(gain_error_covariance) * max(float((residual**2).mean()), 1.0), 0.0
         )
-    return squared_deviation
+    return squared_deviations_beyond_noise
 
 
 def _gain_variance_between_laws(prior_gain_sd: Floats, squared_gain_deviations: Sequence[Floats]) -> Floats:
@@ -877,7 +898,7 @@ def _choose_alarm_threshold(
 ) -> float:
     """By the tail; under laws of which the parts left out say nothing, by theory if that asks for more."""
     lorden_bound_factor = (
-        (1.0 if model.vehicle.moving_air else _THRESHOLD_FACTOR_OTHER_LAWS)
+        (1.0 if model.vehicle.moving_air else _LORDEN_BOUND_FACTOR_OTHER_LAWS)
         if model.vehicle.other_laws
         else 0.0
     )
@@ -944,13 +965,15 @@ def _noise_scale_and_healthy_alarm_peaks(
     bank = build_hypothesis_bank(model)
     posterior, _, noise_variance_scales = hypothesis_posterior(held_out.samples, model, bank)
     evidence_increments, labels = any_fault_log_odds_gains(posterior, bank), held_out.samples.labels
-    is_healthy = (
-        held_out.is_usable & ~(labels < 1.0).any(axis=1) & (posterior[:, bank.no_response_index] < 0.5)
+    is_usable_and_healthy = (
+        held_out.is_usable
+        & ~(labels < 1.0).any(axis=1)
+        & (posterior[:, bank.no_response_hypothesis_index] < 0.5)
     )
-    healthy_rows = np.flatnonzero(is_healthy)
+    healthy_rows = np.flatnonzero(is_usable_and_healthy)
     cusum_runs = [
         page_cusum(evidence_increments[healthy_rows[begin:end]], np.inf)
-        for begin, end in _runs_of_consecutive_rows(healthy_rows)
+        for begin, end in _begins_and_ends_of_consecutive_rows(healthy_rows)
     ]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in cusum_runs])
     return float(noise_variance_scales[held_out.is_usable].max(initial=1.0)), (
@@ -959,7 +982,7 @@ def _noise_scale_and_healthy_alarm_peaks(
     )
 
 
-def _cross_validation_splits(
+def _fitted_and_held_out_by_split(
     usable_flights: Sequence[FlightWithUsableRows],
 ) -> list[tuple[list[FlightWithUsableRows], list[FlightWithUsableRows]]]:
     """Return fitted and left-out parts: halves of one flight, or each flight; of many every twelfth."""
@@ -1028,7 +1051,7 @@ def group_gain_standard_error(rate_regression: regression.RateRegression, model:
         1.0 / np.sqrt(response_factor_information)
         if model.vehicle.other_laws
         else relative_error_sd_of_summed_response,
-        _MAX_GAIN_SD,
+        _MAX_GROUP_GAIN_STANDARD_ERROR,
     )
 
 
@@ -1044,7 +1067,7 @@ def gain_standard_error_by_column(
         (noise_model.covariance_inflation for noise_model in model.noise_models), default=1.0
     )
     noise_sd = np.sqrt(np.diag(rate_regression.residual_covariance))
-    gain_standard_error_of_column = {}
+    standard_error_by_rate_or_signal = {}
     for name, (past_rows, coefficients) in trust.coefficients_by_column_without_own_axis(model).items():
         coefficient_rows = [1 + row for row in past_rows]
         coefficients_over_standard_errors = coefficients / np.maximum(
@@ -1060,13 +1083,13 @@ def gain_standard_error_by_column(
             inverse_error_correlation,
             coefficients_over_standard_errors,
         ) - np.count_nonzero(coefficients)
-        gain_standard_error_of_column[name] = min(
+        standard_error_by_rate_or_signal[name] = min(
             float(
                 np.sqrt(max_covariance_inflation / max(information, MIN_DIVISOR) + gain_variance_between_laws)
             ),
-            _MAX_COLUMN_GAIN_SD,
+            _MAX_COLUMN_GAIN_STANDARD_ERROR,
         )
-    return gain_standard_error_of_column
+    return standard_error_by_rate_or_signal
 
 
 def prediction_quality_by_fold(
@@ -1133,19 +1156,19 @@ def _diagnosis_rows_by_credible_mass(
 
 def one_step_prediction_quality(model: Model, held_out: FlightWithUsableRows) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
-    rows, residual = one_step_residuals(model, held_out)
+    rows, residual = rows_and_one_step_residuals(model, held_out)
     rates = held_out.samples.rates[rows]
     if not len(rates):
         return {"samples": 0}
-    explained_variance_share = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), MIN_DIVISOR)
+    explained_rate_variance_share = 1.0 - residual.var(axis=0) / np.maximum(rates.var(axis=0), MIN_DIVISOR)
     return {
         "samples": len(rates),
-        "explained": dict(zip("pqr", explained_variance_share.tolist(), strict=True)),
+        "explained": dict(zip("pqr", explained_rate_variance_share.tolist(), strict=True)),
         "residual_rad_s": dict(zip("pqr", residual.std(axis=0).tolist(), strict=True)),
     }
 
 
-def time_whitened_residual_and_responses(
+def rows_whitened_residual_and_responses(
     model: Model, usable_flight: FlightWithUsableRows
 ) -> tuple[NDArray[np.int64], Floats, Floats]:
     """Places (n,) of the samples in use, the unpredicted part of the residual (n, 3), and answers
@@ -1162,7 +1185,9 @@ def time_whitened_residual_and_responses(
     )
 
 
-def one_step_residuals(model: Model, usable_flight: FlightWithUsableRows) -> tuple[NDArray[np.int64], Floats]:
+def rows_and_one_step_residuals(
+    model: Model, usable_flight: FlightWithUsableRows
+) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3)."""
     is_predictable, rates_unexplained_by_past, group_responses = regression.unexplained_rates_and_responses(
         usable_flight.samples, model, scales_by_labels=True

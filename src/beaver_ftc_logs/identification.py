@@ -86,7 +86,7 @@ def add_unseen_noise_models(model: Model, flights: Sequence[Samples]) -> Model:
             )
             residuals = np.vstack(
                 [
-                    fitting.one_step_residuals(model, usable_flight)[1]
+                    fitting.rows_and_one_step_residuals(model, usable_flight)[1]
                     for usable_flight in usable_whitened_flights
                 ]
             )
@@ -274,14 +274,18 @@ def scale_by_dynamic_pressure_if_better(
 ) -> tuple[Sequence[Samples], Vehicle]:
     """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
     known and this explains more; else both as they are."""
-    unset_keys = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
-    scaled_flights, scaled_vehicle = _choose_dynamic_pressure_scaling(
-        flights, with_assumed_law_and_air(flights, vehicle)[0] if unset_keys else vehicle
+    none_by_unset_vehicle_key = {
+        key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None
+    }
+    scaled_flights, scaled_vehicle = _scale_flights_and_vehicle_if_better(
+        flights, with_assumed_law_and_air(flights, vehicle)[0] if none_by_unset_vehicle_key else vehicle
     )
-    return scaled_flights, scaled_vehicle.model_copy(update=unset_keys) if unset_keys else scaled_vehicle
+    return scaled_flights, scaled_vehicle.model_copy(
+        update=none_by_unset_vehicle_key
+    ) if none_by_unset_vehicle_key else scaled_vehicle
 
 
-def _choose_dynamic_pressure_scaling(
+def _scale_flights_and_vehicle_if_better(
     flights: Sequence[Samples], vehicle: Vehicle
 ) -> tuple[Sequence[Samples], Vehicle]:
     airspeeds_by_flight = [
@@ -299,7 +303,7 @@ def _choose_dynamic_pressure_scaling(
     if _min_bic(flights, vehicle) - _min_bic(scaled_flights, scaled_vehicle) < _DECISIVE_BIC_DIFFERENCE:
         return flights, vehicle
     return (
-        _choose_airspeed_powers(flights, scaled_vehicle)
+        _scale_by_best_airspeed_powers(flights, scaled_vehicle)
         if vehicle.other_laws
         else (scaled_flights, scaled_vehicle)
     )
@@ -310,7 +314,9 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     return min(fitting.bic_by_order(fitting.flights_with_usable_rows(flights), vehicle).values())
 
 
-def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[list[Samples], Vehicle]:
+def _scale_by_best_airspeed_powers(
+    flights: Sequence[Samples], vehicle: Vehicle
+) -> tuple[list[Samples], Vehicle]:
     """Each surface, or group, in its turn with the power of the airspeed that explains most: slipstream and
     linkages change the square. Another than that must explain decisively more."""
 
@@ -322,14 +328,14 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
         scaled_flights, vehicle
     )  # a criterion believes each sample, as only white noise lets it
 
-    def scale_and_whiten_flights(scaled_vehicle: Vehicle, does_whiten: bool = True) -> list[Samples]:
+    def scale_and_whiten_flights(scaled_vehicle: Vehicle, reuses_whitening: bool = True) -> list[Samples]:
         rescaled_flights = [
             with_airspeed_effects(
                 flight, scaled_vehicle.reference_airspeed_mps or 0.0, scaled_vehicle.surface_airspeed_powers
             )
             for flight in flights
         ]
-        if not (does_whiten and vehicle.moving_air):
+        if not (reuses_whitening and vehicle.moving_air):
             return rescaled_flights
         return [
             whiten_samples(rescaled_flight, whitened_flight.noise_ma_coefficients, whitened_flight.fit_weight)
@@ -348,7 +354,7 @@ def _choose_airspeed_powers(flights: Sequence[Samples], vehicle: Vehicle) -> tup
                 bic := _min_bic(scale_and_whiten_flights(candidate_vehicle), candidate_vehicle)
             ) < bic_to_beat:
                 bic_to_beat, vehicle = bic, candidate_vehicle
-    return scale_and_whiten_flights(vehicle, does_whiten=False), vehicle
+    return scale_and_whiten_flights(vehicle, reuses_whitening=False), vehicle
 
 
 def check_explained_variance(
@@ -448,22 +454,27 @@ def collinear_regressors(
         zip(regressor_names(model), inflation_factors.tolist(), strict=True), key=lambda pair: -pair[1]
     )
     collinear_names_and_factors = [
-        (name, factor if isfinite(factor) else None)
-        for name, factor in names_and_inflation_factors
-        if factor > _MIN_COLLINEAR_VARIANCE_INFLATION
+        (name, inflation_factor if isfinite(inflation_factor) else None)
+        for name, inflation_factor in names_and_inflation_factors
+        if inflation_factor > _MIN_COLLINEAR_VARIANCE_INFLATION
     ]
-    return [{"regressor": name, "inflation": factor} for name, factor in collinear_names_and_factors]
+    return [
+        {"regressor": name, "inflation": inflation_factor}
+        for name, inflation_factor in collinear_names_and_factors
+    ]
 
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    rate_names = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
+    lagged_rate_names = [f"{rate}[-{k}]" for k in range(1, model.n_rate_lags + 1) for rate in "pqr"]
     signal_lags = range(1, model.vehicle.n_signal_lags(model.n_rate_lags) + 1)
-    signal_names = [f"{name}[-{k}]" for k in signal_lags for name in model.vehicle.signal_regressor_names]
+    lagged_signal_names = [
+        f"{name}[-{k}]" for k in signal_lags for name in model.vehicle.signal_regressor_names
+    ]
     command_lags, group_names = range(1, model.n_command_lags + 1), map("+".join, model.groups)
     return (
-        rate_names
-        + signal_names
+        lagged_rate_names
+        + lagged_signal_names
         + [f"command of {group}[-{k}]" for group in group_names for k in command_lags]
     )
 
@@ -492,7 +503,7 @@ def residual_to_white_density_by_band(
 ) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
     residual = np.vstack(
-        [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
+        [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
     )
     frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     white_density = residual.var(axis=0) / (0.5 * model.rate_hz)
@@ -539,12 +550,12 @@ def identification_text(model: Model) -> str:
             f"{_values_by_axis_text(output_error['explained_of_windows_not_fitted'])}"
         )
     if results["collinear"]:
-        worst_entry, n_collinear = results["collinear"][0], len(results["collinear"])
+        most_collinear_entry, n_collinear = results["collinear"][0], len(results["collinear"])
         lines.append(
             f"  {n_collinear} {'regressors are' if n_collinear > 1 else 'regressor is'} "
             "collinear (variance inflated over "
-            f"{_MIN_COLLINEAR_VARIANCE_INFLATION:g} times), most {worst_entry['regressor']} "
-            f"({_variance_inflation_text(worst_entry['inflation'])})"
+            f"{_MIN_COLLINEAR_VARIANCE_INFLATION:g} times), most {most_collinear_entry['regressor']} "
+            f"({_inflation_factor_text(most_collinear_entry['inflation'])})"
         )
     return "\n".join(lines)
 
@@ -555,7 +566,7 @@ def _ma_coefficients_text(noise_model: NoiseModel) -> str:
 
 def _another_day_sentences(expected_performance: Document, n_flights: int) -> list[str]:
     """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
-    day_text = (
+    left_out_unit_text = (
         "another day, each left out in turn"
         if n_flights > 1
         else "another half of this day, not of another day"
@@ -566,7 +577,7 @@ def _another_day_sentences(expected_performance: Document, n_flights: int) -> li
             f"{title} {expected_performance[key]['mean']:.3f} ({expected_performance[key]['worst']:.3f})"
             for key, title in _SCORE_TITLES.items()
         ]
-        lines.append(f"  expect of {day_text}, mean (worst): {', '.join(score_texts)}")
+        lines.append(f"  expect of {left_out_unit_text}, mean (worst): {', '.join(score_texts)}")
     if "false_alarms_per_hour" in expected_performance:
         false_alarm_entry = expected_performance["false_alarms_per_hour"]
         missing_minutes = expected_performance["minutes_missing"]
@@ -606,10 +617,10 @@ def _left_out_test_text(fold_entry: Document) -> str:
     )
     if "score" not in fold_entry:
         return line
-    score = fold_entry["score"]
+    scores = fold_entry["score"]
     return (
-        f"{line}; {len(score['settings'])} classes {score['classes']:.3f}, healthy or faulty "
-        f"{score['healthy_or_faulty']:.3f}, side {score['side']:.3f}, mean error {score['mean_error']:.3f}"
+        f"{line}; {len(scores['settings'])} classes {scores['classes']:.3f}, healthy or faulty "
+        f"{scores['healthy_or_faulty']:.3f}, side {scores['side']:.3f}, mean error {scores['mean_error']:.3f}"
     )
 
 
@@ -619,8 +630,8 @@ def _servo_lag_text(output_error_fit: Document) -> str:
     return f"{output_error_fit['servo_lag_s']:.3f} s (sd {output_error_fit['servo_lag_sd_s']:.3f})"
 
 
-def _variance_inflation_text(factor: float | None) -> str:
-    return "made up by the others" if factor is None else f"{factor:.0f} times"
+def _inflation_factor_text(inflation_factor: float | None) -> str:
+    return "made up by the others" if inflation_factor is None else f"{inflation_factor:.0f} times"
 
 
 def _values_by_axis_text(values: dict[str, float]) -> str:
@@ -667,10 +678,12 @@ def fit_output_error(
     standard_errors = np.sqrt(
         np.maximum(np.diag(inverse_information), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun)
     )
-    held_out_error = standardized_simulation_error(optimum.x, held_out_window_slice).reshape(-1, 3) * rate_sd
-    explained_variance_share = 1.0 - held_out_error.var(axis=0) / window_rates[held_out_window_slice].reshape(
-        -1, 3
-    ).var(axis=0)
+    held_out_error_rad_s = (
+        standardized_simulation_error(optimum.x, held_out_window_slice).reshape(-1, 3) * rate_sd
+    )
+    explained_rate_variance_share = 1.0 - held_out_error_rad_s.var(axis=0) / window_rates[
+        held_out_window_slice
+    ].reshape(-1, 3).var(axis=0)
     return {
         "windows": len(window_rates),
         "servo_lag_s": float(optimum.x[0]),
@@ -678,7 +691,9 @@ def fit_output_error(
         "delay_s": float(optimum.x[1]),
         "delay_sd_s": float(standard_errors[1]),
         "shorter_than_can_be_told": bool(optimum.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": dict(zip("pqr", explained_variance_share.tolist(), strict=True)),
+        "explained_of_windows_not_fitted": dict(
+            zip("pqr", explained_rate_variance_share.tolist(), strict=True)
+        ),
     }
 
 
@@ -694,7 +709,7 @@ def _cut_free_run_windows(
     for usable_flight in usable_flights:
         samples = usable_flight.samples
         effectiveness = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        group_commands = np.column_stack(
+        summed_group_commands = np.column_stack(
             [
                 (samples.commands * effectiveness)[:, surface_indices].sum(axis=1)
                 for surface_indices in surface_groups
@@ -702,7 +717,7 @@ def _cut_free_run_windows(
         )
         is_usable = (
             usable_flight.is_usable
-            & np.isfinite(group_commands).all(axis=1)
+            & np.isfinite(summed_group_commands).all(axis=1)
             & np.isfinite(samples.rates).all(axis=1)
         )
         for window_end in range(n_past_samples + window_samples, len(is_usable), window_samples):
@@ -711,11 +726,11 @@ def _cut_free_run_windows(
                 is_usable[window_rows].all()
                 and samples.stretch_number[window_rows.start] == samples.stretch_number[window_end - 1]
             ):
-                window_commands.append(group_commands[window_rows])
+                window_commands.append(summed_group_commands[window_rows])
                 window_rates.append(samples.rates[window_end - window_samples : window_end])
     window_thinning_factor = max(len(window_rates) // _MAX_FREE_RUN_WINDOWS, 1)
-    commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
-    return np.reshape(window_commands[::window_thinning_factor], commands_shape), np.reshape(
+    window_commands_shape = (-1, n_past_samples + window_samples, len(surface_groups))
+    return np.reshape(window_commands[::window_thinning_factor], window_commands_shape), np.reshape(
         window_rates[::window_thinning_factor], (-1, window_samples, 3)
     )
 
@@ -742,19 +757,22 @@ def _simulate_free_runs(
     n_past_samples = window_commands.shape[1] - window_samples
     whole_delay_samples, delay_fraction = divmod(delay_s / dt_s, 1.0)
     servo_retention = np.exp(-dt_s / servo_lag_s)
-    predicted_rates, servo_positions = measured_rates[:, 0].copy(), window_commands[:, 0].copy()
+    current_simulated_rates, servo_positions = measured_rates[:, 0].copy(), window_commands[:, 0].copy()
     simulated_rates = np.empty_like(measured_rates)
     for k in range(window_commands.shape[1]):
         if k >= n_past_samples:
-            simulated_rates[:, k - n_past_samples] = predicted_rates
-            predicted_rates = (
-                predicted_rates @ rate_transition.T
+            simulated_rates[:, k - n_past_samples] = current_simulated_rates
+            current_simulated_rates = (
+                current_simulated_rates @ rate_transition.T
                 + servo_positions @ rate_step_per_servo_position
                 + constant_rate_step
             )
-        delayed_rows = max(k - int(whole_delay_samples), 0), max(k - int(whole_delay_samples) - 1, 0)
+        rows_around_delayed_time = (
+            max(k - int(whole_delay_samples), 0),
+            max(k - int(whole_delay_samples) - 1, 0),
+        )
         delayed_command = (1.0 - delay_fraction) * window_commands[
-            :, delayed_rows[0]
-        ] + delay_fraction * window_commands[:, delayed_rows[1]]
+            :, rows_around_delayed_time[0]
+        ] + delay_fraction * window_commands[:, rows_around_delayed_time[1]]
         servo_positions = servo_retention * servo_positions + (1.0 - servo_retention) * delayed_command
     return simulated_rates

@@ -58,7 +58,7 @@ class FilterSettings(Section):
         description="spread of the trim as a shift of each group's command",
         alias="trim_shift",
     )
-    trim_random_walk_sd: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
+    trim_walk_sd_per_sample: list[Annotated[Number, Field(ge=0, le=_MAX_COEFFICIENT)]] = Field(
         [3e-4] * 3,
         min_length=3,
         max_length=3,
@@ -332,8 +332,8 @@ class Model(Section):
         group_names = ["+".join(group) for group in self.groups]
         for name in self.settings.likely_effectiveness_levels_by_group:
             if name not in group_names:
-                level_reason = f"{name!r:.60} is no group, allowed: {', '.join(group_names)}"
-                yield ("settings", "levels", name), level_reason
+                unknown_group_reason = f"{name!r:.60} is no group, allowed: {', '.join(group_names)}"
+                yield ("settings", "levels", name), unknown_group_reason
         for k, delay_s in enumerate(self.settings.command_delay_offset_candidates_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
@@ -341,23 +341,23 @@ class Model(Section):
     def _shape_mistakes(self, n_past_rows: int) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones of `fitted` are not checked."""
         n_groups = len(self.groups)
-        expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
+        arrays_and_expected_shapes: list[tuple[Location, object, tuple[int, ...]]] = [
             (("past",), self.lagged_rate_and_signal_coefficients, (n_past_rows, 3)),
             (("response",), self.command_response, (n_groups, self.n_command_lags, 3)),
             (("response_sd",), self.command_response_standard_error, (n_groups, self.n_command_lags, 3)),
             (("noise",), self.residual_covariance, (3, 3)),
         ]
         for i, noise_model in enumerate(self.noise_models):
-            location_of_noise_model = ("colours", i)
+            noise_model_location = ("colours", i)
             n_ar_rows = -(-len(noise_model.ar_coefficients) // 3) * 3
-            expected_shapes += [
-                ((*location_of_noise_model, "noise"), noise_model.residual_covariance, (3, 3)),
-                ((*location_of_noise_model, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
+            arrays_and_expected_shapes += [
+                ((*noise_model_location, "noise"), noise_model.residual_covariance, (3, 3)),
+                ((*noise_model_location, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
             ]
             if noise_model.ma_coefficients[0] != 1.0:
-                yield (*location_of_noise_model, "average"), "does not begin with 1, allowed: 1, c1, ..."
+                yield (*noise_model_location, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (fitted_ranges := self.fitted_ranges) is not None:
-            optional_shapes: list[tuple[str, object, tuple[int, ...]]] = [
+            optional_arrays_and_shapes: list[tuple[str, object, tuple[int, ...]]] = [
                 ("commands", fitted_ranges.command_ranges, (len(fitted_ranges.command_ranges), 2)),
                 ("rates", fitted_ranges.rate_ranges_rad_s, (3, 2)),
                 ("airspeed", fitted_ranges.airspeed_range_mps, (2,)),
@@ -366,22 +366,24 @@ class Model(Section):
                 ("tied", fitted_ranges.effect_share_explained_by_others, (n_groups,)),
                 ("gain_sd", fitted_ranges.group_gain_standard_error, (n_groups,)),
             ]  # fmt: skip
-            expected_shapes += [
-                (("fitted", key), array, shape) for key, array, shape in optional_shapes if array
+            arrays_and_expected_shapes += [
+                (("fitted", key), array, shape) for key, array, shape in optional_arrays_and_shapes if array
             ]
-        for location, array, shape in expected_shapes:
+        for location, array, shape in arrays_and_expected_shapes:
             if not _has_shape(array, shape):
                 shape_text = " x ".join(map(str, shape))
                 yield location, f"has another shape, allowed: {shape_text} numbers"
 
     def _invalid_covariances_or_errors(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, CoefficientMatrix]] = [(("noise",), self.residual_covariance)]
-        covariances += [
+        locations_and_covariances: list[tuple[Location, CoefficientMatrix]] = [
+            (("noise",), self.residual_covariance)
+        ]
+        locations_and_covariances += [
             (("colours", i, "noise"), noise_model.residual_covariance)
             for i, noise_model in enumerate(self.noise_models)
         ]
-        for location, covariance_rows in covariances:
+        for location, covariance_rows in locations_and_covariances:
             covariance = np.array(covariance_rows)
             if abs(covariance - covariance.T).max() > 1e-6 * abs(covariance).max():
                 yield location, "is not symmetric, allowed: a covariance"
@@ -405,7 +407,7 @@ class Model(Section):
         """The model with one of its noise models only."""
         return self.model_copy(update={"noise_models": [noise_model]})
 
-    def with_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
+    def with_covariance_of_noise_model(self, ma_coefficients: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its
         `covariance_inflation_of_noise_model`; the model itself where none was fitted.
 

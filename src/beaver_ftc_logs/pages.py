@@ -312,7 +312,7 @@ def _rates_and_residual_in_liveliest_window(
     model: Model, held_out: fitting.FlightWithUsableRows, window_samples: int
 ) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the liveliest window; nan where nothing is known, for lines to end."""
-    rows, residual = fitting.one_step_residuals(model, held_out)
+    rows, residual = fitting.rows_and_one_step_residuals(model, held_out)
     rates_or_nan = np.full_like(held_out.samples.rates, np.nan)
     residual_or_nan = np.full_like(held_out.samples.rates, np.nan)
     rates_or_nan[rows], residual_or_nan[rows] = held_out.samples.rates[rows], residual
@@ -338,7 +338,7 @@ def _first_row_of_liveliest_window(
 def _spectrum_figure(usable_flights: Sequence[fitting.FlightWithUsableRows], model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = np.vstack(
-        [fitting.one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
+        [fitting.rows_and_one_step_residuals(model, usable_flight)[1] for usable_flight in usable_flights]
     )
     frequency_hz, density = power_spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)

@@ -577,7 +577,7 @@ def _flight_noise_whitening(samples: Samples, model: Model) -> tuple[Floats, flo
     one counts, and the logarithm of the size of the noise of a sample that is not filtered."""
     noise_covariance_inflation = model.covariance_inflation_of_noise_model(samples.noise_ma_coefficients)
     noise_covariance_root = np.linalg.cholesky(
-        model.with_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
+        model.with_covariance_of_noise_model(samples.noise_ma_coefficients).intercept_past_response_noise()[3]
         / noise_covariance_inflation
     )
     log_noise_sd_product = float(

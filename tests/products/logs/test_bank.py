@@ -59,7 +59,7 @@ def test_shares_are_those_of_the_settings(name):
         pytest.approx(1.0),
     )
     assert bank.change_probability_per_sample == pytest.approx(9.0 / 36000.0)
-    assert bank.no_response_index == len(bank.hypothesis_kind) - 1
+    assert bank.no_response_hypothesis_index == len(bank.hypothesis_kind) - 1
     assert bank.hypothesis_kind[[0, -1]].tolist() == [HEALTHY, NO_RESPONSE]
     assert bank.is_fault_hypothesis.tolist() == [
         kind in (GROUP_LOSS, PAIR_LOSS) for kind in bank.hypothesis_kind

@@ -107,10 +107,10 @@ def test_a_drift_of_the_trim_is_told_from_noise(monkeypatch):
     series = series * np.sqrt(np.diag(np.array(model.residual_covariance)))
     monkeypatch.setattr(fitting, "fit_with_same_order", lambda fitted, like: like)
     monkeypatch.setattr(
-        fitting, "time_whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
+        fitting, "rows_whitened_residual_and_responses", lambda like, kept: (np.arange(n), series, None)
     )
     usable_flights = fitting.flights_with_usable_rows([small.flight(model, 60)])
-    found = fitting._estimate_trim_random_walk_sd(usable_flights, model)
+    found = fitting._estimate_trim_walk_sd_per_sample(usable_flights, model)
     assert max(found[:2]) < 0.01
     assert found[2] == pytest.approx(0.05, rel=0.15)
 

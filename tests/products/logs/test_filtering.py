@@ -100,7 +100,7 @@ def with_settings(model, **changes):
 def test_the_trim_wanders_as_far_as_the_settings_say(wing_model):
     """A walk of so many residual sd a sample has gone 30 times that after 900 samples."""
     walk = [2e-3, 1e-3, 4e-3]
-    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_random_walk_sd=walk))
+    own = build_trim_and_gain_state_model(with_settings(wing_model, trim_walk_sd_per_sample=walk))
     noise_sd = np.sqrt(np.diag(np.array(wing_model.residual_covariance)))
     drawn = np.random.default_rng(6).standard_normal((4000, 900, 3)).sum(axis=1) * np.array(walk) * noise_sd
     np.testing.assert_allclose(np.sqrt(900 * own.random_walk_variance[:3]), drawn.std(axis=0), rtol=0.05)
@@ -122,7 +122,7 @@ def test_a_trim_that_drifts_is_followed_if_it_may(healthy, wing_model):
     for walk in (1e-6, 2e-2):
         model = with_settings(
             wing_model,
-            trim_random_walk_sd=[walk] * 3,
+            trim_walk_sd_per_sample=[walk] * 3,
             max_trim_deviation_in_sd=40.0,
             command_delay_offset_candidates_s=[0.0],
         )
@@ -146,7 +146,7 @@ def test_the_scale_of_the_noise_has_the_memory_of_the_settings(healthy, wing_mod
     bank = build_hypothesis_bank(model)
     posterior, _, scale = hypothesis_posterior(replace(healthy, rates=rates), model, bank)
     begin, end = 620, 620 + round(0.4 * memory_s * wing_model.rate_hz)
-    answering = 1.0 - posterior[begin + 1 : end + 1, bank.no_response_index].mean()
+    answering = 1.0 - posterior[begin + 1 : end + 1, bank.no_response_hypothesis_index].mean()
     grown = np.log(scale[end] / scale[begin])
     assert scale[end] < 6.0
     assert grown == pytest.approx(0.4 * (3.0 - 0.93) * answering, rel=0.02)

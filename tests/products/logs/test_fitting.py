@@ -376,7 +376,7 @@ def test_what_one_step_prediction_explains(usable_flights):
     (usable_flight,) = usable_flights
     samples, use = usable_flight.samples, usable_flight.is_usable
     left = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    rows, residual = fitting.one_step_residuals(MODEL, usable_flight)
+    rows, residual = fitting.rows_and_one_step_residuals(MODEL, usable_flight)
     expected = [k for k in np.flatnonzero(use) if k >= 3]
     assert rows.tolist() == expected
     for i in (0, 100, len(expected) - 1):
@@ -427,7 +427,7 @@ def test_a_model_is_trusted_as_far_as_its_worst_parts_allow(monkeypatch):
     """The noisiest of all parts, and of the first four the one that is read wrongly most easily."""
     noise, misread = {1: 0.7, 2: 2.5, 3: 1.4, 4: 1.1, 5: 0.9}, {1: 0.2, 2: 0.6, 3: 0.1, 4: 0.3, 5: 9.0}
     left_out = [("half", [1, 2]), ("other", [3, 4, 5])]
-    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *of: left_out)
+    monkeypatch.setattr(fitting, "_fold_models_and_held_out_flights", lambda *of: left_out)
     monkeypatch.setattr(
         fitting,
         "_noise_scale_and_healthy_alarm_peaks",

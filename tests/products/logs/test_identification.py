@@ -241,7 +241,7 @@ def test_a_spectrum_by_bands():
     assert ends == [(0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0)]
     from scipy import signal
 
-    residual = fitting.one_step_residuals(model, usable_flights[0])[1]
+    residual = fitting.rows_and_one_step_residuals(model, usable_flights[0])[1]
     frequency, density = signal.welch(residual, fs=20.0, nperseg=256, axis=0)
     for (low, high), band in zip(ends, bands, strict=True):
         inside = (frequency > low) & (frequency <= high)

@@ -172,9 +172,9 @@ def test_the_scale_of_the_noise_is_of_residuals_however_wide_it_is_taken(wider):
     flight = replace(small.flight(model, 3000, seed=3), noise_ma_coefficients=(1.0,))
     scale = hypothesis_posterior(flight, model, build_hypothesis_bank(model))[2]
     assert scale[-1] == pytest.approx(1.0, abs=0.15)
-    assert build_residual_noise(model.with_noise_model((1.0,)), (1.0,)).covariance == pytest.approx(
-        wider * np.array(model.residual_covariance)
-    )
+    assert build_residual_noise(
+        model.with_covariance_of_noise_model((1.0,)), (1.0,)
+    ).covariance == pytest.approx(wider * np.array(model.residual_covariance))
 
 
 @pytest.mark.parametrize(("average", "factor"), [((1.0, -0.8, 0.16), 1.7), ((1.0, 0.5), 2.5), ((1.0,), 2.5)])
@@ -182,7 +182,7 @@ def test_of_another_law_the_noise_is_taken_wider(monkeypatch, average, factor):
     """By what was seen to be asked for after gyros and after gusts; of the laws seen not at all."""
     plain = small.model(small.WING | {"moving_air": True})
     colour = NoiseModel(average=list(average), noise=plain.residual_covariance)
-    monkeypatch.setattr(fitting, "_cross_validation_fits", lambda *_: [(model, usable_flights)])
+    monkeypatch.setattr(fitting, "_fold_models_and_held_out_flights", lambda *_: [(model, usable_flights)])
     found = []
     for laws in (False, True):
         vehicle = plain.vehicle.model_copy(update={"other_laws": laws})
@@ -266,7 +266,9 @@ def test_a_flight_is_tried_with_noise_that_no_fitted_flight_had(moving):
     }
     for one in others:
         white = fitting.flights_with_usable_rows([whiten_samples(flights[0], one.ma_coefficients)])[0]
-        assert np.allclose(one.residual_covariance, np.cov(fitting.one_step_residuals(model, white)[1].T))
+        assert np.allclose(
+            one.residual_covariance, np.cov(fitting.rows_and_one_step_residuals(model, white)[1].T)
+        )
     assert (np.diff([np.linalg.det(one.residual_covariance) for one in gyros]) > 0.0).all()
     assert {one.covariance_inflation for one in gyros} == {model.noise_models[0].covariance_inflation}
     assert identification.add_unseen_noise_models(small.model(), flights).noise_models == []

@@ -82,7 +82,9 @@ def test_a_groups_levels_are_over_all_hypotheses_but_the_idle_one():
     bank = build_hypothesis_bank(WING)
     posterior = np.arange(1.0, len(bank.hypothesis_kind) + 1)[None, :] / 1000.0
     for group in (0, 1):
-        levels, mass = diagnose._group_level_distribution(bank, posterior[:, : bank.no_response_index], group)
+        levels, mass = diagnose._group_level_distribution(
+            bank, posterior[:, : bank.no_response_hypothesis_index], group
+        )
         assert levels.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
         for level, found in zip(levels, mass[0], strict=True):
             its = (bank.effectiveness[:-1, group] == level).nonzero()[0]

@@ -198,7 +198,7 @@ def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     excesses = np.array(tail.excess_over_level)
     scale_grid = max(float(excesses.mean()), MIN_DIVISOR) * _PARETO_SCALE_RATIO_GRID
     pareto_shapes, pareto_scales = (
-        grid.ravel() for grid in np.meshgrid(_PARETO_SHAPE_GRID, scale_grid, indexing="ij")
+        mesh_array.ravel() for mesh_array in np.meshgrid(_PARETO_SHAPE_GRID, scale_grid, indexing="ij")
     )
     log_posterior = (
         genpareto.logpdf(excesses[:, None], pareto_shapes, scale=pareto_scales).sum(axis=0)

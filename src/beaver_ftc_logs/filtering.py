@@ -344,7 +344,7 @@ def run_bank(
 
 
 @kernel
-def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_walk_variance):
+def _mix_hypotheses(hypothesis_probabilities, state_means, state_covariances, bank, random_walk_variance):
     """Interaction of the hypotheses: each may change to any other. state_means (H, N) and state_covariances
     (H, N, N) are replaced. Returns the prior probabilities (H,)."""
     n_hypotheses, n_states = state_means.shape
@@ -352,11 +352,11 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
     mixed_mean = np.zeros(n_states)
     mixed_covariance = np.zeros((n_states, n_states))
     for h in range(n_hypotheses):
-        mixed_mean += probabilities[h] * state_means[h]
+        mixed_mean += hypothesis_probabilities[h] * state_means[h]
     for h in range(n_hypotheses):
         for i in range(n_states):
             for j in range(n_states):
-                mixed_covariance[i, j] += probabilities[h] * (
+                mixed_covariance[i, j] += hypothesis_probabilities[h] * (
                     state_covariances[h, i, j]
                     + (state_means[h, i] - mixed_mean[i]) * (state_means[h, j] - mixed_mean[j])
                 )
@@ -364,12 +364,12 @@ def _mix_hypotheses(probabilities, state_means, state_covariances, bank, random_
     prior_probability_sum = 0.0
     for h in range(n_hypotheses):
         prior_probabilities[h] = (
-            stay_probability * probabilities[h]
+            stay_probability * hypothesis_probabilities[h]
             + bank.change_probability_per_sample * bank.transition_share[h]
         )
         prior_probability_sum += prior_probabilities[h]
         _merge_gaussians_and_add_variances(
-            stay_probability * probabilities[h] / prior_probabilities[h],
+            stay_probability * hypothesis_probabilities[h] / prior_probabilities[h],
             state_means[h],
             state_covariances[h],
             mixed_mean,
@@ -483,19 +483,19 @@ def _correct_hypotheses(
             - 0.5 * log_determinant
         )
     max_hypothesis_log_likelihood = log_likelihoods.max()
-    probabilities = np.maximum(
+    hypothesis_probabilities = np.maximum(
         prior_probabilities * np.exp(log_likelihoods - max_hypothesis_log_likelihood),
         _MIN_HYPOTHESIS_PROBABILITY,
     )
-    probability_sum = probabilities.sum()
-    probabilities /= probability_sum
+    probability_sum = hypothesis_probabilities.sum()
+    hypothesis_probabilities /= probability_sum
     mean_clipped_squared_residual = 0.0
     for h in range(n_hypotheses):
-        mean_clipped_squared_residual += probabilities[h] * min(
+        mean_clipped_squared_residual += hypothesis_probabilities[h] * min(
             noise.covariance_inflation * squared_residuals[h], 3.0 * _SQUARED_RESIDUAL_CLIP_PER_AXIS
         )
     return (
-        probabilities,
+        hypothesis_probabilities,
         mean_clipped_squared_residual,
         max_hypothesis_log_likelihood + np.log(probability_sum),
     )

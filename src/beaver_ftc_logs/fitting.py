@@ -846,13 +846,13 @@ def _max_gain_bias_under_one_law(usable_flights: Sequence[FlightWithUsableRows],
             for usable_flight in usable_flights
             if list(usable_flight.samples.noise_ma_coefficients) == noise_model.ma_coefficients
         ]
-        residuals, n_samples = np.vstack(residuals_by_flight), sum(map(len, residuals_by_flight))
+        stacked_residuals, n_samples = np.vstack(residuals_by_flight), sum(map(len, residuals_by_flight))
         variance_share_explained_by_chance = (
             3.0 * AUTOREGRESSIVE_ORDER / n_samples if noise_model.ar_coefficients else 0.0
         )
         log_determinant_ratio = (
             np.linalg.slogdet(np.array(noise_model.residual_covariance))[1]
-            - np.linalg.slogdet(np.cov(residuals.T))[1]
+            - np.linalg.slogdet(np.cov(stacked_residuals.T))[1]
         )
         unmodelled_variance_share = max(
             unmodelled_variance_share,

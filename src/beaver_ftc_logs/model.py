@@ -317,7 +317,7 @@ class Model(Section):
             *self._shape_mistakes(len(self.lagged_rate_and_signal_coefficients)),
         ]
         refuse(mistakes)  # before any of it is computed with
-        refuse(self._invalid_covariances_or_errors())
+        refuse(self._covariance_and_standard_error_mistakes())
         return self
 
     def _group_and_settings_mistakes(self) -> Iterator[Conflict]:
@@ -374,7 +374,7 @@ class Model(Section):
                 shape_text = " x ".join(map(str, shape))
                 yield location, f"has another shape, allowed: {shape_text} numbers"
 
-    def _invalid_covariances_or_errors(self) -> Iterator[Conflict]:
+    def _covariance_and_standard_error_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
         locations_and_covariances: list[tuple[Location, CoefficientMatrix]] = [
             (("noise",), self.residual_covariance)

@@ -10,7 +10,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_uncertainty_bound_now
-from beaver_ftc.diagnosis.detection.filters import update_max_residual_over_threshold
+from beaver_ftc.diagnosis.detection.filters import update_max_residual_ratio_by_filter
 from beaver_ftc.diagnosis.model_prediction import evaluate_bound_and_frame_means, evaluate_design_model
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.stepping import diagnose
@@ -38,7 +38,7 @@ def evaluate(frames):
 @kernel
 def note(frames):
     """How close the residuals have come to their thresholds."""
-    update_max_residual_over_threshold(frames[0].fdi.bank)
+    update_max_residual_ratio_by_filter(frames[0].fdi.bank)
 
 
 def conclude(frames):

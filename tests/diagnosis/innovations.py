@@ -144,7 +144,7 @@ def filter_all(block, innovations, dt, out):
     for k in range(len(innovations)):
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.whiten(block, block.state, block.frame_innovation, dt, out[k])
+        likelihood.advance_whitening_filter(block, block.state, block.frame_innovation, dt, out[k])
 
 
 @kernel
@@ -155,11 +155,11 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regr
             likelihood.reset_onset_slot(block, likelihood.onset_slot_to_reset(first + k))
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = innovations[k]
-        likelihood.whiten(
+        likelihood.advance_whitening_filter(
             block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
         )
         for j in range(block.n_regressors):
-            likelihood.whiten(
+            likelihood.advance_whitening_filter(
                 block, block.regressor_filter_state[j], regressors[k, j], dt, block.regressor_response[j]
             )
         for h in range(block.n_hypotheses):
@@ -175,7 +175,7 @@ def bounded_all(block, d, signatures, onset, dt):
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
         block.frame_innovation[: block.n_axes] = d[k]
-        likelihood.whiten(
+        likelihood.advance_whitening_filter(
             block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
         )
         for h in range(block.n_hypotheses):

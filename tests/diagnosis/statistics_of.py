@@ -128,14 +128,16 @@ class Across:
     def observe(fdi, innovation, G, Gu, y, frame, latched):
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["test_config"]
-        parity.update_view_directions_and_signatures(views, record["forces"], record["gust"], bound, G, Gu)
+        parity.prepare_views_for_frame(views, record["forces"], record["gust"], bound, G, Gu)
         parts = (record[name] for name in ("noise", "block", "forces", "gust", "inertial_gust"))
-        parity.fill_view_innovations_and_noise(views, int(tests["uses_regressors"]), *parts, innovation, y[2])
+        parity.fill_view_innovations_noise_regressors(
+            views, int(tests["uses_regressors"]), *parts, innovation, y[2]
+        )
         parity.update_view_tests(views, tests, record["tone_config"], y, fdi["config"]["dt"], frame, latched)
 
     @staticmethod
-    def is_view_sensitive_to_fault(fdi, view, s, column):
-        return parity.is_view_sensitive_to_fault(view, fdi["statistical"]["forces"], s, column)
+    def can_surface_fault_change_view(fdi, view, s, column):
+        return parity.can_surface_fault_change_view(view, fdi["statistical"]["forces"], s, column)
 
     @staticmethod
     def shown(record, view):

@@ -258,7 +258,7 @@ def assess_unknown_acceleration(
             statistical_detector.block, statistical_detector.gust, unknown_acceleration
         )
     elif conclusion.detected and not accommodates_lag:
-        filters.fill_fdae_unmodelled_acceleration(
+        filters.fill_fdae_unmodelled_acceleration_estimate(
             fdae, bound_record.changing_gyro_error_bound, unknown_acceleration
         )
     fault_is_undecided = (

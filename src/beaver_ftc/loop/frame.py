@@ -525,7 +525,7 @@ def account(frame):
     if truth.faulted:
         account_authority(sums.authority, control.axes)
     else:
-        filters.update_max_residual_over_threshold(frame.fdi.bank)
+        filters.update_max_residual_ratio_by_filter(frame.fdi.bank)
         statistical.update_max_alarm_score_so_far(frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)

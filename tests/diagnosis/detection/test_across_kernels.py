@@ -8,7 +8,7 @@ from statistics_of import Across
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.likelihood import MIN_UNCERTAINTY_BOUND_RAD_S2, STEP_FAULT
+from beaver_ftc.diagnosis.detection.likelihood import MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2, STEP_FAULT
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, USUAL_RECORD_SIZE, configure_parity_views
 from beaver_ftc.diagnosis.schemes.adaptive_estimators import parity_excludes
 from beaver_ftc.diagnosis.state import LOSS, POSITION
@@ -129,7 +129,7 @@ def declared_along(statistical, m):
             @ turned.T
         )
     moves = float(air["output"]["accounts_for_gusts"])
-    size = max(bound, MIN_UNCERTAINTY_BOUND_RAD_S2)
+    size = max(bound, MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2)
     drift = statistical["noise"]["drift_intensity_over_squared_bound"] * size**2 + moves * V * m @ walk @ m
     jitter = (np.abs(m) @ np.sqrt(statistical["noise"]["acceleration_variance_by_input_noise"])) ** 2
     return (
@@ -174,7 +174,9 @@ def test_where_no_uncertainty_is_declared_the_least_is_reckoned_with(fdi):
     statistical["noise"]["uncertainty_bound"], statistical["gust"]["output"]["accounts_for_gusts"] = 0.0, 0
     Across.blur(view, statistical, V)
     assert view["uncertainty_bound"][0] == 0.0
-    assert view["block"]["drift_intensity"][0, 0] == pytest.approx(2.0 * MIN_UNCERTAINTY_BOUND_RAD_S2**2)
+    assert view["block"]["drift_intensity"][0, 0] == pytest.approx(
+        2.0 * MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2**2
+    )
 
 
 def test_what_constants_multiply_is_that_of_the_axes_along_the_direction(fdi):
@@ -216,9 +218,7 @@ def test_of_what_goes_along_a_column_that_may_be_turned_a_share_shows_across(
     e = fdi["bound"]["surface_term_error_bound_per_rad"][[0, 2], AILERON]
     corners = [e * (s, t) for s in (-1, 1) for t in (-1, 1)]
     most = max(abs(m @ c) for c in corners)
-    least = max(
-        size - max(abs(along @ c) for c in corners), parity.MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS * size
-    )
+    least = max(size - max(abs(along @ c) for c in corners), parity.COLUMN_NORM_SHARE_FLOOR * size)
     shown = has_surface_term_errors * most / least * (along @ innovation[[0, 2]])
     n = int(fdi["statistical"]["block"][1]["n_regressors"])
     assert view["block"]["regressor"][n, 0] == pytest.approx(shown)
@@ -242,9 +242,9 @@ def test_a_fault_shows_along_every_axis_that_its_column_moves(fdi, axis):
     view = fdi["statistical"]["views"][PAST_RUDDER]
     moved = np.eye(3)[axis]
     view["direction"][:3] = moved
-    assert Across.is_view_sensitive_to_fault(fdi, view, AILERON, 1e-6 * moved)
-    assert not Across.is_view_sensitive_to_fault(fdi, view, AILERON, 1.0 - moved)
-    assert not Across.is_view_sensitive_to_fault(fdi, view, RUDDER, moved), (
+    assert Across.can_surface_fault_change_view(fdi, view, AILERON, 1e-6 * moved)
+    assert not Across.can_surface_fault_change_view(fdi, view, AILERON, 1.0 - moved)
+    assert not Across.can_surface_fault_change_view(fdi, view, RUDDER, moved), (
         "across its own column it shows nothing"
     )
 
@@ -261,7 +261,7 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi
     for k in range(20):
         Across.observe(fdi, course[k] * G[:, surface], G, 0.05 * G, FLOW, k, False)
     for v, view in enumerate(statistical["views"][:5]):
-        felt = Across.is_view_sensitive_to_fault(fdi, view, surface, G[:, surface])
+        felt = Across.can_surface_fault_change_view(fdi, view, surface, G[:, surface])
         assert felt == (v not in blind)
         assert (np.abs(view["block"]["onset_tests"]["correlation"]).max() > 1e-6) == felt
 

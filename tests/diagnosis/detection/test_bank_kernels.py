@@ -19,7 +19,7 @@ def test_a_filter_and_its_bound_are_convolutions_of_what_went_in():
     for k in range(frames):
         fdi["bound"]["eta_bar"], fdi["bound"]["changing_gyro_error_bound_before"] = eta[k], noise[k]
         fdi["bound"]["changing_gyro_error_bound"] = noise[k + 1]
-        on(filters.update_residuals_and_thresholds, fdi, x[k + 1], x[k], believed[k])
+        on(filters.update_innovation_residuals_and_thresholds, fdi, x[k + 1], x[k], believed[k])
     innovation = np.diff(x, axis=0) / DT - believed
     assert fdi["bank"]["output"]["innovation"] == pytest.approx(innovation[-1])
     assert fdi["bound"]["frame_innovation_bound"] == pytest.approx(eta[-1] + (noise[-1] + noise[-2]) / DT)
@@ -63,12 +63,12 @@ def test_the_closest_approach_of_every_filter_is_kept():
         (0.6, 0.0, 0.0),
         0.4,
     )
-    filters.update_max_residual_over_threshold(fdi["bank"])
+    filters.update_max_residual_ratio_by_filter(fdi["bank"])
     statistical.update_max_alarm_score_so_far(alarm)
     assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.6, 1.5, 1.2])
     assert alarm["max_score_over_alarm_level_so_far"] == 0.4
     silent = new_fdi()
-    filters.update_max_residual_over_threshold(silent["bank"])
+    filters.update_max_residual_ratio_by_filter(silent["bank"])
     assert not silent["bank"]["output"]["max_residual_over_threshold_so_far"].any()
     assert on(filters.max_residual_threshold_ratio, silent) == 0.0
 
@@ -164,7 +164,7 @@ def test_a_filter_without_a_bound_has_no_share_of_it():
     with np.errstate(divide="ignore"):
         assert on(filters.max_residual_threshold_ratio, fdi) == pytest.approx(1.5)
         assert [filters.filter_nearest_to_alarm(fdi["bank"], i) for i in range(3)] == [2, 1, 2]
-        filters.update_max_residual_over_threshold(fdi["bank"])
+        filters.update_max_residual_ratio_by_filter(fdi["bank"])
     assert fdi["bank"]["output"]["max_residual_over_threshold_so_far"][:3] == pytest.approx([0.0, 1.5, 1.2])
     assert on(filters.bank_alarm_axis, fdi) == 0
 

@@ -37,7 +37,7 @@ def test_the_basis_is_that_of_gaussians_as_wide_as_their_spacing(alpha, beta):
     ("residual", "left"), [(0.5, 0.2), (0.3, 0.0), (-0.3, 0.0), (-0.5, -0.2), (0.1, 0.0)]
 )
 def test_the_dead_zone_leaves_the_excess(residual, left):
-    assert detection_filters.apply_dead_zone(residual, 0.3) == pytest.approx(left)
+    assert detection_filters.signed_excess_over_threshold(residual, 0.3) == pytest.approx(left)
 
 
 def test_the_output_is_the_weights_on_the_basis():
@@ -71,10 +71,10 @@ def test_weights_learn_what_exceeds_the_threshold_and_leak(leaking):
 def test_a_diagnosis_begins_with_no_residual_and_the_gyros_error_to_come():
     fdi = new_fdi()
     fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2, 0.3
-    on(detection_filters.start_fdae, fdi, np.array([1.0, 2.0, 3.0]))
+    on(detection_filters.start_fdae_rates_and_gyro_bounds, fdi, np.array([1.0, 2.0, 3.0]))
     assert fdi["fdae"]["memory"]["xhat"] == pytest.approx([1.0, 2.0, 3.0])
     assert fdi["fdae"]["memory"]["threshold_gyro_error_part"] == pytest.approx([0.1, 0.2, 0.3])
-    on(detection_filters.start_bank, fdi)
+    on(detection_filters.start_bank_gyro_error_bounds, fdi)
     assert fdi["bank"]["memory"]["threshold_gyro_error_part"][:3] == pytest.approx(
         np.tile([0.1, 0.2, 0.3], (3, 1))
     )
@@ -150,7 +150,7 @@ def test_beyond_the_model_is_what_was_learnt_and_the_residual_beyond_noise():
     record["network"]["output"], record["config"]["pole_per_s"] = 0.1, (2.0, 3.0, 4.0)
     record["output"]["residual"] = 0.5, -0.5, 0.05
     record["memory"]["threshold_gyro_error_part"], fdi["bound"]["changing_gyro_error_bound"] = 0.1, 0.2
-    on(detection_filters.fill_fdae_unmodelled_acceleration, fdi, out)
+    on(detection_filters.fill_fdae_unmodelled_acceleration_estimate, fdi, out)
     assert out == pytest.approx([0.1 + 2.0 * 0.2, 0.1 - 3.0 * 0.2, 0.1])
 
 

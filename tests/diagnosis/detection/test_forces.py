@@ -86,6 +86,9 @@ def test_how_fast_a_flow_angle_may_drift_is_by_gyros_attitude_and_accelerometers
     gyros = 0.007 + 0.2 * 0.07
     side = 9.7 * 0.024 + 0.5 + 0.3 * 0.3 + EARTH_ACCELERATION_BOUND_M_S2
     normal = 0.3 * 9.7 * 0.024 + 0.7 + 0.3 * 0.3 + 9.7 * 0.16 + EARTH_ACCELERATION_BOUND_M_S2
-    for component, acceleration in ((forces.SIDE_COMPONENT, side), (forces.NORMAL_COMPONENT, normal)):
+    for component, acceleration in (
+        (forces.SIDE_INDEX_AMONG_FORCES, side),
+        (forces.NORMAL_INDEX_AMONG_FORCES, normal),
+    ):
         found = forces._flow_angle_drift_bound(errors, 9.7, 45.0, component)
         assert found == pytest.approx(EARTH_RATE_RAD_S + gyros + acceleration / 45.0)

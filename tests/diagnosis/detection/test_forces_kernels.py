@@ -11,8 +11,8 @@ from beaver_ftc.aircraft.schema import SIDESLIP_RATE
 from beaver_ftc.design.model import fill_table, slipstream_slopes
 from beaver_ftc.diagnosis.detection import forces, parity, statistical
 from beaver_ftc.diagnosis.detection.forces import (
-    NORMAL_COMPONENT,
-    SIDE_COMPONENT,
+    NORMAL_INDEX_AMONG_FORCES,
+    SIDE_INDEX_AMONG_FORCES,
     configure_forces,
     update_all_force_innovations,
 )
@@ -75,11 +75,11 @@ def per_coefficient(y=Y):
     return y[3] * AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg / AIRCRAFT.geometry.chord_m
 
 
-@pytest.mark.parametrize(("f", "name"), [(SIDE_COMPONENT, "CY"), (NORMAL_COMPONENT, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX_AMONG_FORCES, "CY"), (NORMAL_INDEX_AMONG_FORCES, "CZ")])
 def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, name):
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
-    record["flow_angle_rate"][SIDE_COMPONENT], record["n_updates_capped_at_minimum"] = rate, 1
+    record["flow_angle_rate"][SIDE_INDEX_AMONG_FORCES], record["n_updates_capped_at_minimum"] = rate, 1
     update_all_force_innovations(record, fdi["statistical"]["gust"], seen, U, DT)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
@@ -91,16 +91,16 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
     values += [
         t.value
         for t in AIRCRAFT.forces
-        if t.coefficient == "CY" and f == SIDE_COMPONENT and "betadoth" in dict(t.of)
+        if t.coefficient == "CY" and f == SIDE_INDEX_AMONG_FORCES and "betadoth" in dict(t.of)
     ]
     terms = force["regressor"][: n - 1]
-    if f == SIDE_COMPONENT:
+    if f == SIDE_INDEX_AMONG_FORCES:
         terms = np.append(terms[:-1], terms[-1] / values[-1])
         assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
     assert np.dot(values, terms) == pytest.approx(whole)
 
 
-@pytest.mark.parametrize(("f", "name"), [(SIDE_COMPONENT, "CY"), (NORMAL_COMPONENT, "CZ")])
+@pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX_AMONG_FORCES, "CY"), (NORMAL_INDEX_AMONG_FORCES, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
     record = fdi["statistical"]["forces"]
@@ -109,8 +109,8 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
         slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
-        assert force["scaled_force_per_surface_rad"][s] == pytest.approx(slope, abs=1e-9)
-        assert force["scaled_force_of_surface_at_command"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        assert force["chord_scaled_force_per_surface_rad"][s] == pytest.approx(slope, abs=1e-9)
+        assert force["chord_scaled_force_of_surface_at_command"][s] == pytest.approx(slope * U[s], abs=1e-9)
         own = [
             t
             for t in AIRCRAFT.measurable_forces
@@ -119,7 +119,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
         size = sum(
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
-        assert force["scaled_force_per_surface_rad_error_bound"][s] == pytest.approx(
+        assert force["chord_scaled_force_per_surface_rad_error_bound"][s] == pytest.approx(
             0.05 * per_coefficient() * size
         )
 
@@ -137,7 +137,7 @@ def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     assert record["flow_angle_rate"] == pytest.approx((now - then) / step, rel=1e-4)
 
 
-@pytest.mark.parametrize(("f", "place"), [(SIDE_COMPONENT, 1), (NORMAL_COMPONENT, 0)])
+@pytest.mark.parametrize(("f", "place"), [(SIDE_INDEX_AMONG_FORCES, 1), (NORMAL_INDEX_AMONG_FORCES, 0)])
 def test_followed_by_inertial_motion_a_force_does_not_know_its_vane(f, place):
     """Whatever a vane says after the first frame, what is left of the force is the same but for curvature."""
     courses = np.zeros(30), np.append(0.0, np.random.default_rng(3).normal(0.0, 0.002, 29).cumsum())
@@ -166,7 +166,7 @@ def test_the_angle_followed_is_the_sum_of_its_rates_and_its_drift_is_counted():
     record = fdi["statistical"]["forces"]
     for _ in range(11):
         update_all_force_innovations(record, fdi["statistical"]["gust"], measured(), U, DT)
-    for f, place in ((SIDE_COMPONENT, 1), (NORMAL_COMPONENT, 0)):
+    for f, place in ((SIDE_INDEX_AMONG_FORCES, 1), (NORMAL_INDEX_AMONG_FORCES, 0)):
         force = record["component"][f]
         assert force["inertial_flow_angle"] == pytest.approx(
             Y[place] + 10 * DT * record["flow_angle_rate"][f]
@@ -236,7 +236,9 @@ def test_noise_of_accelerometers_is_jitter_that_the_pressure_does_not_scale():
         record["component"]["inertial_innovation_drift_intensity"]
         - felt()["statistical"]["forces"]["component"]["inertial_innovation_drift_intensity"]
     )
-    walked = [(0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_COMPONENT, NORMAL_COMPONENT)]
+    walked = [
+        (0.04, 0.07)[f] / Y[2] * np.sqrt(DT) for f in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
+    ]
     assert np.sqrt(more) == pytest.approx(
         np.abs(record["component"]["axis_and_force_innovation_per_vane_error"][:, 1]) * walked
     )
@@ -247,7 +249,7 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
     sensors = {"ay": {"bias_mps2": -0.2}, "az": {"bias_mps2": 0.3, "scale_error": -0.01}}
     record, none = (felt(Bounds(sensors=given))["statistical"]["forces"] for given in (sensors, {}))
     update_all_force_innovations(record, felt()["statistical"]["gust"], measured(), U, DT)
-    for f, bias, scale in ((SIDE_COMPONENT, 0.2, 0.0), (NORMAL_COMPONENT, 0.3, 0.01)):
+    for f, bias, scale in ((SIDE_INDEX_AMONG_FORCES, 0.2, 0.0), (NORMAL_INDEX_AMONG_FORCES, 0.3, 0.01)):
         force, before = record["component"][f], none["component"][f]
         n = int(force["n_regressors"])
         assert n == before["n_regressors"] + 1
@@ -256,8 +258,8 @@ def test_bias_and_slope_of_accelerometers_are_tolerated():
         assert force["regressor_tolerance"][n - 1] == pytest.approx(forces.MASS_TOLERANCE + scale)
         assert force["regressor_tolerance"][: n - 2] == pytest.approx(before["regressor_tolerance"][: n - 2])
     whole = per_coefficient() * coefficient("CZ")
-    assert record["component"][NORMAL_COMPONENT]["regressor"][
-        int(record["component"][NORMAL_COMPONENT]["n_regressors"]) - 1
+    assert record["component"][NORMAL_INDEX_AMONG_FORCES]["regressor"][
+        int(record["component"][NORMAL_INDEX_AMONG_FORCES]["n_regressors"]) - 1
     ] == pytest.approx(whole)
 
 
@@ -266,7 +268,9 @@ def test_without_accelerometers_no_force_is_weighed(viewed):
     statistical["inertial_gust"]["output"]["accounts_for_gusts"] = 1
     views = statistical["views"]
     views["decaying_peak_score"], views["block"]["hypothesis"]["score"][:, 0] = 50.0, 50.0
-    forces.stop_using_forces(*(statistical[name] for name in ("forces", "gust", "inertial_gust")))
+    forces.stop_using_forces_and_accelerometers(
+        *(statistical[name] for name in ("forces", "gust", "inertial_gust"))
+    )
     assert not statistical["gust"]["output"]["uses_accelerometers"]
     assert not statistical["inertial_gust"]["output"]["accounts_for_gusts"]
     for v in (ELEVATOR_VIEW, ALPHA_VIEW, UP_VIEW, SIDE_VIEW):
@@ -346,7 +350,9 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
         view["direction"] = 0.0, -0.6, 0.0, 0.0, 0.8
         Across.blur(view, statistical, 45.0)
         own = 0.8 * np.sqrt(
-            statistical["forces"]["component"][NORMAL_COMPONENT]["noise_variance_with_without_vane"][0]
+            statistical["forces"]["component"][NORMAL_INDEX_AMONG_FORCES]["noise_variance_with_without_vane"][
+                0
+            ]
         )
         assert view["block"]["model_noise_variance"][0] == pytest.approx(
             (own + 0.6 * 0.2 * angular_acceleration_by_gust_noise_std) ** 2
@@ -355,7 +361,10 @@ def test_noise_of_the_gust_that_forces_tell_blurs_what_clears_a_vane(viewed):
 
 def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
     record = felt()["statistical"]["forces"]
-    for f, name, place, axis in ((SIDE_COMPONENT, "CY", 1, 2), (NORMAL_COMPONENT, "CZ", 0, 1)):
+    for f, name, place, axis in (
+        (SIDE_INDEX_AMONG_FORCES, "CY", 1, 2),
+        (NORMAL_INDEX_AMONG_FORCES, "CZ", 0, 1),
+    ):
         off = Y + 1e-5 * np.eye(5)[place]
         slope = per_coefficient() * (coefficient(name, y=off) - coefficient(name)) / 1e-5
         assert record["component"][f]["axis_and_force_innovation_per_vane_error"] == pytest.approx(
@@ -365,8 +374,8 @@ def test_a_vane_s_error_moves_rate_and_force_by_their_slopes():
 
 def test_constant_errors_are_tolerated_term_by_term():
     given = Bounds(coefficients=0.05, sensors={"alpha": {"bias_deg": 0.5}, "qdyn": {"bias_pa": 23.0}})
-    force = felt(given)["statistical"]["forces"]["component"][NORMAL_COMPONENT]
-    terms = forces.force_terms(AIRCRAFT, NORMAL_COMPONENT)
+    force = felt(given)["statistical"]["forces"]["component"][NORMAL_INDEX_AMONG_FORCES]
+    terms = forces.terms_of_one_force(AIRCRAFT, NORMAL_INDEX_AMONG_FORCES)
     shares = force["regressor_tolerance"][: len(terms)] / np.abs([t.value for t in terms])
     assert shares[1:] == pytest.approx(0.05 + 23.0 / 1150.0)
     slope = abs(force["axis_and_force_innovation_per_vane_error"][1]) / per_coefficient()
@@ -433,7 +442,7 @@ def viewed():
 @pytest.mark.parametrize(("before", "begun", "expected"), [(1.0, 1, 0.3), (2.2, 1, 0.3), (1.0, 0, 0.0)])
 def test_a_force_is_off_by_what_it_changes_in_two_milliseconds(before, begun, expected):
     force = new_fdi()["statistical"]["forces"]["component"][0]
-    force["predicted_scaled_force"] = 1.6
+    force["predicted_chord_scaled_force"] = 1.6
     forces.fill_force_flow_lag_error_bound(force, before, begun, 0.004)
     assert force["force_flow_lag_error_bound"] == pytest.approx(expected)
 
@@ -443,7 +452,7 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
     view["direction"] = 0.0, 0.6, 0.0, 0.0, -0.8
     Across.blur(view, statistical, 45.0)
     before = float(view["uncertainty_bound"][0])
-    statistical["forces"]["component"]["force_flow_lag_error_bound"][NORMAL_COMPONENT] = 0.5
+    statistical["forces"]["component"]["force_flow_lag_error_bound"][NORMAL_INDEX_AMONG_FORCES] = 0.5
     Across.blur(view, statistical, 45.0)
     assert view["uncertainty_bound"][0] == pytest.approx(before + 0.8 * 0.5)
 
@@ -451,11 +460,11 @@ def test_what_a_force_is_off_widens_what_is_merely_bounded(viewed):
 def test_how_fast_a_force_changes_is_told_from_one_instant_to_the_next(viewed):
     statistical = viewed["statistical"]
     component = statistical["forces"]["component"]
-    then, seen = component["predicted_scaled_force"].copy(), measured()
+    then, seen = component["predicted_chord_scaled_force"].copy(), measured()
     seen["y"][1] += 0.01
     update_all_force_innovations(statistical["forces"], statistical["gust"], seen, U, DT)
-    changed = np.abs(component["predicted_scaled_force"] - then)
-    assert changed[SIDE_COMPONENT] > 0.01
+    changed = np.abs(component["predicted_chord_scaled_force"] - then)
+    assert changed[SIDE_INDEX_AMONG_FORCES] > 0.01
     assert component["force_flow_lag_error_bound"] == pytest.approx(
         forces.MAX_FORCE_FLOW_LAG_S * changed / DT
     )
@@ -490,14 +499,14 @@ def test_what_goes_along_a_column_of_rate_and_force_is_not_seen_past_it(viewed, 
     of_it = (
         force["axis_and_force_innovation_per_vane_error"]
         if s == ORTHOGONAL_TO_VANE_ERROR
-        else (G[first, s], force["scaled_force_per_surface_rad"][s])
+        else (G[first, s], force["chord_scaled_force_per_surface_rad"][s])
     )
     assert view["direction"][[first, second]] @ of_it == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(view["direction"]) == pytest.approx(1.0)
     assert np.count_nonzero(view["direction"]) == 2
     if s != ORTHOGONAL_TO_VANE_ERROR:
-        assert Across.is_view_sensitive_to_fault(viewed, view, s, G[:, s]) == 0
-        assert Across.is_view_sensitive_to_fault(
+        assert Across.can_surface_fault_change_view(viewed, view, s, G[:, s]) == 0
+        assert Across.can_surface_fault_change_view(
             viewed, view, FLAP if s == ELEVATOR else ELEVATOR, G[:, 1]
         ) == (second == NORMAL_FORCE)
 
@@ -514,7 +523,7 @@ def test_the_side_vane_is_cleared_across_the_rolling_gust_as_well(viewed):
         rng.normal(size=(3, 3)),
         np.linalg.qr(rng.normal(size=(3, 3)))[0],
     )
-    force = statistical["forces"]["component"][SIDE_COMPONENT]
+    force = statistical["forces"]["component"][SIDE_INDEX_AMONG_FORCES]
     column = np.array(
         [force["roll_innovation_per_vane_error"], *force["axis_and_force_innovation_per_vane_error"]]
     )
@@ -647,7 +656,7 @@ def test_old_evidence_of_a_force_is_forgotten_slowly(viewed):
 def test_what_errors_multiply_along_a_direction_is_that_of_rate_and_force(viewed):
     """Of the rate's block, then of the force, then how far the followed angle has drifted, or the column."""
     statistical, rng = viewed["statistical"], np.random.default_rng(9)
-    pitch, force = statistical["block"][0], statistical["forces"]["component"][NORMAL_COMPONENT]
+    pitch, force = statistical["block"][0], statistical["forces"]["component"][NORMAL_INDEX_AMONG_FORCES]
     pitch["n_regressors"], pitch["regressor"][:3, 0] = 3, rng.normal(size=3)
     view, n = statistical["views"][ELEVATOR_VIEW], int(force["n_regressors"])
     view["direction"], view["unit_column"] = (0.0, 0.6, 0.0, 0.0, -0.8), (0.0, -0.8, 0.0, 0.0, -0.6)
@@ -666,8 +675,8 @@ def test_a_loss_signs_with_the_force_it_takes(viewed):
     view, Gu = viewed["statistical"]["views"][FLAP_VIEW], np.random.default_rng(1).normal(size=(3, 4))
     view["direction"] = 0.0, 0.9, 0.0, 0.0, 0.4
     Across.sign(viewed, view, Gu)
-    moment = viewed["statistical"]["forces"]["component"][NORMAL_COMPONENT][
-        "scaled_force_of_surface_at_command"
+    moment = viewed["statistical"]["forces"]["component"][NORMAL_INDEX_AMONG_FORCES][
+        "chord_scaled_force_of_surface_at_command"
     ][ELEVATOR]
     assert view["block"]["hypothesis"]["signature"][:2, 0] == pytest.approx(
         [1.0, 0.9 * Gu[1, ELEVATOR] + 0.4 * moment]
@@ -770,18 +779,16 @@ def test_without_vanes_the_flow_is_what_the_forces_say():
     update_all_force_innovations(record, air, measured(), U, DT)
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
-        for f in (SIDE_COMPONENT, NORMAL_COMPONENT)
+        for f in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
     update_all_force_innovations(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
-    forces.fill_y_with_flow_angles_from_forces(
+    forces.fill_y_without_vanes(
         record, np.zeros(3), np.append(off, np.zeros(record["y_without_vanes"].size - 5))
     )
     assert record["y_without_vanes"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y_without_vanes"][:2].copy(), np.array([0.02, -0.03, 0.01])
-    forces.fill_y_with_flow_angles_from_forces(
-        record, turning, np.append(off, np.zeros(record["y_without_vanes"].size - 5))
-    )
+    forces.fill_y_without_vanes(record, turning, np.append(off, np.zeros(record["y_without_vanes"].size - 5)))
     damped = (
         record["component"]["innovation_per_air_rotation"]
         @ turning
@@ -804,7 +811,7 @@ def test_a_view_takes_off_the_gust_as_it_may_know_it(viewed, v):
     seen = 0.5 if v == ALPHA_VIEW else 0.2
     view = statistical["views"][v]
     assert Across.part(viewed, view, np.ones(3), PITCH) == pytest.approx(1.0 - seen)
-    force = statistical["forces"]["component"][NORMAL_COMPONENT]["innovation"]
+    force = statistical["forces"]["component"][NORMAL_INDEX_AMONG_FORCES]["innovation"]
     assert Across.part(viewed, view, np.ones(3), NORMAL_FORCE) == force
     assert Across.part(viewed, statistical["views"][ROLL_VIEW], np.ones(3), ROLL) == 1.0
 
@@ -876,7 +883,8 @@ NOISY = {
 
 
 @pytest.mark.parametrize(
-    ("f", "name", "vane"), [(SIDE_COMPONENT, "CY", "beta"), (NORMAL_COMPONENT, "CZ", "alpha")]
+    ("f", "name", "vane"),
+    [(SIDE_INDEX_AMONG_FORCES, "CY", "beta"), (NORMAL_INDEX_AMONG_FORCES, "CZ", "alpha")],
 )
 @pytest.mark.parametrize("engine", [0, 1])
 def test_what_noise_of_the_readings_makes_up_of_a_force(f, name, vane, engine):

@@ -35,7 +35,7 @@ def through(block, accelerations):
     """What the filter, from rest, leaves of accelerations (k, n)."""
     out, state, shown = np.zeros(2), np.zeros(4), []
     for acceleration in accelerations:
-        likelihood.whiten(block, state, np.append(acceleration, 0.0)[:2], DT, out)
+        likelihood.advance_whitening_filter(block, state, np.append(acceleration, 0.0)[:2], DT, out)
         shown.append(out[: block["n_axes"]].copy())
     return np.array(shown)
 
@@ -231,7 +231,7 @@ def test_what_calm_air_foretells_is_what_the_calm_filter_sees_by_as_much_as_it_l
     likelihood.whiten_by_no_gust_filter(block, DT)
     likelihood.fill_predictable_innovation(block, DT)
     likelihood.advance_covariance(alone, DT)
-    likelihood.whiten(
+    likelihood.advance_whitening_filter(
         alone, alone["state"], np.array([0.4, -0.2]), DT, alone["unscaled_white_innovation_rad_s"]
     )
     foretold = g - alone["unscaled_white_innovation_rad_s"]
@@ -312,7 +312,7 @@ def shapes(kind, frames=5):
     found = []
     for k in range(frames):
         block["hypothesis"]["signature"][0] = 1.0 + k, -2.0 * k
-        likelihood.fill_signatures_for_onsets(block["hypothesis"][0], block["onset_tests"][0], 0)
+        likelihood.update_signatures_for_onsets(block["hypothesis"][0], block["onset_tests"][0], 0)
         found.append(by_onset(block, "signature_for_onset")[:, 3, 0].copy())
     return np.array(found)
 
@@ -381,14 +381,18 @@ def test_the_estimate_of_a_loss_is_the_likeliest_with_a_prior_and_of_a_step_with
     """A normal prior of mean -1/2 and the variance of a uniform one: the mode within [-1, 0]."""
     theta, D = np.linspace(-1.0, 0.0, 100001), 9.0
     posterior = theta * N - 0.5 * theta**2 * D - 0.5 * 12.0 * (theta + 0.5) ** 2
-    assert likelihood.estimate_theta(LOSS, N, D) == pytest.approx(theta[posterior.argmax()], abs=2e-5)
-    assert likelihood.estimate_theta(STEP_FAULT, N, D) == pytest.approx(N / 9.0)
+    assert likelihood.estimate_theta_with_loss_prior(LOSS, N, D) == pytest.approx(
+        theta[posterior.argmax()], abs=2e-5
+    )
+    assert likelihood.estimate_theta_with_loss_prior(STEP_FAULT, N, D) == pytest.approx(N / 9.0)
 
 
 def test_a_share_is_in_standard_deviations_or_of_what_uncertainty_and_chance_allow():
-    assert likelihood.normalised_evidence(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
-    assert likelihood.normalised_evidence(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(12.0 / (4.0 + 1.5))
-    against_chance_alone = likelihood.normalised_evidence(6.0, 0.5, 12.0, 0.6, 9.0)
+    assert likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 0.0, 9.0) == pytest.approx(4.0)
+    assert likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 24.0, 9.0) == pytest.approx(
+        12.0 / (4.0 + 1.5)
+    )
+    against_chance_alone = likelihood.evidence_over_effective_std(6.0, 0.5, 12.0, 0.6, 9.0)
     assert against_chance_alone == pytest.approx(4.0)  # never more than that
 
 

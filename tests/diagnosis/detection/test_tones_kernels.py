@@ -113,7 +113,9 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     block["K_x"][0, 0], block["K_d"][0, 0], block["drift_decay_factor"] = K_x, K_d, keep
     out, response = np.zeros(2), []
     for k in range(6000):
-        likelihood.whiten(block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out)
+        likelihood.advance_whitening_filter(
+            block, block["state"], np.array([np.cos(frequency_rad_s * k * DT), 0.0]), DT, out
+        )
         response.append(out[0])
     angles = frequency_rad_s * DT * np.arange(3000, 6000)
     shares, *_ = np.linalg.lstsq(
@@ -240,14 +242,14 @@ def test_the_score_is_that_of_the_loudest_beyond_what_is_explained(view, tone_co
         12.0,
         0.6,
     )
-    parity.fill_tone_score(record, tone_config, 6.0)
+    parity.fill_max_tone_score(record, tone_config, 6.0)
     root = sqrt(100.0 * tone_config["larger_complex_part_variance_share"][3])
     assert record["score"] == pytest.approx(90.0 / root * 6.0 / LEVEL)
     record["max_correlation_by_uncertainty"][3] = 200.0
-    parity.fill_tone_score(record, tone_config, 6.0)
+    parity.fill_max_tone_score(record, tone_config, 6.0)
     assert record["score"] == pytest.approx(90.0 / (200.0 / LEVEL + 0.5 * root) * 6.0 / LEVEL)
     record["correlation"][:] = 0.0
-    parity.fill_tone_score(record, tone_config, 6.0)
+    parity.fill_max_tone_score(record, tone_config, 6.0)
     assert record["score"] == 0.0
 
 

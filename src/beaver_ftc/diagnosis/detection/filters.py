@@ -124,8 +124,10 @@ BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, outpu
 def filter_poles_per_s(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
     """The filters' poles, 1/s, the published one first."""
     poles_for_noise_per_s = detection_poles_for_noise(declared.sensors, max(declared.constant_rad_s2))
-    added_poles_per_s = (*config.pole_bank_per_s, *poles_for_noise_per_s) if config.sharpen.pole_bank else ()
-    return (config.detection_pole_per_s, *added_poles_per_s)[:MAX_POLES]
+    poles_after_published_per_s = (
+        (*config.pole_bank_per_s, *poles_for_noise_per_s) if config.sharpen.pole_bank else ()
+    )
+    return (config.detection_pole_per_s, *poles_after_published_per_s)[:MAX_POLES]
 
 
 def configure_bank(filter_bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
@@ -138,7 +140,7 @@ def configure_bank(filter_bank: np.void, config: FdiConfig, declared: Declared, 
 
 
 @kernel
-def start_bank(filter_bank, changing_gyro_error_bound):
+def start_bank_gyro_error_bounds(filter_bank, changing_gyro_error_bound):
     """Start with the full bound on the changing part of the gyros' errors, changing_gyro_error_bound (3,)
     rad/s."""
     filter_bank.memory.threshold_gyro_error_part[: filter_bank.config.n_filters] = changing_gyro_error_bound
@@ -167,7 +169,9 @@ def set_parity_directions(isolation, G):
 
 
 @kernel
-def update_residuals_and_thresholds(filter_bank, bound_record, x, x_before, predicted_acceleration, dt):
+def update_innovation_residuals_and_thresholds(
+    filter_bank, bound_record, x, x_before, predicted_acceleration, dt
+):
     """Form the innovation of the elapsed frame and pass it through the bank.
 
     x, x_before (3,) rad/s: measured now and a frame ago; predicted_acceleration (3,) rad/s2: f + G u of the
@@ -238,7 +242,7 @@ def max_residual_threshold_ratio(filter_bank):
 
 
 @kernel
-def update_max_residual_over_threshold(filter_bank):
+def update_max_residual_ratio_by_filter(filter_bank):
     """Keep the largest share of its bound that each filter has reached."""
     for m in range(filter_bank.config.n_filters):
         for i in range(3):
@@ -410,7 +414,7 @@ def fill_normalised_gaussians(alpha, beta, out):
 
 
 @kernel
-def apply_dead_zone(residual, threshold):
+def signed_excess_over_threshold(residual, threshold):
     """D[eps]: zero inside the threshold, the excess over it outside."""
     if residual > threshold:
         return residual - threshold
@@ -439,7 +443,9 @@ def train_network(network, residual, threshold, do_weights_leak, dt):
     leak_factor = np.exp(-network.config.leak_per_s * dt) if do_weights_leak else 1.0
     weight_limit = network.config.weight_limit
     for i in range(3):
-        learning_step = dt * network.config.learning_gain * apply_dead_zone(residual[i], threshold[i])
+        learning_step = (
+            dt * network.config.learning_gain * signed_excess_over_threshold(residual[i], threshold[i])
+        )
         for j in range(N_BASIS_FUNCTIONS):
             weight = (
                 leak_factor * network.memory.weights[i, j] + learning_step * network.memory.basis_values[j]
@@ -448,7 +454,7 @@ def train_network(network, residual, threshold, do_weights_leak, dt):
 
 
 @kernel
-def start_fdae(fdae, changing_gyro_error_bound, x):
+def start_fdae_rates_and_gyro_bounds(fdae, changing_gyro_error_bound, x):
     """Start at the first measurement x (3,) rad/s: no residual, and all of the gyro's error still to come.
 
     changing_gyro_error_bound (3,) rad/s: on the changing part of the gyros' errors.
@@ -526,7 +532,7 @@ def advance_fdae(fdae, bound_record, x, predicted_acceleration, is_fault_detecte
 
 
 @kernel
-def fill_fdae_unmodelled_acceleration(fdae, changing_gyro_error_bound, out):
+def fill_fdae_unmodelled_acceleration_estimate(fdae, changing_gyro_error_bound, out):
     """Fill out (3,) rad/s2 with the acceleration that the FDAE estimates in addition to the model.
 
     The residual settles at (phi - fhat) / Lambda0, so Lambda0 eps0 is the part of the fault not yet in the
@@ -534,7 +540,7 @@ def fill_fdae_unmodelled_acceleration(fdae, changing_gyro_error_bound, out):
     explains stays out of it, and off the surfaces.
     """
     for i in range(3):
-        gyro_error_bound = fdae.memory.threshold_gyro_error_part[i] + changing_gyro_error_bound[i]
-        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * apply_dead_zone(
-            fdae.output.residual[i], gyro_error_bound
+        gyro_caused_residual_bound = fdae.memory.threshold_gyro_error_part[i] + changing_gyro_error_bound[i]
+        out[i] = fdae.network.output[i] + fdae.config.pole_per_s[i] * signed_excess_over_threshold(
+            fdae.output.residual[i], gyro_caused_residual_bound
         )

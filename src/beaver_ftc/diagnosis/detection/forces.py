@@ -28,9 +28,9 @@ from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
-SIDE_COMPONENT, NORMAL_COMPONENT = range(2)  # across the body, and normal to it
+SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES = range(2)  # across the body, and normal to it
 FORCE_COEFFICIENT_NAMES = ("CY", "CZ")
-SIDE_FORCE_TABLE_INDEX = FORCES.index("CY")
+SIDE_FORCE_INDEX_IN_TABLE = FORCES.index("CY")
 TYPICAL_BODY_RATE_RAD_S, TYPICAL_PATH_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
 MIN_FORCE_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
 # Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
@@ -43,7 +43,7 @@ SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES = {
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
-TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+RatesReadingsDeflections = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
 FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame, rad/s2
@@ -52,15 +52,16 @@ FORCE_RECORD = record(
     innovation_at_inertial_flow_angle=float, inertial_flow_angle=float, flow_angle_drift_bound=float,
     innovation_per_flow_angle_drift=float, inertial_innovation_drift_intensity=float,
     # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    scaled_force_per_surface_rad=MAX_SURFACES, previous_scaled_force_per_surface_rad=MAX_SURFACES,
-    scaled_force_of_surface_at_command=MAX_SURFACES, scaled_force_per_surface_rad_error_bound=MAX_SURFACES,
+    chord_scaled_force_per_surface_rad=MAX_SURFACES, previous_chord_scaled_force_per_surface_rad=MAX_SURFACES,
+    chord_scaled_force_of_surface_at_command=MAX_SURFACES,
+    chord_scaled_force_per_surface_rad_error_bound=MAX_SURFACES,
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     axis_and_force_innovation_per_vane_error=2, roll_innovation_per_vane_error=float,
     # variance of e in trim and now: with the vane, without it; (rad/s2)2
     trim_noise_variance_with_without_vane=2, noise_variance_with_without_vane=2,
     # e per rad/s of rotation of the air; bound on e by errors of deflections
     innovation_per_air_rotation=3, deflection_error_effect_bound=float,
-    predicted_scaled_force=float,  # e of the model, rad/s2
+    predicted_chord_scaled_force=float,  # e of the model, rad/s2
     force_flow_lag_error_bound=float,  # bound on its error by a time lag, rad/s2
     # variance of e by noise of the accelerometer; independent of the pressure
     accelerometer_innovation_variance=float,
@@ -90,15 +91,15 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
     evaluate(gust.memory.force_table, measured.x, measured.y)
     forces.dynamic_pressure_over_trim = measured.y[QDYN] / forces.trim_dynamic_pressure
     for force_index in range(2):
-        previous_predicted_scaled_force = forces.component[force_index].predicted_scaled_force
+        previous_predicted_chord_scaled_force = forces.component[force_index].predicted_chord_scaled_force
         update_force_innovation_and_regressors(forces, gust, force_index, measured, u)
         fill_force_flow_lag_error_bound(
             forces.component[force_index],
-            previous_predicted_scaled_force,
+            previous_predicted_chord_scaled_force,
             forces.n_updates_capped_at_minimum,
             dt,
         )
-        update_inertial_flow_angle_and_innovation(
+        integrate_flow_angle_and_fill_innovation(
             forces, forces.component[force_index], force_index, measured.y, dt
         )
     fill_flow_angle_rates(forces, measured)
@@ -106,18 +107,22 @@ def update_all_force_innovations(forces, gust, measured, u, dt):
 
 
 @kernel
-def fill_force_flow_lag_error_bound(force_record, previous_predicted_scaled_force, has_earlier_update, dt):
+def fill_force_flow_lag_error_bound(
+    force_record, previous_predicted_chord_scaled_force, has_earlier_update, dt
+):
     """Fill `force_flow_lag_error_bound` from the change of the model's e since
-    `previous_predicted_scaled_force`: force and flow differ in time."""
+    `previous_predicted_chord_scaled_force`: force and flow differ in time."""
     force_record.force_flow_lag_error_bound = (
-        MAX_FORCE_FLOW_LAG_S * abs(force_record.predicted_scaled_force - previous_predicted_scaled_force) / dt
+        MAX_FORCE_FLOW_LAG_S
+        * abs(force_record.predicted_chord_scaled_force - previous_predicted_chord_scaled_force)
+        / dt
         if has_earlier_update
         else 0.0
     )
 
 
 @kernel
-def fill_y_with_flow_angles_from_forces(forces, air_rotation, y):
+def fill_y_without_vanes(forces, air_rotation, y):
     """Fill `y` with the readings y, but alpha and beta worked out from the forces.
 
     air_rotation (3,) rad/s: of the air in body axes; it damps like the aircraft's own rotation.
@@ -125,17 +130,17 @@ def fill_y_with_flow_angles_from_forces(forces, air_rotation, y):
     forces.y_without_vanes[:] = y
     for force_index in range(2):
         force_record = forces.component[force_index]
-        vane_index = BETA if force_index == SIDE_COMPONENT else ALPHA
-        innovation_by_air_rotation = 0.0
+        vane_index = BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA
+        air_rotation_part_of_innovation = 0.0
         for k in range(3):
-            innovation_by_air_rotation += force_record.innovation_per_air_rotation[k] * air_rotation[k]
+            air_rotation_part_of_innovation += force_record.innovation_per_air_rotation[k] * air_rotation[k]
         forces.y_without_vanes[vane_index] -= (
-            force_record.innovation / forces.dynamic_pressure_over_trim + innovation_by_air_rotation
+            force_record.innovation / forces.dynamic_pressure_over_trim + air_rotation_part_of_innovation
         ) / force_record.axis_and_force_innovation_per_vane_error[1]
 
 
 @kernel
-def stop_using_forces(forces, gust, inertial_gust):
+def stop_using_forces_and_accelerometers(forces, gust, inertial_gust):
     """Stop using forces, and estimate the gust without accelerometers."""
     stop_using_accelerometers(gust)
     stop_gust_estimate(inertial_gust)
@@ -143,9 +148,9 @@ def stop_using_forces(forces, gust, inertial_gust):
 
 
 @kernel
-def update_inertial_flow_angle_and_innovation(forces, force_record, force_index, y, dt):
+def integrate_flow_angle_and_fill_innovation(forces, force_record, force_index, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and fill the force's innovation at it."""
-    vane_angle = y[BETA if force_index == SIDE_COMPONENT else ALPHA]
+    vane_angle = y[BETA if force_index == SIDE_INDEX_AMONG_FORCES else ALPHA]
     innovation_per_vane_rad = (
         force_record.axis_and_force_innovation_per_vane_error[1] * forces.dynamic_pressure_over_trim
     )
@@ -164,56 +169,58 @@ def update_inertial_flow_angle_and_innovation(forces, force_record, force_index,
 def update_force_innovation_and_regressors(forces, gust, force_index, measured, u):
     """Update one force: its innovation e, the effects of surfaces, and the regressors of its errors."""
     force_table, force_record = gust.memory.force_table, forces.component[force_index]
-    first_term_index = force_table.free_from[SIDE_FORCE_TABLE_INDEX + force_index]
-    end_term_index = force_table.surface_to[SIDE_FORCE_TABLE_INDEX + force_index]
-    scaled_force_per_coefficient = (
+    first_term_index = force_table.free_from[SIDE_FORCE_INDEX_IN_TABLE + force_index]
+    end_term_index = force_table.surface_to[SIDE_FORCE_INDEX_IN_TABLE + force_index]
+    chord_scaled_force_per_coefficient = (
         measured.y[QDYN] * gust.config.wing_area_per_mass * forces.inverse_chord_per_m
     )
-    predicted_scaled_force = 0.0
-    force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
-    force_record.scaled_force_per_surface_rad[:] = 0.0
-    force_record.scaled_force_per_surface_rad_error_bound[:] = 0.0
+    predicted_chord_scaled_force = 0.0
+    force_record.previous_chord_scaled_force_per_surface_rad[:] = (
+        force_record.chord_scaled_force_per_surface_rad
+    )
+    force_record.chord_scaled_force_per_surface_rad[:] = 0.0
+    force_record.chord_scaled_force_per_surface_rad_error_bound[:] = 0.0
     for k in range(first_term_index, end_term_index):
         s = force_table.surface[k]
-        scaled_force_per_term_value = (
-            scaled_force_per_coefficient * force_table.power[force_table.monomial[k]]
-        )
+        term_regressor = chord_scaled_force_per_coefficient * force_table.power[force_table.monomial[k]]
         if s >= 0:
-            force_record.scaled_force_per_surface_rad[s] += force_table.value[k] * scaled_force_per_term_value
-            force_record.scaled_force_per_surface_rad_error_bound[s] += force_record.regressor_tolerance[
-                k - first_term_index
-            ] * abs(scaled_force_per_term_value)
-            scaled_force_per_term_value *= u[s]
-        force_record.regressor[k - first_term_index] = scaled_force_per_term_value
-        predicted_scaled_force += force_table.value[k] * scaled_force_per_term_value
-    if force_index == SIDE_COMPONENT:
-        sideslip_rate_scaled_force = (
-            scaled_force_per_coefficient
+            force_record.chord_scaled_force_per_surface_rad[s] += force_table.value[k] * term_regressor
+            force_record.chord_scaled_force_per_surface_rad_error_bound[s] += (
+                force_record.regressor_tolerance[k - first_term_index] * abs(term_regressor)
+            )
+            term_regressor *= u[s]
+        force_record.regressor[k - first_term_index] = term_regressor
+        predicted_chord_scaled_force += force_table.value[k] * term_regressor
+    if force_index == SIDE_INDEX_AMONG_FORCES:
+        sideslip_rate_chord_scaled_force = (
+            chord_scaled_force_per_coefficient
             * forces.sideslip_rate_coefficient
-            * forces.flow_angle_rate[SIDE_COMPONENT]
+            * forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES]
             * forces.wing_span
             / (2.0 * measured.y[AIRSPEED])
         )
-        force_record.regressor[end_term_index - first_term_index] = sideslip_rate_scaled_force
-        predicted_scaled_force += sideslip_rate_scaled_force
-    force_record.regressor[force_record.n_regressors - 1] = predicted_scaled_force
-    force_record.predicted_scaled_force = predicted_scaled_force
+        force_record.regressor[end_term_index - first_term_index] = sideslip_rate_chord_scaled_force
+        predicted_chord_scaled_force += sideslip_rate_chord_scaled_force
+    force_record.regressor[force_record.n_regressors - 1] = predicted_chord_scaled_force
+    force_record.predicted_chord_scaled_force = predicted_chord_scaled_force
     if forces.n_updates_capped_at_minimum == 0:
-        force_record.previous_scaled_force_per_surface_rad[:] = force_record.scaled_force_per_surface_rad
+        force_record.previous_chord_scaled_force_per_surface_rad[:] = (
+            force_record.chord_scaled_force_per_surface_rad
+        )
     for s in range(u.size):
-        force_record.scaled_force_of_surface_at_command[s] = (
-            force_record.previous_scaled_force_per_surface_rad[s] * u[s]
+        force_record.chord_scaled_force_of_surface_at_command[s] = (
+            force_record.previous_chord_scaled_force_per_surface_rad[s] * u[s]
         )
     force_record.innovation = (
-        measured.force[1 + force_index] * forces.inverse_chord_per_m - predicted_scaled_force
+        measured.force[1 + force_index] * forces.inverse_chord_per_m - predicted_chord_scaled_force
     )
-    pressure_noise_scaled_force_std = (
-        predicted_scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
+    pressure_noise_innovation_std = (
+        predicted_chord_scaled_force * forces.dynamic_pressure_noise_std / measured.y[QDYN]
     )
     for k in range(2):
         force_record.noise_variance_with_without_vane[k] = (
             force_record.trim_noise_variance_with_without_vane[k] * forces.dynamic_pressure_over_trim**2
-            + pressure_noise_scaled_force_std * pressure_noise_scaled_force_std
+            + pressure_noise_innovation_std * pressure_noise_innovation_std
             + force_record.accelerometer_innovation_variance
         )
 
@@ -238,19 +245,19 @@ def fill_flow_angle_rates(forces, measured):
         + unit_velocity_down * down_acceleration
     )
     right_velocity_rate = right_acceleration + V * (x[0] * unit_velocity_down - x[2] * unit_velocity_forward)
-    forces.flow_angle_rate[SIDE_COMPONENT] = (right_velocity_rate - airspeed_rate * unit_velocity_right) / (
-        V * np.cos(beta)
-    )
+    forces.flow_angle_rate[SIDE_INDEX_AMONG_FORCES] = (
+        right_velocity_rate - airspeed_rate * unit_velocity_right
+    ) / (V * np.cos(beta))
     forward_velocity_rate = forward_acceleration + V * (
         x[2] * unit_velocity_right - x[1] * unit_velocity_down
     )
     down_velocity_rate = down_acceleration + V * (x[1] * unit_velocity_forward - x[0] * unit_velocity_right)
-    forces.flow_angle_rate[NORMAL_COMPONENT] = (
+    forces.flow_angle_rate[NORMAL_INDEX_AMONG_FORCES] = (
         down_velocity_rate * np.cos(alpha) - forward_velocity_rate * np.sin(alpha)
     ) / (V * np.cos(beta))
 
 
-def force_terms(aircraft: Aircraft, force_index: int) -> list[Term]:
+def terms_of_one_force(aircraft: Aircraft, force_index: int) -> list[Term]:
     """The terms of one direction, as `update_force_innovation_and_regressors` goes through them."""
     return [
         term
@@ -262,7 +269,7 @@ def force_terms(aircraft: Aircraft, force_index: int) -> list[Term]:
 def configure_forces(
     fdi: np.void,
     declared: Declared,
-    trim: TrimState,
+    trim: RatesReadingsDeflections,
     acceleration_slopes_by_air_data: np.ndarray,
     dt_s: float,
 ) -> None:
@@ -279,37 +286,40 @@ def configure_forces(
     forces["inverse_chord_per_m"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
     forces["trim_dynamic_pressure"] = y[QDYN]
     forces["dynamic_pressure_noise_std"] = sensor_errors["qdyn"].random
-    sideslip_rate_coefficients = [
+    side_force_sideslip_rate_coefficients = [
         t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)
     ]
     forces["wing_span"] = geometry.span_m
-    forces["sideslip_rate_coefficient"] = sum(sideslip_rate_coefficients)
-    scaled_force_per_coefficient = (
+    forces["sideslip_rate_coefficient"] = sum(side_force_sideslip_rate_coefficients)
+    chord_scaled_force_per_coefficient = (
         y[QDYN] * gust["config"]["wing_area_per_mass"] * forces["inverse_chord_per_m"]
     )
     reading_noise_std = sensor_errors.each("random", ("alpha", "beta", "V", *AXES))
-    slipstream_per_airspeed, slipstream_variance_by_other_readings = _slipstream_slope_and_noise_variance(
+    slipstream_per_airspeed, slipstream_variance_from_other_readings = _slipstream_slope_and_noise_variance(
         y, fdi["bound"]["declared_errors"], sensor_errors
     )
     for force_index, (vane_index, axis) in enumerate(((BETA, 2), (ALPHA, 1))):
-        force_record, terms = forces["component"][force_index], force_terms(aircraft, force_index)
-        scaled_force_slopes_with_slipstream = scaled_force_per_coefficient * _force_coefficient_slopes(
-            aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim
+        force_record, terms = forces["component"][force_index], terms_of_one_force(aircraft, force_index)
+        chord_scaled_force_slopes_with_slipstream = (
+            chord_scaled_force_per_coefficient
+            * _force_coefficient_slopes(aircraft, FORCE_COEFFICIENT_NAMES[force_index], trim)
         )
-        scaled_force_slopes = scaled_force_slopes_with_slipstream[:-1]
-        scaled_force_per_slipstream = scaled_force_slopes_with_slipstream[-1]
+        chord_scaled_force_slopes = chord_scaled_force_slopes_with_slipstream[:-1]
+        chord_scaled_force_per_slipstream = chord_scaled_force_slopes_with_slipstream[-1]
         force_record["axis_and_force_innovation_per_vane_error"] = (
             -acceleration_slopes_by_air_data[axis, vane_index],
-            -scaled_force_slopes[vane_index],
+            -chord_scaled_force_slopes[vane_index],
         )
         force_record["roll_innovation_per_vane_error"] = -acceleration_slopes_by_air_data[0, vane_index]
-        force_record["innovation_per_air_rotation"] = scaled_force_slopes[3:]
-        total_scaled_force_slopes = scaled_force_slopes.copy()
-        total_scaled_force_slopes[AIRSPEED] += scaled_force_per_slipstream * slipstream_per_airspeed
-        innovation_variance_by_reading = (total_scaled_force_slopes * reading_noise_std) ** 2
+        force_record["innovation_per_air_rotation"] = chord_scaled_force_slopes[3:]
+        total_chord_scaled_force_slopes = chord_scaled_force_slopes.copy()
+        total_chord_scaled_force_slopes[AIRSPEED] += (
+            chord_scaled_force_per_slipstream * slipstream_per_airspeed
+        )
+        innovation_variance_by_reading = (total_chord_scaled_force_slopes * reading_noise_std) ** 2
         innovation_noise_variance = (
             innovation_variance_by_reading.sum()
-            + scaled_force_per_slipstream**2 * slipstream_variance_by_other_readings
+            + chord_scaled_force_per_slipstream**2 * slipstream_variance_from_other_readings
         )
         force_record["trim_noise_variance_with_without_vane"] = (
             innovation_noise_variance,
@@ -324,15 +334,15 @@ def configure_forces(
             declared,
             terms,
             y,
-            scaled_force_slopes[vane_index] / scaled_force_per_coefficient,
+            chord_scaled_force_slopes[vane_index] / chord_scaled_force_per_coefficient,
             force_index,
             forces["inverse_chord_per_m"],
         )
-        scaled_force_magnitude_sum_per_rad = scaled_force_per_coefficient * sum(
+        chord_scaled_force_magnitude_sum_per_rad = chord_scaled_force_per_coefficient * sum(
             abs(term.value) for term in terms if term.surface
         )
         force_record["deflection_error_effect_bound"] = (
-            scaled_force_magnitude_sum_per_rad * declared.actuators.deflection_rad
+            chord_scaled_force_magnitude_sum_per_rad * declared.actuators.deflection_rad
         )
         force_record["flow_angle_drift_bound"] = _flow_angle_drift_bound(
             sensor_errors, gust["config"]["gravity"], y[AIRSPEED], force_index
@@ -340,7 +350,7 @@ def configure_forces(
         flow_angle_drift_intensity = (
             FLOW_ANGLE_DRIFT_CHANGE_SHARE_PER_S * force_record["flow_angle_drift_bound"]
         ) ** 2 + dt_s * (accelerometer_noise_std / y[AIRSPEED]) ** 2
-        force_record["inertial_innovation_drift_intensity"] = scaled_force_slopes[vane_index] ** 2 * (
+        force_record["inertial_innovation_drift_intensity"] = chord_scaled_force_slopes[vane_index] ** 2 * (
             flow_angle_drift_intensity + declared.air.angle_walk(y[AIRSPEED])
         )
 
@@ -377,10 +387,12 @@ def _flow_angle_drift_bound(
     accelerometer_error_bound = (
         accelerometer_errors.steady
         + TYPICAL_PATH_SLOPE_RAD * sensor_errors["ax"].steady
-        + gravity * (accelerometer_errors.slope if force_index == NORMAL_COMPONENT else 0.0)
+        + gravity * (accelerometer_errors.slope if force_index == NORMAL_INDEX_AMONG_FORCES else 0.0)
     )
     acceleration_error_bound = (
-        gravity * attitude_error_bound * (TYPICAL_PATH_SLOPE_RAD if force_index == NORMAL_COMPONENT else 1.0)
+        gravity
+        * attitude_error_bound
+        * (TYPICAL_PATH_SLOPE_RAD if force_index == NORMAL_INDEX_AMONG_FORCES else 1.0)
         + EARTH_ACCELERATION_BOUND_M_S2
         + accelerometer_error_bound
     )
@@ -399,17 +411,19 @@ def _configure_force_tolerances(
     """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
     pressure do; of the accelerometer's bias, m/s2; of the whole."""
     relative_coefficient_tolerance, sensor_errors = declared.coefficients.largest, declared.sensors
-    vane_errors = sensor_errors["alpha" if force_index == NORMAL_COMPONENT else "beta"]
+    declared_errors_of_vane = sensor_errors["alpha" if force_index == NORMAL_INDEX_AMONG_FORCES else "beta"]
     accelerometer_errors = sensor_errors[ACCELEROMETERS[1 + force_index]]
     relative_pressure_error_bound = sensor_errors["qdyn"].steady / y[QDYN] + sensor_errors["qdyn"].slope
     for k, term in enumerate(terms):
         force_record["regressor_tolerance"][k] = (
-            relative_coefficient_tolerance + relative_pressure_error_bound + vane_errors.slope
+            relative_coefficient_tolerance + relative_pressure_error_bound + declared_errors_of_vane.slope
         ) * abs(term.value)
         if term.is_constant:
-            force_record["regressor_tolerance"][k] += vane_errors.steady * abs(coefficient_per_vane_rad)
+            force_record["regressor_tolerance"][k] += declared_errors_of_vane.steady * abs(
+                coefficient_per_vane_rad
+            )
     n_regressors = len(terms)
-    if force_index == SIDE_COMPONENT:
+    if force_index == SIDE_INDEX_AMONG_FORCES:
         force_record["regressor_tolerance"][n_regressors] = (
             relative_coefficient_tolerance
             + SIDESLIP_RATE_TERM_TOLERANCE_BY_WHETHER_AIR_MOVES[declared.air.moves]
@@ -423,7 +437,9 @@ def _configure_force_tolerances(
     force_record["n_regressors"] = n_regressors + 1
 
 
-def _force_coefficient(aircraft: Aircraft, coefficient_name: str, flight_state: TrimState) -> float:
+def _force_coefficient(
+    aircraft: Aircraft, coefficient_name: str, flight_state: RatesReadingsDeflections
+) -> float:
     """A force coefficient at x (3,) rad/s, y, u rad."""
     x, y, u = flight_state
     geometry, V = aircraft.geometry, y[AIRSPEED]
@@ -441,7 +457,9 @@ def _force_coefficient(aircraft: Aircraft, coefficient_name: str, flight_state: 
     return float(aircraft.coefficient(coefficient_name, value_by_factor))
 
 
-def _force_coefficient_slopes(aircraft: Aircraft, coefficient_name: str, trim: TrimState) -> np.ndarray:
+def _force_coefficient_slopes(
+    aircraft: Aircraft, coefficient_name: str, trim: RatesReadingsDeflections
+) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
     (x, y, u), difference_step = trim, 1e-5
     changed_states = [(x, y + difference_step * e, u) for e in np.eye(3, y.size)]

@@ -75,7 +75,9 @@ N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: s
 USUAL_MAX_HYPOTHESES_PER_BLOCK = (
     8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
 )
-MIN_UNCERTAINTY_BOUND_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
+MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2 = (
+    1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
+)
 STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
 # Sign of N that supports a hypothesis: a loss removes moment, its end restores moment; 0: both signs.
 SUPPORTING_CORRELATION_SIGN_BY_KIND = {
@@ -198,14 +200,14 @@ def new_filter_block(P: np.ndarray, R: np.ndarray) -> np.ndarray:
 
     P (2 n, 2 n): covariance of rates and their drift; R (n,): variance of a reading's noise."""
     one_block, n = np.zeros(1, block_dtype(BlockCapacity(1, 1))), len(R)
-    block, rate_indices, drift_indices = one_block[0], slice(0, n), slice(n, 2 * n)
+    block, rate_slice, drift_slice = one_block[0], slice(0, n), slice(n, 2 * n)
     block["n_axes"], block["axes"], block["gyro_noise_variance"][:n] = n, (0, 1), R
-    for covariance_name, rows, columns in (
-        ("P_xx", rate_indices, rate_indices),
-        ("P_xd", rate_indices, drift_indices),
-        ("P_dd", drift_indices, drift_indices),
+    for covariance_name, row_slice, column_slice in (
+        ("P_xx", rate_slice, rate_slice),
+        ("P_xd", rate_slice, drift_slice),
+        ("P_dd", drift_slice, drift_slice),
     ):
-        block[covariance_name][:n, :n] = P[rows, columns]
+        block[covariance_name][:n, :n] = P[row_slice, column_slice]
     return one_block
 
 
@@ -275,7 +277,7 @@ def advance_covariance(block, dt):
 
 
 @kernel
-def whiten(block, filter_state, acceleration, dt, out):
+def advance_whitening_filter(block, filter_state, acceleration, dt, out):
     """Advance the filter by one frame of an acceleration (2,) rad/s2; dt s.
 
     filter_state (4,): e, rad/s, and d, rad/s2; advanced in place. out (2,) rad/s: the whitened response g;
@@ -294,7 +296,10 @@ def whiten(block, filter_state, acceleration, dt, out):
 
 @kernel
 def whiten_regressors(block, dt):
-    """Whiten all regressors as `whiten` does; in a block of one axis all values of a second axis are zero."""
+    """Whiten all regressors as `advance_whitening_filter` does.
+
+    In a block of one axis all values of a second axis are zero.
+    """
     rate_gain, drift_gain, drift_decay_factor = block.K_x, block.K_d, block.drift_decay_factor
     rate_gain_00, rate_gain_01 = rate_gain[0, 0], rate_gain[0, 1]
     rate_gain_10, rate_gain_11 = rate_gain[1, 0], rate_gain[1, 1]
@@ -321,7 +326,7 @@ def whiten_regressors(block, dt):
 def whiten_by_no_gust_filter(block, dt):
     """Whiten the frame, `frame_innovation`, rad/s2, by the filter without gust; dt s."""
     advance_covariance(block.no_gust_filter, dt)
-    whiten(
+    advance_whitening_filter(
         block.no_gust_filter,
         block.no_gust_filter.state,
         block.frame_innovation,
@@ -356,13 +361,13 @@ def fill_predictable_innovation(block, dt):
             block.calm_air_information += (
                 predictable_innovation[i] * block.S_inverse[i, j] * predictable_innovation[j]
             )
-    information_plus_prior = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
-    cross_correlation_plus_prior_and_margin = (
+    calm_air_share_denominator = block.calm_air_information + CALM_AIR_SHARE_PRIOR_INFORMATION
+    calm_air_share_numerator = (
         block.calm_air_cross_correlation
         + CALM_AIR_SHARE_PRIOR_INFORMATION
-        + CALM_AIR_SHARE_MARGIN_STD * sqrt(information_plus_prior)
+        + CALM_AIR_SHARE_MARGIN_STD * sqrt(calm_air_share_denominator)
     )
-    calm_air_share = min(max(cross_correlation_plus_prior_and_margin / information_plus_prior, 0.0), 1.0)
+    calm_air_share = min(max(calm_air_share_numerator / calm_air_share_denominator, 0.0), 1.0)
     for i in range(block.n_axes):
         predictable_innovation[i] *= calm_air_share
 
@@ -437,18 +442,18 @@ def fill_uncertainty_response_bounds(block, uncertainty_bound, dt):
                 * uncertainty_bound[block.axes[j]]
             )
         if drift_share_lost_per_frame > 0.0:
-            settled_response_per_uncertainty = (
+            axis_settled_response_per_uncertainty = (
                 dt
                 * drift_share_lost_per_frame
                 / (block.K_x[i, i] * drift_share_lost_per_frame + dt * drift_gain[i, i])
             )
             block.settled_uncertainty_response_bound[i] = (
-                settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
+                axis_settled_response_per_uncertainty * uncertainty_bound[block.axes[i]]
             )
 
 
 @kernel
-def fill_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
+def update_signatures_for_onsets(hypothesis, onset_tests, first_test_index):
     """Fill `signature_for_onset`, rad/s2, of a hypothesis for each onset, from test `first_test_index` on.
 
     It is the signature of the frame; for a growing loss times 1 - exp(-kappa t); for the end of a loss that
@@ -624,7 +629,7 @@ def accumulate_evidence(block, uses_regressors, dt, evidence_decay_factor):
     """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by
     `evidence_decay_factor`."""
     for h in range(block.n_hypotheses):
-        fill_signatures_for_onsets(
+        update_signatures_for_onsets(
             block.hypothesis[h],
             block.onset_tests[h // HYPOTHESES_PER_TEST_GROUP],
             (h % HYPOTHESES_PER_TEST_GROUP) * N_ONSET_SLOTS,
@@ -676,7 +681,7 @@ def max_log_likelihood_ratio(is_loss_or_its_end, evidence, information):
 
 
 @kernel
-def normalised_evidence(
+def evidence_over_effective_std(
     alarm_level, noise_share_of_alarm_level, evidence, max_evidence_by_uncertainty, information
 ):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
@@ -731,7 +736,7 @@ def evaluate_onset_tests(
             if non_loss_llr_bounds_include_uncertainty and not is_loss_or_its_end
             else uncertainty_weight_in_llr_bounds * max_evidence_by_uncertainty
         )
-        score = normalised_evidence(
+        score_in_standard_deviations = evidence_over_effective_std(
             alarm_level,
             noise_share_of_alarm_level,
             evidence - evidence_by_errors_and_air,
@@ -741,7 +746,7 @@ def evaluate_onset_tests(
         llr = max_log_likelihood_ratio(is_loss_or_its_end, evidence, D)
         llr_lower_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence - evidence_error_bound, D)
         llr_upper_bound = max_log_likelihood_ratio(is_loss_or_its_end, evidence + evidence_error_bound, D)
-        onset_tests.score[k] = score if has_information else 0.0
+        onset_tests.score[k] = score_in_standard_deviations if has_information else 0.0
         onset_tests.llr_lower_bound[k] = llr_lower_bound if has_information else 0.0
         onset_tests.llr_upper_bound[k] = llr_upper_bound if has_information else 0.0
         onset_tests.llr[k] = llr if has_information else -1.0
@@ -783,7 +788,10 @@ def evaluate_hypotheses(
         if likeliest_test_index >= 0:
             N = onset_tests.correlation[likeliest_test_index]
             D = onset_tests.information[likeliest_test_index]
-            hypothesis.theta_estimate, hypothesis.theta_information = estimate_theta(hypothesis.kind, N, D), D
+            hypothesis.theta_estimate, hypothesis.theta_information = (
+                estimate_theta_with_loss_prior(hypothesis.kind, N, D),
+                D,
+            )
 
 
 @kernel
@@ -806,11 +814,13 @@ def update_block(
     advance_covariance(block, dt)
     if block.alarm_level > 0.0:
         fill_uncertainty_response_bounds(block, uncertainty_bound, dt)
-    whiten(block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s)
+    advance_whitening_filter(
+        block, block.state, block.frame_innovation, dt, block.unscaled_white_innovation_rad_s
+    )
     if block.no_gust_filter.n_axes > 0:
         fill_predictable_innovation(block, dt)
     if block.has_coarse_gust_estimate:
-        whiten(
+        advance_whitening_filter(
             block, block.coarse_gust_filter_state, block.coarse_gust_response, dt, block.coarse_gust_response
         )
     if uses_regressors:
@@ -820,7 +830,7 @@ def update_block(
 
 
 @kernel
-def estimate_theta(kind, N, D):
+def estimate_theta_with_loss_prior(kind, N, D):
     """The most likely theta; for a loss with a prior that is uniform on its set [-1, 0]."""
     if not is_one_sided(kind):
         return N / D

@@ -67,9 +67,9 @@ from beaver_ftc.diagnosis.detection import forces, likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_COEFFICIENT_NAMES,
     MIN_FORCE_UPDATES,
-    NORMAL_COMPONENT,
-    SIDE_COMPONENT,
-    force_terms,
+    NORMAL_INDEX_AMONG_FORCES,
+    SIDE_INDEX_AMONG_FORCES,
+    terms_of_one_force,
 )
 from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL_BLOCK,
@@ -78,7 +78,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     STEP_FAULT,
     USUAL_MAX_HYPOTHESES_PER_BLOCK,
     BlockCapacity,
-    normalised_evidence,
+    evidence_over_effective_std,
 )
 from beaver_ftc.diagnosis.gusts import (
     full_gust_drift_intensity,
@@ -177,7 +177,7 @@ def update_tone_tests(view, tone_config, detector_alarm_level, is_inside_envelop
         tone_tests, tone_config, block, inverse_innovation_std * view.uncertainty_bound[0], dt
     )
     fill_max_correlation_by_coefficient_errors(tone_tests, block.regressor_tolerance, n_regressors)
-    fill_tone_score(tone_tests, tone_config, detector_alarm_level)
+    fill_max_tone_score(tone_tests, tone_config, detector_alarm_level)
     tone_tests.normalised_innovation_sum, tone_tests.frames_since_update = 0.0, 0
 
 
@@ -187,15 +187,18 @@ def advance_resonators(tone_config, resonator_state, input_sum):
     add the drive."""
     decayed_rotation = tone_config.decayed_rotation_per_update
     for frequency_index in range(resonator_state.shape[1]):
-        state_real, state_imaginary = resonator_state[0, frequency_index], resonator_state[1, frequency_index]
+        previous_state_real, previous_state_imaginary = (
+            resonator_state[0, frequency_index],
+            resonator_state[1, frequency_index],
+        )
         resonator_state[0, frequency_index] = (
-            decayed_rotation[0, frequency_index] * state_real
-            - decayed_rotation[1, frequency_index] * state_imaginary
+            decayed_rotation[0, frequency_index] * previous_state_real
+            - decayed_rotation[1, frequency_index] * previous_state_imaginary
             + input_sum
         )
         resonator_state[1, frequency_index] = (
-            decayed_rotation[1, frequency_index] * state_real
-            + decayed_rotation[0, frequency_index] * state_imaginary
+            decayed_rotation[1, frequency_index] * previous_state_real
+            + decayed_rotation[0, frequency_index] * previous_state_imaginary
         )
 
 
@@ -231,23 +234,25 @@ def update_max_correlation_by_uncertainty(tone_tests, tone_config, block, normal
     """
     decayed_double_rotation = tone_config.decayed_double_rotation_per_update
     sum_decay_factor = tone_config.sum_decay_factor_per_update
-    normalised_uncertainty_bound_sum = normalised_uncertainty_bound * tone_tests.frames_since_update
+    normalised_bound_sum_since_update = normalised_uncertainty_bound * tone_tests.frames_since_update
     for frequency_index in range(tone_tests.max_correlation_by_uncertainty.size):
         cos_phase_change = tone_config.phase_rotation_per_frame[0, frequency_index]
         sin_phase_change = tone_config.phase_rotation_per_frame[1, frequency_index]
-        filtered_bound_since_update = normalised_uncertainty_bound_sum * whitened_unit_tone_amplitude(
+        filtered_bound_since_update = normalised_bound_sum_since_update * whitened_unit_tone_amplitude(
             block.K_x[0, 0], block.K_d[0, 0], block.drift_decay_factor, cos_phase_change, sin_phase_change, dt
         )
-        double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
-        double_frequency_imaginary = tone_tests.filtered_bound_double_frequency_sum[1, frequency_index]
+        previous_double_frequency_real = tone_tests.filtered_bound_double_frequency_sum[0, frequency_index]
+        previous_double_frequency_imaginary = tone_tests.filtered_bound_double_frequency_sum[
+            1, frequency_index
+        ]
         tone_tests.filtered_bound_double_frequency_sum[0, frequency_index] = (
-            decayed_double_rotation[0, frequency_index] * double_frequency_real
-            - decayed_double_rotation[1, frequency_index] * double_frequency_imaginary
+            decayed_double_rotation[0, frequency_index] * previous_double_frequency_real
+            - decayed_double_rotation[1, frequency_index] * previous_double_frequency_imaginary
             + filtered_bound_since_update
         )
         tone_tests.filtered_bound_double_frequency_sum[1, frequency_index] = (
-            decayed_double_rotation[1, frequency_index] * double_frequency_real
-            + decayed_double_rotation[0, frequency_index] * double_frequency_imaginary
+            decayed_double_rotation[1, frequency_index] * previous_double_frequency_real
+            + decayed_double_rotation[0, frequency_index] * previous_double_frequency_imaginary
         )
         tone_tests.filtered_bound_sum[frequency_index] = (
             sum_decay_factor * tone_tests.filtered_bound_sum[frequency_index] + filtered_bound_since_update
@@ -276,16 +281,17 @@ def fill_max_correlation_by_coefficient_errors(tone_tests, regressor_tolerance, 
         regressor_correlation = tone_tests.regressor_correlation[j]
         coefficient_tolerance = regressor_tolerance[j]
         for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
-            real_magnitude = abs(regressor_correlation[0, frequency_index])
-            imaginary_magnitude = abs(regressor_correlation[1, frequency_index])
+            correlation_real_part_magnitude = abs(regressor_correlation[0, frequency_index])
+            correlation_imaginary_part_magnitude = abs(regressor_correlation[1, frequency_index])
             tone_tests.max_correlation_by_coefficient_errors[frequency_index] += coefficient_tolerance * (
-                max(real_magnitude, imaginary_magnitude)
-                + 0.41421356237309515 * min(real_magnitude, imaginary_magnitude)
+                max(correlation_real_part_magnitude, correlation_imaginary_part_magnitude)
+                + 0.41421356237309515
+                * min(correlation_real_part_magnitude, correlation_imaginary_part_magnitude)
             )
 
 
 @kernel
-def fill_tone_score(tone_tests, tone_config, detector_alarm_level):
+def fill_max_tone_score(tone_tests, tone_config, detector_alarm_level):
     """Fill `score` with the largest score over the frequencies, scaled to the detector's alarm level."""
     max_score = 0.0
     for frequency_index in range(tone_tests.max_correlation_by_coefficient_errors.size):
@@ -298,7 +304,7 @@ def fill_tone_score(tone_tests, tone_config, detector_alarm_level):
         )
         max_score = max(
             max_score,
-            normalised_evidence(
+            evidence_over_effective_std(
                 tone_config.alarm_level,
                 TONE_NOISE_SHARE_OF_ALARM_LEVEL,
                 evidence,
@@ -310,32 +316,32 @@ def fill_tone_score(tone_tests, tone_config, detector_alarm_level):
 
 
 def derive_max_tone_mean_of_uncertainty(
-    frequency_rad_s: np.ndarray, uncertainty_change_rate_per_s: float
+    frequencies_rad_s: np.ndarray, uncertainty_change_rate_per_s: float
 ) -> np.ndarray:
     """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
 
     The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
     edges do not reach 1, by a triangular wave.
     """
-    normalised_frequency = frequency_rad_s / uncertainty_change_rate_per_s
+    normalised_frequencies = frequencies_rad_s / uncertainty_change_rate_per_s
     return (
         2.0
         / pi
-        * np.where(normalised_frequency < pi / 2.0, np.sin(normalised_frequency), 1.0)
-        / normalised_frequency
+        * np.where(normalised_frequencies < pi / 2.0, np.sin(normalised_frequencies), 1.0)
+        / normalised_frequencies
     )
 
 
 def configure_tone_tests(
     tone_config: np.void,
-    false_alarm_probability_per_test: float,
+    false_alarm_probability_per_test_frame: float,
     airspeed_mps: float,
     uncertainty_change_rate_per_s: float,
     dt_s: float,
 ) -> None:
     """Fill the configuration that all views share.
 
-    false_alarm_probability_per_test: probability of a false alarm granted to one test in one frame.
+    false_alarm_probability_per_test_frame: probability of a false alarm granted to one test in one frame.
     airspeed_mps: in trim. uncertainty_change_rate_per_s: largest rate of change of a bounded uncertainty, in
     bounds per second.
     """
@@ -349,7 +355,7 @@ def configure_tone_tests(
     sum_decay_factor_per_update = exp(-frames_per_update * dt_s / TONE_MEMORY_S)
     tone_config["frames_per_update"] = frames_per_update
     tone_config["sum_decay_factor_per_update"] = sum_decay_factor_per_update
-    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability_per_test))
+    tone_config["alarm_level"] = sqrt(-2.0 * np.log(false_alarm_probability_per_test_frame))
     tone_config["phase_rotation_per_frame"] = np.cos(phase_per_frame_rad), np.sin(phase_per_frame_rad)
     tone_config["decayed_rotation_per_update"] = (
         sum_decay_factor_per_update * np.cos(frames_per_update * phase_per_frame_rad),
@@ -375,9 +381,7 @@ PEAK_SCORE_TO_EVIDENCE_MEMORY_RATIO = (
 MIN_FORCE_COMPONENT_OF_FORCE_VIEW = (
     0.9  # component of a direction of length 1, above which a view counts as one of the force
 )
-MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS = (
-    0.1  # least length that the errors leave of a column, as a share of its length
-)
+COLUMN_NORM_SHARE_FLOOR = 0.1  # least length that the errors leave of a column, as a share of its length
 PITCH_AND_NORMAL_FORCE = (PITCH, NORMAL_FORCE)
 ROLL_AND_YAW = (ROLL, YAW)
 YAW_AND_SIDE_FORCE = (YAW, SIDE_FORCE)
@@ -426,7 +430,9 @@ def parity_view_dtype(capacity: BlockCapacity) -> np.dtype:
 
 
 @kernel
-def innovation_component_for_view(view, forces, gust, inertial_gust, innovation, component):
+def innovation_component_for_view(
+    view, forces, gust, inertial_gust, angular_acceleration_innovation, component
+):
     """One component of the innovation that a view projects, rad/s2: of the rates (3,), or of a force."""
     if component < SIDE_FORCE:
         mean_angular_acceleration_by_gust = 0.0
@@ -434,7 +440,7 @@ def innovation_component_for_view(view, forces, gust, inertial_gust, innovation,
             mean_angular_acceleration_by_gust = gust_estimate_of_view(
                 view, gust, inertial_gust
             ).output.mean_angular_acceleration_by_gust[component]
-        return innovation[component] - mean_angular_acceleration_by_gust
+        return angular_acceleration_innovation[component] - mean_angular_acceleration_by_gust
     force_record = forces.component[component - SIDE_FORCE]
     return (
         force_record.innovation_at_inertial_flow_angle
@@ -454,8 +460,8 @@ def column_entry_and_error_bound(view, forces, bound_record, G, plane_axis_index
         return column_entry, VANE_EFFECT_RELATIVE_TOLERANCE * abs(column_entry)
     if component >= SIDE_FORCE:
         force_record = forces.component[component - SIDE_FORCE]
-        column_entry = force_record.previous_scaled_force_per_surface_rad[s]
-        return column_entry, force_record.scaled_force_per_surface_rad_error_bound[s]
+        column_entry = force_record.previous_chord_scaled_force_per_surface_rad[s]
+        return column_entry, force_record.chord_scaled_force_per_surface_rad_error_bound[s]
     error_bound = (
         bound_record.surface_term_error_bound_per_rad[component, s]
         if bound_record.has_surface_term_errors
@@ -491,7 +497,7 @@ def set_view_direction_and_return_leak_share(view, forces, gust, bound_record, G
         + abs(view.direction[first_component]) * second_error_bound
     )
     return error_bound_along_direction / max(
-        column_norm - column_norm_error_bound, MIN_COLUMN_NORM_SHARE_LEFT_BY_ERRORS * column_norm
+        column_norm - column_norm_error_bound, COLUMN_NORM_SHARE_FLOOR * column_norm
     )
 
 
@@ -569,11 +575,13 @@ def fill_gust_sensitivity(view, forces, rate_damping):
     """
     m = view.direction
     for k in range(3):
-        projected_roll_damping = m[ROLL] * rate_damping[ROLL, k]
-        projected_pitch_damping = m[PITCH] * rate_damping[PITCH, k]
-        projected_yaw_damping = m[YAW] * rate_damping[YAW, k]
+        projected_roll_acceleration_per_rotation = m[ROLL] * rate_damping[ROLL, k]
+        projected_pitch_acceleration_per_rotation = m[PITCH] * rate_damping[PITCH, k]
+        projected_yaw_acceleration_per_rotation = m[YAW] * rate_damping[YAW, k]
         view.rate_gust_sensitivity[k] = (
-            projected_roll_damping + projected_pitch_damping + projected_yaw_damping
+            projected_roll_acceleration_per_rotation
+            + projected_pitch_acceleration_per_rotation
+            + projected_yaw_acceleration_per_rotation
         )
         view.force_gust_sensitivity[k] = 0.0
         for force_index in range(2):
@@ -628,23 +636,25 @@ def set_view_noise_drift_and_bound(view, noise_model, blocks, forces, gust, iner
         for i in range(3):
             for j in range(3):
                 block.P_dd[0, 0] += m[i] * m[j] * gust.output.acceleration_variance_by_axes_turn[i, j]
-    uncertainty_bound_for_drift = max(uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+    lower_limited_uncertainty_bound = max(
+        uncertainty_bound, likelihood.MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2
+    )
     block.gyro_noise_variance[0] = gyro_noise_variance
     block.model_noise_variance[0] = model_noise_std * model_noise_std
     view.uncertainty_bound[0] = uncertainty_bound
     block.drift_intensity[0, 0] = (
         drift_intensity
         + noise_model.drift_intensity_over_squared_bound
-        * uncertainty_bound_for_drift
-        * uncertainty_bound_for_drift
+        * lower_limited_uncertainty_bound
+        * lower_limited_uncertainty_bound
     )
 
 
 @kernel
-def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
+def fill_view_regressors(view, blocks, forces, gust, inertial_gust, angular_acceleration_innovation):
     """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
 
-    innovation (3,) rad/s2.
+    angular_acceleration_innovation (3,) rad/s2.
     """
     block, m = view.block, view.direction
     first_component, second_component = view.plane_axes[0], view.plane_axes[1]
@@ -669,16 +679,16 @@ def fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation):
         block.regressor[next_regressor_index, 0] = 0.0
         for i in range(m.size):
             if view.unit_column[i] != 0.0:
-                component_innovation = innovation_component_for_view(
-                    view, forces, gust, inertial_gust, innovation, i
+                view_innovation_component = innovation_component_for_view(
+                    view, forces, gust, inertial_gust, angular_acceleration_innovation, i
                 )
                 block.regressor[next_regressor_index, 0] += (
-                    view.column_leak_share * view.unit_column[i] * component_innovation
+                    view.column_leak_share * view.unit_column[i] * view_innovation_component
                 )
 
 
 @kernel
-def update_view_directions_and_signatures(views, forces, gust, bound_record, G, Gu):
+def prepare_views_for_frame(views, forces, gust, bound_record, G, Gu):
     """Bring the direction and the signatures of each view to this frame.
 
     G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
@@ -697,8 +707,16 @@ def update_view_directions_and_signatures(views, forces, gust, bound_record, G, 
 
 
 @kernel
-def fill_view_innovations_and_noise(
-    views, uses_regressors, noise_model, blocks, forces, gust, inertial_gust, innovation, V
+def fill_view_innovations_noise_regressors(
+    views,
+    uses_regressors,
+    noise_model,
+    blocks,
+    forces,
+    gust,
+    inertial_gust,
+    angular_acceleration_innovation,
+    V,
 ):
     """Project the innovation (3,) rad/s2 on the direction of each view, into `frame_innovation` of its block.
 
@@ -713,10 +731,10 @@ def fill_view_innovations_and_noise(
         for i in range(m.size):
             if m[i] != 0.0:
                 projected_innovation[0] += m[i] * innovation_component_for_view(
-                    view, forces, gust, inertial_gust, innovation, i
+                    view, forces, gust, inertial_gust, angular_acceleration_innovation, i
                 )
         if uses_regressors or view.always_uses_regressors:
-            fill_view_regressors(view, blocks, forces, gust, inertial_gust, innovation)
+            fill_view_regressors(view, blocks, forces, gust, inertial_gust, angular_acceleration_innovation)
 
 
 @kernel
@@ -749,17 +767,17 @@ def update_view_tests(views, test_config, tone_config, y, dt, frame_index, is_al
 
 
 @kernel
-def is_view_sensitive_to_fault(view, forces, s, effectiveness_column):
-    """True if a fault of surface s, with this effectiveness_column (3,) of G, changes the projection of a
-    view."""
+def can_surface_fault_change_view(view, forces, s, angular_effectiveness_column):
+    """True if a fault of surface s, with this angular_effectiveness_column (3,) of G, changes the projection
+    of a view."""
     if view.orthogonal_to_surface == s:
         return False
     m, projected_effect_per_rad = view.direction, 0.0
     for i in range(3):
-        projected_effect_per_rad += m[i] * effectiveness_column[i]
+        projected_effect_per_rad += m[i] * angular_effectiveness_column[i]
     for force_index in range(2):
         projected_effect_per_rad += (
-            m[SIDE_FORCE + force_index] * forces.component[force_index].scaled_force_per_surface_rad[s]
+            m[SIDE_FORCE + force_index] * forces.component[force_index].chord_scaled_force_per_surface_rad[s]
         )
     return projected_effect_per_rad != 0.0
 
@@ -814,12 +832,12 @@ def view_alarm_score(view, views, test_config, forces, gust):
 
 
 @kernel
-def views_exclude_surface(views, test_config, forces, gust, s, effectiveness_column):
-    """True if a view detects a signal that no fault of surface s, with this effectiveness_column (3,) of G,
-    can cause."""
+def views_exclude_surface(views, test_config, forces, gust, s, angular_effectiveness_column):
+    """True if a view detects a signal that no fault of surface s, with this angular_effectiveness_column (3,)
+    of G, can cause."""
     for view in views:
-        can_exclude_surface = not view.is_immune_to_vane_error and not is_view_sensitive_to_fault(
-            view, forces, s, effectiveness_column
+        can_exclude_surface = not view.is_immune_to_vane_error and not can_surface_fault_change_view(
+            view, forces, s, angular_effectiveness_column
         )
         if (
             can_exclude_surface
@@ -833,21 +851,21 @@ class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
     orthogonal_to_surface: the surface to whose column it is orthogonal, or ORTHOGONAL_TO_VANE_ERROR, or
-    AXIS_VIEW; direction: at the start of the flight; surfaces_tested_for_loss: their indices;
+    AXIS_VIEW; initial_direction: at the start of the flight; loss_tested_surface_indices: their indices;
     uses_inertial_flow_angle: the force is that at the flow angle from inertial motion.
     """
 
     orthogonal_to_surface: int
-    direction: tuple[float, ...]
+    initial_direction: tuple[float, ...]
     plane_axes: tuple[int, int]
-    surfaces_tested_for_loss: list[int]
+    loss_tested_surface_indices: list[int]
     uses_inertial_flow_angle: bool = False
     may_use_vane_gust_estimate: bool = (
         False  # for the gust estimate in moving air, which has no rolling component
     )
 
 
-def parity_directions_of(aircraft: Aircraft, uses_forces: bool = False) -> Iterator[ParityDirection]:
+def iterate_parity_directions(aircraft: Aircraft, uses_forces: bool = False) -> Iterator[ParityDirection]:
     """The parity directions of an aircraft: each axis, and in roll and yaw across each surface's column.
 
     With accelerometers also, in the plane of a rate and its force, across the column of each surface that
@@ -885,11 +903,11 @@ def parity_directions_of(aircraft: Aircraft, uses_forces: bool = False) -> Itera
     if not uses_forces:
         return
     for force_index, plane_axes, plane_surface_indices in (
-        (NORMAL_COMPONENT, PITCH_AND_NORMAL_FORCE, pitch_surface_indices),
-        (SIDE_COMPONENT, YAW_AND_SIDE_FORCE, lateral_surface_indices),
+        (NORMAL_INDEX_AMONG_FORCES, PITCH_AND_NORMAL_FORCE, pitch_surface_indices),
+        (SIDE_INDEX_AMONG_FORCES, YAW_AND_SIDE_FORCE, lateral_surface_indices),
     ):
-        surfaces_distinguished_by_force = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
-        for s in surfaces_distinguished_by_force:
+        force_separable_surface_indices = aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
+        for s in force_separable_surface_indices:
             column_components = aircraft.dominant_axis[s], plane_axes[1]
             yield ParityDirection(
                 s,
@@ -901,7 +919,7 @@ def parity_directions_of(aircraft: Aircraft, uses_forces: bool = False) -> Itera
                     if other_surface_index != s
                 ],
             )
-        if surfaces_distinguished_by_force:
+        if force_separable_surface_indices:
             yield ParityDirection(
                 ORTHOGONAL_TO_VANE_ERROR, _sum_of_unit_vectors(plane_axes), plane_axes, plane_surface_indices
             )
@@ -921,12 +939,15 @@ def _sum_of_unit_vectors(component_indices: tuple[int, ...]) -> tuple[float, ...
 def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
     """The capacities that the records of an aircraft need."""
     axis_of_term = [moment_axis_of_term(term) for term in aircraft.moments]
-    parity_directions = list(parity_directions_of(aircraft, aircraft.forces_separate_surfaces))
+    parity_directions = list(iterate_parity_directions(aircraft, aircraft.forces_separate_surfaces))
     max_rate_regressors = N_INPUT_READINGS + max(
         axis_of_term.count(PITCH), axis_of_term.count(ROLL) + axis_of_term.count(YAW)
     )
     max_force_regressors = (
-        max(len(force_terms(aircraft, force_index)) for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT))
+        max(
+            len(terms_of_one_force(aircraft, force_index))
+            for force_index in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
+        )
         + forces.MAX_FORCE_REGRESSORS
         - MAX_TERMS_OF_ONE
     )
@@ -934,16 +955,16 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
         aircraft.dominant_axis[aircraft.surfaces.index(surface_name)]
         for surface_name in aircraft.class_of_losses
     ]
-    max_losses_per_rate_block = max(
+    max_loss_surfaces_per_rate_block = max(
         axis_of_loss.count(PITCH), axis_of_loss.count(ROLL) + axis_of_loss.count(YAW)
     )
     max_tested_losses_per_view = max(
-        len(parity_direction.surfaces_tested_for_loss) for parity_direction in parity_directions
+        len(parity_direction.loss_tested_surface_indices) for parity_direction in parity_directions
     )
     model_error_map = aircraft.file.model_error_map
     n_boxes = len(model_error_map.boxes) if model_error_map else 0
     return StatisticalRecordSize(
-        BlockCapacity(max_rate_regressors, 3 * max_losses_per_rate_block + 2),
+        BlockCapacity(max_rate_regressors, 3 * max_loss_surfaces_per_rate_block + 2),
         BlockCapacity(max_rate_regressors + max_force_regressors + 2, max_tested_losses_per_view + 1),
         len(parity_directions),
         n_boxes,
@@ -953,35 +974,35 @@ def required_record_size(aircraft: Aircraft) -> StatisticalRecordSize:
 def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose blocks and forces are already set up."""
     forces = statistical["forces"]
-    surfaces_distinguished_by_each_force = [
+    separable_surface_indices_by_force = [
         aircraft.separated_by_force(FORCE_COEFFICIENT_NAMES[force_index])
-        for force_index in (SIDE_COMPONENT, NORMAL_COMPONENT)
+        for force_index in (SIDE_INDEX_AMONG_FORCES, NORMAL_INDEX_AMONG_FORCES)
     ]
     subtracts_gust_estimate_from_rates = (
         forces["in_use"]
         and statistical["gust"]["output"]["accounts_for_gusts"]
-        and all(surfaces_distinguished_by_each_force)
+        and all(separable_surface_indices_by_force)
     )
-    parity_directions = list(parity_directions_of(aircraft, bool(forces["in_use"])))[
+    parity_directions = list(iterate_parity_directions(aircraft, bool(forces["in_use"])))[
         : len(statistical["views"])
     ]
     statistical["n_views"] = len(parity_directions)
     for view, (
         orthogonal_to_surface,
-        direction,
+        initial_direction,
         plane_axes,
-        surfaces_tested_for_loss,
+        loss_tested_surface_indices,
         uses_inertial_flow_angle,
         may_use_vane_gust_estimate,
     ) in zip(statistical["views"], parity_directions, strict=False):
         view["orthogonal_to_surface"], view["direction"], view["plane_axes"], block = (
             orthogonal_to_surface,
-            direction,
+            initial_direction,
             plane_axes,
             view["block"],
         )
         view["alarm_axis"] = (
-            direction.index(1.0)
+            initial_direction.index(1.0)
             if orthogonal_to_surface == AXIS_VIEW and not uses_inertial_flow_angle
             else plane_axes[0]
         )
@@ -990,9 +1011,11 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
         ]
         # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
         # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
-        law_reacts_to_gust = statistical["gust"]["output"]["accounts_for_gusts"] and direction[PITCH]
+        is_pitch_view_in_gusts = (
+            statistical["gust"]["output"]["accounts_for_gusts"] and initial_direction[PITCH]
+        )
         loss_surface_indices = (
-            [] if law_reacts_to_gust else surfaces_tested_for_loss[: len(block["hypothesis"]) - 1]
+            [] if is_pitch_view_in_gusts else loss_tested_surface_indices[: len(block["hypothesis"]) - 1]
         )
         hypothesis_kinds = [STEP_FAULT, *(LOSS for _ in loss_surface_indices)]
         n_regressors = int(rate_block["n_regressors"])
@@ -1010,7 +1033,7 @@ def configure_parity_views(statistical: np.void, aircraft: Aircraft) -> None:
             view["confirming_force_component"] = (
                 NORMAL_FORCE if plane_axes == PITCH_AND_NORMAL_FORCE else SIDE_FORCE
             )
-        if any(direction[SIDE_FORCE:]):
+        if any(initial_direction[SIDE_FORCE:]):
             force_record = forces["component"][plane_axes[1] - SIDE_FORCE]
             view["confirming_force_component"] = plane_axes[1]
             view["always_uses_regressors"], n_force_regressors = 1, int(force_record["n_regressors"])
@@ -1068,10 +1091,10 @@ def fill_view_signatures(view, forces, Gu):
         s = hypothesis.surface
         hypothesis.signature[0] = 1.0
         if hypothesis.kind != STEP_FAULT:
-            loss_signature = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
+            projected_surface_acceleration = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
             for force_index in range(2):
-                loss_signature += (
+                projected_surface_acceleration += (
                     m[SIDE_FORCE + force_index]
-                    * forces.component[force_index].scaled_force_of_surface_at_command[s]
+                    * forces.component[force_index].chord_scaled_force_of_surface_at_command[s]
                 )
-            hypothesis.signature[0] = loss_signature
+            hypothesis.signature[0] = projected_surface_acceleration

@@ -46,7 +46,11 @@ from beaver_ftc.diagnosis.bounds import (
     moment_term_tolerances,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES_RECORD, TrimState, configure_forces
+from beaver_ftc.diagnosis.detection.forces import (
+    MEASURED_FORCES_RECORD,
+    RatesReadingsDeflections,
+    configure_forces,
+)
 from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
@@ -67,7 +71,7 @@ from beaver_ftc.diagnosis.detection.parity import (
     StatisticalRecordSize,
     configure_parity_views,
     configure_tone_tests,
-    parity_directions_of,
+    iterate_parity_directions,
     parity_view_dtype,
 )
 from beaver_ftc.diagnosis.gusts import (
@@ -163,10 +167,12 @@ def n_tests_per_frame(aircraft: Aircraft, *parity_directions: ParityDirection) -
     ]
     n_tone_tests = 0
     for parity_direction in parity_directions:
-        if parity_direction.orthogonal_to_surface >= 0 and any(parity_direction.direction[SIDE_FORCE:]):
+        if parity_direction.orthogonal_to_surface >= 0 and any(
+            parity_direction.initial_direction[SIDE_FORCE:]
+        ):
             kind_of_each_alarm_hypothesis += [
                 STEP_FAULT,
-                *(LOSS for _ in parity_direction.surfaces_tested_for_loss),
+                *(LOSS for _ in parity_direction.loss_tested_surface_indices),
             ]
             n_tone_tests += N_TONE_FREQUENCIES
         elif (
@@ -203,7 +209,7 @@ def configure_statistical_detector(
     declared: Declared,
     design_model: np.void,
     mass_properties: MassProperties,
-    trim: TrimState,
+    trim: RatesReadingsDeflections,
     rate_hz: float,
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
@@ -227,7 +233,7 @@ def configure_statistical_detector(
     configure_gust_estimate(gust_estimate, declared, mass_properties)
     uses_parity_views = config.compares_across(n_instants_per_frame)
     n_tests = n_tests_per_frame(
-        aircraft, *(parity_directions_of(aircraft, uses_forces) if uses_parity_views else ())
+        aircraft, *(iterate_parity_directions(aircraft, uses_forces) if uses_parity_views else ())
     )
     test_config["alarm_level"] = derive_alarm_level(statistical_settings.false_alarms_per_h, rate_hz, n_tests)
     configure_gust_velocity_and_speed_error(
@@ -254,12 +260,12 @@ def configure_statistical_detector(
     _configure_regressor_tolerances(statistical, aircraft, term_tolerances)
     configure_reading_regressors(statistical, sensor_errors, fdi["bound"]["declared_errors"])
     if uses_parity_views:
-        false_alarm_probability_per_test = statistical_settings.false_alarms_per_h / (
+        false_alarm_probability_per_test_frame = statistical_settings.false_alarms_per_h / (
             3600.0 * rate_hz * n_tests
         )
         configure_tone_tests(
             statistical["tone_config"],
-            false_alarm_probability_per_test,
+            false_alarm_probability_per_test_frame,
             airspeed_mps,
             frame_uncertainty_change_over_bound * rate_hz,
             dt_s,
@@ -394,7 +400,7 @@ def _configure_drift_and_model_noise(
     uncertainty_frequency_rad_s: float,
     declared: Declared,
     design_model: np.void,
-    trim: TrimState,
+    trim: RatesReadingsDeflections,
     dt_s: float,
 ) -> None:
     """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
@@ -437,7 +443,7 @@ def derive_drift_intensity_over_squared_bound(
     value of sin(z) / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then
     takes up no more than the other half. eta_bar rad/s2; omega, noise rad/s; level in standard deviations.
     """
-    eta_bar = max(eta_bar, likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2)
+    eta_bar = max(eta_bar, likelihood.MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2)
     intensity_times_bandwidth_of_step_test = (
         8.0 * sqrt(2.0) * (eta_bar * uncertainty_frequency_rad_s / alarm_level) ** 2
     )  # of i w0
@@ -735,7 +741,7 @@ def filter_innovation_after_known_faults(blocks, gust_estimate, innovation_after
                 innovation_after_known_faults[axis]
                 - gust_estimate.output.mean_angular_acceleration_by_gust[axis]
             )
-        likelihood.whiten(
+        likelihood.advance_whitening_filter(
             block, block.filter_state_after_known_faults, block.frame_innovation, dt, block.frame_innovation
         )
 
@@ -1100,13 +1106,13 @@ def fill_uncertainty_bound_drift_and_noise(
                         block_index == likelihood.MEAN_REVERTING_LATERAL_BLOCK,
                     )
                     block.drift_intensity[i, j] = block.gust_drift_intensity_factor * gust_drift_intensity
-            uncertainty_bound_for_drift = max(
-                uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_RAD_S2
+            lower_limited_uncertainty_bound = max(
+                uncertainty_bound[axis], likelihood.MIN_UNCERTAINTY_BOUND_FOR_DRIFT_RAD_S2
             )
             uncertainty_drift_intensity = (
                 noise_model.drift_intensity_over_squared_bound
-                * uncertainty_bound_for_drift
-                * uncertainty_bound_for_drift
+                * lower_limited_uncertainty_bound
+                * lower_limited_uncertainty_bound
             )
             block.drift_intensity[i, i] += uncertainty_drift_intensity
             block.no_gust_filter.drift_intensity[i, i] = uncertainty_drift_intensity

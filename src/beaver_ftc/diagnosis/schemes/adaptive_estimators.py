@@ -76,14 +76,14 @@ def skip_accumulate_substep(fdi, prediction, measured):
 @kernel
 def start_detection_filters(fdi, x):
     """Begin the detection filters at the first measurement x (3,) rad/s."""
-    filters.start_fdae(fdi.fdae, fdi.bound.changing_gyro_error_bound, x)
-    filters.start_bank(fdi.bank, fdi.bound.changing_gyro_error_bound)
+    filters.start_fdae_rates_and_gyro_bounds(fdi.fdae, fdi.bound.changing_gyro_error_bound, x)
+    filters.start_bank_gyro_error_bounds(fdi.bank, fdi.bound.changing_gyro_error_bound)
 
 
 @kernel
 def update_detection_filters(fdi, prediction, measured):
     """Bring the detection filters from the frame before to this one: innovation, residuals and thresholds."""
-    filters.update_residuals_and_thresholds(
+    filters.update_innovation_residuals_and_thresholds(
         fdi.bank,
         fdi.bound,
         measured.x,
@@ -381,10 +381,10 @@ def update_statistical_tests(fdi, prediction, measured, k, t):
     statistical.update_blocks(
         test_config, uncertainty_bound, blocks, gust, innovation, dt, k, is_alarm_latched, may_loss_end
     )
-    parity.update_view_directions_and_signatures(
+    parity.prepare_views_for_frame(
         parity_views, forces_record, gust, fdi.bound, frame_means.previous_G, frame_means.Gu_with_previous_G
     )
-    parity.fill_view_innovations_and_noise(
+    parity.fill_view_innovations_noise_regressors(
         parity_views,
         test_config.uses_regressors,
         statistical_detector.noise,
@@ -468,7 +468,7 @@ def update_gusts_and_forces(gust, inertial_gust, forces_record, prediction, meas
             gust, measured.y, measured.attitude, prediction.frame_share_per_instant * dt, k
         )
     if (forces_record.in_use or gust.output.uses_accelerometers) and not measured.inertial:
-        forces.stop_using_forces(forces_record, gust, inertial_gust)
+        forces.stop_using_forces_and_accelerometers(forces_record, gust, inertial_gust)
     if forces_record.in_use or gust.output.uses_accelerometers:
         gusts.store_accelerometer_reading(gust, measured.force)
     if forces_record.in_use:
@@ -480,9 +480,7 @@ def update_forces_and_inertial_gust(gust, inertial_gust, forces_record, predicti
     """Update the innovations of the forces, and the gust estimate from accelerometers without vanes."""
     forces.update_all_force_innovations(forces_record, gust, measured, prediction.u, dt)
     if inertial_gust.output.accounts_for_gusts:
-        forces.fill_y_with_flow_angles_from_forces(
-            forces_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y
-        )
+        forces.fill_y_without_vanes(forces_record, inertial_gust.memory.air_rotation_in_body_axes, measured.y)
         gusts.store_accelerometer_reading(inertial_gust, measured.force)
         gusts.set_gust_rotation_intensity(inertial_gust, measured.altitude)
         gusts.update_gust_estimate(inertial_gust, forces_record.y_without_vanes, measured.attitude, dt, k)

@@ -653,11 +653,11 @@ def max_correlation_by_uncertainty(
 
     transient_response_sum_bound_0, _1: the two entries of the block's `transient_response_sum_bound`.
     """
-    bound_by_final_drop_of_weight = transient_response_sum_bound_0 * abs(
+    bound_from_final_drop_of_weight = transient_response_sum_bound_0 * abs(
         onset_tests.correlation_weight[0, k]
     ) + transient_response_sum_bound_1 * abs(onset_tests.correlation_weight[1, k])
     return onset_tests.max_correlation_by_constant_uncertainty[k] + min(
-        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_by_final_drop_of_weight,
+        onset_tests.max_correlation_by_varying_uncertainty[k] + bound_from_final_drop_of_weight,
         onset_tests.max_correlation_by_rate_limited_uncertainty[k],
     )
 
@@ -682,21 +682,21 @@ def max_log_likelihood_ratio(is_loss_or_its_end, evidence, information):
 
 @kernel
 def evidence_over_effective_std(
-    alarm_level, noise_share_of_alarm_level, evidence, max_evidence_by_uncertainty, information
+    alarm_level, noise_share_of_alarm_level, evidence, max_evidence_from_uncertainty, information
 ):
     """Evidence over its standard deviation sqrt(D), or over what uncertainty and noise together allow.
 
-    max_evidence_by_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
+    max_evidence_from_uncertainty: the share of the evidence that a bounded uncertainty explains; alarm_level:
     of the alarm; noise_share_of_alarm_level: share of the level that is reserved for noise in addition. The
     result is compared with the level.
     """
     evidence_std = sqrt(information)
     return evidence / (
         evidence_std
-        if max_evidence_by_uncertainty <= 0.0
+        if max_evidence_from_uncertainty <= 0.0
         else max(
             evidence_std,
-            max_evidence_by_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
+            max_evidence_from_uncertainty / alarm_level + noise_share_of_alarm_level * evidence_std,
         )
     )
 
@@ -720,27 +720,27 @@ def evaluate_onset_tests(
     uncertainty_weight_in_llr_bounds = 0.0 if llr_bounds_ignore_uncertainty else 1.0
     for k in range(n_tests):
         N, D = onset_tests.correlation[k], onset_tests.information[k]
-        evidence_by_errors_and_air = onset_tests.max_correlation_by_coefficient_errors[k] + max(
+        evidence_from_errors_and_air = onset_tests.max_correlation_by_coefficient_errors[k] + max(
             supporting_correlation_sign[k] * onset_tests.correlation_by_calm_air[k], 0.0
         )
-        evidence_by_errors_and_air += max(
+        evidence_from_errors_and_air += max(
             supporting_correlation_sign[k] * onset_tests.correlation_by_coarse_gust[k], 0.0
         )
         is_loss_or_its_end, has_information = supporting_correlation_sign[k] != 0.0, D > 0.0
         evidence = supporting_correlation_sign[k] * N if is_loss_or_its_end else abs(N)
-        max_evidence_by_uncertainty = max_correlation_by_uncertainty(
+        max_evidence_from_uncertainty = max_correlation_by_uncertainty(
             onset_tests, k, transient_response_sum_bound_0, transient_response_sum_bound_1
         )
-        evidence_error_bound = evidence_by_errors_and_air + (
-            max_evidence_by_uncertainty
+        evidence_error_bound = evidence_from_errors_and_air + (
+            max_evidence_from_uncertainty
             if non_loss_llr_bounds_include_uncertainty and not is_loss_or_its_end
-            else uncertainty_weight_in_llr_bounds * max_evidence_by_uncertainty
+            else uncertainty_weight_in_llr_bounds * max_evidence_from_uncertainty
         )
         score_in_standard_deviations = evidence_over_effective_std(
             alarm_level,
             noise_share_of_alarm_level,
-            evidence - evidence_by_errors_and_air,
-            max_evidence_by_uncertainty,
+            evidence - evidence_from_errors_and_air,
+            max_evidence_from_uncertainty,
             D,
         )
         llr = max_log_likelihood_ratio(is_loss_or_its_end, evidence, D)

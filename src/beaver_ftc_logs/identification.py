@@ -140,13 +140,13 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
     for what the surface does [Ljung1999, section 13.4].
     """
-    most_rate_lags = max(fitting.RATE_LAG_COUNT_CANDIDATES)
+    max_n_rate_lags = max(fitting.RATE_LAG_COUNT_CANDIDATES)
     # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
-    n_rate_and_command_lags = most_rate_lags, most_rate_lags
+    whitening_lag_counts = max_n_rate_lags, max_n_rate_lags
     if not vehicle.moving_air:
         return list(flights)
     ma_coefficients_by_flight = [
-        _choose_noise_ma_coefficients(flight, vehicle, n_rate_and_command_lags) for flight in flights
+        _choose_noise_ma_coefficients(flight, vehicle, whitening_lag_counts) for flight in flights
     ]
     whitened_flights = [
         whiten_samples(flight, noise_ma_coefficients)
@@ -154,14 +154,14 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     ]
     for _ in range(_MAX_WHITENING_ROUNDS):
         regressors, rates, _ = fitting.stacked_regression_data(
-            fitting.flights_with_usable_rows(whitened_flights), vehicle, *n_rate_and_command_lags
+            fitting.flights_with_usable_rows(whitened_flights), vehicle, *whitening_lag_counts
         )
         pooled_regression_coefficients = np.linalg.lstsq(regressors, rates, rcond=None)[0]
         log_determinants_and_ma_coefficients = [
             _log_determinant_and_best_ma_coefficients(
                 fitting.flights_with_usable_rows([flight]),
                 vehicle,
-                n_rate_and_command_lags,
+                whitening_lag_counts,
                 np.asarray(pooled_regression_coefficients),
             )
             for flight in flights
@@ -188,7 +188,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
 
 def _choose_noise_ma_coefficients(
-    flight: Samples, vehicle: Vehicle, n_rate_and_command_lags: tuple[int, int]
+    flight: Samples, vehicle: Vehicle, whitening_lag_counts: tuple[int, int]
 ) -> tuple[float, ...]:
     """The colour of which a fit to one flight alone leaves least: the likeliest of an ARMAX model, by
     profile likelihood over the moving averages."""
@@ -197,7 +197,7 @@ def _choose_noise_ma_coefficients(
         regressors, rates, _ = fitting.stacked_regression_data(
             fitting.flights_with_usable_rows([whiten_samples(flight, noise_ma_coefficients)]),
             vehicle,
-            *n_rate_and_command_lags,
+            *whitening_lag_counts,
         )
         if len(rates) < 2:
             raise BadInput(
@@ -214,13 +214,13 @@ def _choose_noise_ma_coefficients(
 def _log_determinant_and_best_ma_coefficients(
     usable_flights: list[fitting.FlightWithUsableRows],
     vehicle: Vehicle,
-    n_rate_and_command_lags: tuple[int, int],
+    whitening_lag_counts: tuple[int, int],
     coefficients: Floats,
 ) -> tuple[float, tuple[float, ...]]:
     """The colour of a flight, and the log determinant of the residual that it leaves."""
     from scipy.signal import lfilter
 
-    regressors, rates, _ = fitting.stacked_regression_data(usable_flights, vehicle, *n_rate_and_command_lags)
+    regressors, rates, _ = fitting.stacked_regression_data(usable_flights, vehicle, *whitening_lag_counts)
     residual = rates - regressors @ coefficients
     log_determinant_by_ma = {
         ma_coefficients: np.linalg.slogdet(np.cov(lfilter([1.0], ma_coefficients, residual, axis=0).T))[1]
@@ -530,7 +530,7 @@ def identification_text(model: Model) -> str:
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_dynamic_pressure_sentences(model),
         *dict.fromkeys(
-            f"  noise of the colour {_ma_coefficients_text(noise_model)}: "
+            f"  noise of the colour {_noise_model_coefficients_text(noise_model)}: "
             f"{noise_model.covariance_inflation:.2g} times as wide, in squares, as gains of 10 s left out "
             "differ, and other laws may"
             for noise_model in model.noise_models
@@ -560,7 +560,7 @@ def identification_text(model: Model) -> str:
     return "\n".join(lines)
 
 
-def _ma_coefficients_text(noise_model: NoiseModel) -> str:
+def _noise_model_coefficients_text(noise_model: NoiseModel) -> str:
     return ", ".join(f"{coefficient:.3g}" for coefficient in noise_model.ma_coefficients)
 
 

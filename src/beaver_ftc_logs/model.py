@@ -348,14 +348,14 @@ class Model(Section):
             (("noise",), self.residual_covariance, (3, 3)),
         ]
         for i, noise_model in enumerate(self.noise_models):
-            noise_model_location = ("colours", i)
+            noise_model_key_path = ("colours", i)
             n_ar_rows = -(-len(noise_model.ar_coefficients) // 3) * 3
             arrays_and_expected_shapes += [
-                ((*noise_model_location, "noise"), noise_model.residual_covariance, (3, 3)),
-                ((*noise_model_location, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
+                ((*noise_model_key_path, "noise"), noise_model.residual_covariance, (3, 3)),
+                ((*noise_model_key_path, "before"), noise_model.ar_coefficients, (n_ar_rows, 3)),
             ]
             if noise_model.ma_coefficients[0] != 1.0:
-                yield (*noise_model_location, "average"), "does not begin with 1, allowed: 1, c1, ..."
+                yield (*noise_model_key_path, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (fitted_ranges := self.fitted_ranges) is not None:
             optional_arrays_and_shapes: list[tuple[str, object, tuple[int, ...]]] = [
                 ("commands", fitted_ranges.command_ranges, (len(fitted_ranges.command_ranges), 2)),
@@ -369,29 +369,29 @@ class Model(Section):
             arrays_and_expected_shapes += [
                 (("fitted", key), array, shape) for key, array, shape in optional_arrays_and_shapes if array
             ]
-        for location, array, shape in arrays_and_expected_shapes:
+        for key_path, array, shape in arrays_and_expected_shapes:
             if not _has_shape(array, shape):
                 shape_text = " x ".join(map(str, shape))
-                yield location, f"has another shape, allowed: {shape_text} numbers"
+                yield key_path, f"has another shape, allowed: {shape_text} numbers"
 
     def _covariance_and_standard_error_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        locations_and_covariances: list[tuple[Location, CoefficientMatrix]] = [
+        key_paths_and_covariances: list[tuple[Location, CoefficientMatrix]] = [
             (("noise",), self.residual_covariance)
         ]
-        locations_and_covariances += [
+        key_paths_and_covariances += [
             (("colours", i, "noise"), noise_model.residual_covariance)
             for i, noise_model in enumerate(self.noise_models)
         ]
-        for location, covariance_rows in locations_and_covariances:
+        for key_path, covariance_rows in key_paths_and_covariances:
             covariance = np.array(covariance_rows)
             if abs(covariance - covariance.T).max() > 1e-6 * abs(covariance).max():
-                yield location, "is not symmetric, allowed: a covariance"
+                yield key_path, "is not symmetric, allowed: a covariance"
                 continue
             min_eigenvalue, *_, max_eigenvalue = np.linalg.eigvalsh(covariance)
             if min_eigenvalue <= 0.0 or max_eigenvalue > _MAX_CONDITION_NUMBER * min_eigenvalue:
                 yield (
-                    location,
+                    key_path,
                     "is singular or nearly so, allowed: a covariance, conditioned to "
                     f"{_MAX_CONDITION_NUMBER:g}",
                 )

@@ -197,8 +197,8 @@ def _is_excluded(one: Candidate, diagnosis: DiagnosisReadout) -> bool:
     """Whether a candidate is excluded."""
     estimators, layout = diagnosis.estimators, diagnosis.layout
     if not diagnosis.diagnoses_all_types:
-        return estimators[layout.loss_estimator[one.surface]].is_excluded
-    surface = estimators[layout.position_estimator[one.surface]].is_excluded
+        return estimators[layout.loss_estimator_index_by_surface[one.surface]].is_excluded
+    surface = estimators[layout.position_estimator_index_by_surface[one.surface]].is_excluded
     return surface or bool(diagnosis.surface_fault_types[one.surface].is_type_excluded[one.kind])
 
 
@@ -272,10 +272,10 @@ def _left(tape: Tape) -> Iterator[tuple[int, int]]:
     estimators, layout = diagnosis.estimators, diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.diagnoses_all_types:
-            e = layout.loss_estimator[s]
+            e = layout.loss_estimator_index_by_surface[s]
             if e >= 0 and not estimators[e].is_excluded:
                 yield s, LOSS
-        elif not estimators[layout.position_estimator[s]].is_excluded:
+        elif not estimators[layout.position_estimator_index_by_surface[s]].is_excluded:
             yield from ((s, kind) for kind in RELATIONS if not surface.is_type_excluded[kind])
 
 
@@ -285,7 +285,7 @@ def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
     if not diagnosis.diagnoses_all_types:
         return []
     for s, surface in enumerate(diagnosis.surface_fault_types):
-        if not diagnosis.estimators[diagnosis.layout.position_estimator[s]].is_excluded:
+        if not diagnosis.estimators[diagnosis.layout.position_estimator_index_by_surface[s]].is_excluded:
             kinds = np.flatnonzero(~surface.is_type_excluded)
             found += [f"{names[s]} {NAMES[k]}" for k in kinds if k not in RELATIONS]
     return sorted(set(found))

@@ -64,23 +64,23 @@ def test_the_diagnosis_is_read_as_the_log_has_it(flown):
     for s, name in enumerate(aircraft.surfaces):
         stops, actuator = aircraft.travel[name], diagnosis.surface_fault_types[s].actuator
         assert (actuator.travel_low_rad, actuator.travel_high_rad) == (stops.min_rad, stops.max_rad)
-        assert names[diagnosis.layout.position_estimator[s]] == f"{name}_position"
-        assert names[diagnosis.layout.loss_estimator[s]] == name
-        assert diagnosis.layout.dominant_axis[s] == aircraft.dominant_axis[s]
+        assert names[diagnosis.layout.position_estimator_index_by_surface[s]] == f"{name}_position"
+        assert names[diagnosis.layout.loss_estimator_index_by_surface[s]] == name
+        assert diagnosis.layout.dominant_axis_by_surface[s] == aircraft.dominant_axis[s]
 
 
 def test_the_statistical_detector_and_the_sensor_monitor_are_read_as_the_log_has_them(flown):
     _, _, now, row, _ = flown
     diagnosis, monitor = now.diagnosis, now.diagnosis.sensor_monitor
     shares = [
-        one.score / diagnosis.statistical_alarm_level
+        one.score_in_std / diagnosis.statistical_alarm_level
         for block in diagnosis.statistical_blocks
         for one in block.hypotheses
     ]
     logged = [value for name, value in row.items() if name.endswith("_likelihood_share")]
     assert max(shares) == pytest.approx(max(logged), rel=1e-12)
     for block in diagnosis.statistical_blocks:
-        assert block.onset_tests.score.shape[0] == len(block.hypotheses)
+        assert block.hypothesis_tests_by_onset.score.shape[0] == len(block.hypotheses)
         assert len(block.axis_indices) in (1, 2)
     assert monitor.enabled
     assert (monitor.worst_residual_bound_ratio, monitor.worst_test_index) == (

@@ -29,13 +29,13 @@ class IsolationEstimator(NamedTuple):
     parity_direction: np.ndarray
 
 
-class SurfaceLayout(NamedTuple):
+class LayoutOfAllSurfaces(NamedTuple):
     """Layout of the surfaces: the axis that each turns most, and the number of the estimator of its loss and
     of its position, -1 where there is none."""
 
-    dominant_axis: tuple[int, ...]
-    loss_estimator: tuple[int, ...]
-    position_estimator: tuple[int, ...]
+    dominant_axis_by_surface: tuple[int, ...]
+    loss_estimator_index_by_surface: tuple[int, ...]
+    position_estimator_index_by_surface: tuple[int, ...]
 
 
 class FaultTypesConfig(NamedTuple):
@@ -117,41 +117,42 @@ class MappedModelError(NamedTuple):
 class StatisticalHypothesis(NamedTuple):
     """A fault that the statistical test compares with health.
 
-    kind: of `likelihood`; surface, axis: which. may_raise_alarm: whether its score counts for the alarm.
-    score: largest normalised evidence over all onsets, standard deviations, like the alarm level.
+    hypothesis_kind: of `likelihood`; surface, axis: which. may_raise_alarm: whether its score counts for
+    the alarm. score_in_std: largest normalised evidence over all onsets, standard deviations, like the
+    alarm level.
     """
 
-    kind: int
+    hypothesis_kind: int
     surface: int
     axis: int
     may_raise_alarm: bool
-    score: float
+    score_in_std: float
 
 
-class OnsetTests(NamedTuple):
+class HypothesisTestsByOnset(NamedTuple):
     """By hypothesis and onset (hypotheses, N_ONSET_SLOTS): score, direction of the loss that is tested (0:
     either), and the part of the correlation that calm air and that gusts seen by the vanes explain."""
 
     score: np.ndarray
     supporting_correlation_sign: np.ndarray
-    correlation_by_calm_air: np.ndarray
-    correlation_by_coarse_gust: np.ndarray
+    calm_air_part_of_correlation: np.ndarray
+    coarse_gust_part_of_correlation: np.ndarray
 
 
 class StatisticalBlock(NamedTuple):
     """One Kalman filter of the statistical detector and the hypotheses on its axes.
 
     axis_indices: of its states. drift_correlation_length_m: of the drift, m; 0 for none.
-    gust_drift_intensity_factor: on the variance of a gust seen roughly. regressor_tolerance (regressors,):
-    of the constants that are not known, 0 for one not used.
+    factor_on_gust_drift_intensity: on the variance of a gust seen roughly. regressor_coefficient_tolerance
+    (regressors,): of the constants that are not known, 0 for one not used.
     """
 
     axis_indices: tuple[int, ...]
     drift_correlation_length_m: float
-    gust_drift_intensity_factor: float
-    regressor_tolerance: np.ndarray
+    factor_on_gust_drift_intensity: float
+    regressor_coefficient_tolerance: np.ndarray
     hypotheses: tuple[StatisticalHypothesis, ...]
-    onset_tests: OnsetTests
+    hypothesis_tests_by_onset: HypothesisTestsByOnset
 
 
 class SensorTest(NamedTuple):
@@ -159,37 +160,37 @@ class SensorTest(NamedTuple):
 
     residual: of the last sample. bound_per_s, bound_per_sample: parts of the bound on it, the first for each
     second of the sample. residual_per_gust_speed_change: effect on it of 1 m/s that a gust changes by.
-    filtered_residual, filtered_bound (poles,): through the filters.
+    filtered_residual_by_pole, filtered_bound_by_pole (poles,): through the filters.
     """
 
     residual: float
     bound_per_s: float
     bound_per_sample: float
     residual_per_gust_speed_change: float
-    filtered_residual: np.ndarray
-    filtered_bound: np.ndarray
+    filtered_residual_by_pole: np.ndarray
+    filtered_bound_by_pole: np.ndarray
 
 
 class SensorMonitor(NamedTuple):
-    """The sensor monitor. enabled; alarmed: an alarm of its own stands.
+    """The sensor monitor. enabled; has_raised_alarm: an alarm of its own stands.
 
     worst_test_index: of the test with the largest ratio of residual to bound; worst_residual_bound_ratio:
-    that ratio; worst_test: the numbers of that test. isolated_sensor: index, -1 for none;
+    that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
     is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
-    gust_change_bound_mps (poles,): bound on the changes of a gust through the filters. predicted_reading,
-    reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm, manifold pressure
-    inHg, which the engine's sensors should read.
+    filtered_gust_change_bound_by_pole_mps (poles,): bound on the changes of a gust through the filters.
+    predicted_reading, reading_error_bound (sensors,): SI. commanded_engine_readings (2,): engine speed rpm,
+    manifold pressure inHg, which the engine's sensors should read.
     """
 
     enabled: bool
-    alarmed: bool
+    has_raised_alarm: bool
     worst_test_index: int
     worst_residual_bound_ratio: float
     worst_test: SensorTest
-    isolated_sensor: int
+    isolated_sensor_index: int
     is_reading_unused: np.ndarray
     sample_time_s: float
-    gust_change_bound_mps: np.ndarray
+    filtered_gust_change_bound_by_pole_mps: np.ndarray
     predicted_reading: np.ndarray
     reading_error_bound: np.ndarray
     commanded_engine_readings: np.ndarray
@@ -232,9 +233,10 @@ class DiagnosisReadout:
         return int(self._fdi["verdict"]["isolated_estimator"])
 
     @cached_property
-    def layout(self) -> SurfaceLayout:
+    def layout(self) -> LayoutOfAllSurfaces:
         """Axes and estimators of the surfaces."""
-        return SurfaceLayout(*(tuple(self._fdi["layout"][name].tolist()) for name in SurfaceLayout._fields))
+        field_names = ("dominant_axis", "loss_estimator", "position_estimator")
+        return LayoutOfAllSurfaces(*(tuple(self._fdi["layout"][name].tolist()) for name in field_names))
 
     @cached_property
     def is_estimator_excluded(self) -> np.ndarray:
@@ -451,15 +453,20 @@ def _read_surface(surface_record: np.void) -> SurfaceFaultTypes:
 def _read_block(block_record: np.void) -> StatisticalBlock:
     hypotheses = tuple(map(_read_hypothesis, block_record["hypothesis"][: block_record["n_hypotheses"]]))
     n_hypotheses = len(hypotheses)
-    onset_tests = (
+    hypothesis_tests_by_onset = (
         block_record["onset_tests"][name].reshape(-1, N_ONSET_SLOTS)[:n_hypotheses].copy()
-        for name in OnsetTests._fields
+        for name in (
+            "score",
+            "supporting_correlation_sign",
+            "correlation_by_calm_air",
+            "correlation_by_coarse_gust",
+        )
     )
     return StatisticalBlock(
         tuple(block_record["axes"][: block_record["n_axes"]].tolist()),
         float(block_record["drift_correlation_length_m"]), float(block_record["gust_drift_intensity_factor"]),
         block_record["regressor_tolerance"][: block_record["n_regressors"]].copy(),
-        hypotheses, OnsetTests(*onset_tests),
+        hypotheses, HypothesisTestsByOnset(*hypothesis_tests_by_onset),
     )  # fmt: skip
 
 

@@ -298,7 +298,7 @@ def statements(
     alarm, diagnosis = events["detected"], tape.alarm.diagnosis
     about: Document = {"what": None, "column": "detected", "frame": alarm}
     monitor, ours = diagnosis.sensor_monitor, scheme_number("adaptive-estimators")
-    watch = instruments_say.instrument_alarm_statement(monitor) if monitor.alarmed else None
+    watch = instruments_say.instrument_alarm_statement(monitor) if monitor.has_raised_alarm else None
     if not diagnosis.estimators or not diagnosis.enabled or diagnosis.scheme_number != ours:
         yield about | (watch or {"because": "another scheme was in charge"})
         return

@@ -53,7 +53,7 @@ def alarm_statement(tape: Tape, history: History, surfaces: Sequence[str], k: in
     if first is None or k - first > MAX_WRITTEN_FRAMES:
         return None
     hypothesis = diagnosis.statistical_blocks[b].hypotheses[h]
-    score = hypothesis.score / diagnosis.statistical_alarm_level
+    score = hypothesis.score_in_std / diagnosis.statistical_alarm_level
     said = _likelihood_fields(tape, history, (b, h, slot), range(first, k + 1))
     if score > 1.0 + LOGGED_SCORE_TOLERANCE:
         _remove_negligible(said, history)
@@ -85,13 +85,13 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
         each for block in diagnosis.statistical_blocks for each in block.hypotheses if each.may_raise_alarm
     ):
         column = _share_column(hypothesis, surfaces)
-        share = hypothesis.score / diagnosis.statistical_alarm_level
+        share = hypothesis.score_in_std / diagnosis.statistical_alarm_level
         found[column] = max(found.get(column, 0.0), share)
     return found
 
 
 def _share_column(of: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
-    name = f"{AXES[of.axis]}_step" if of.kind == STEP else f"{surfaces[of.surface]}_loss"
+    name = f"{AXES[of.axis]}_step" if of.hypothesis_kind == STEP else f"{surfaces[of.surface]}_loss"
     return f"{name}_likelihood_share"
 
 
@@ -165,8 +165,11 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int, int]:
     best, found = -1.0, (0, 0, 0)
     for b, block in enumerate(blocks):
         for h, hypothesis in enumerate(block.hypotheses):
-            if hypothesis.may_raise_alarm and hypothesis.score > best:
-                best, found = hypothesis.score, (b, h, int(np.argmax(block.onset_tests.score[h])))
+            if hypothesis.may_raise_alarm and hypothesis.score_in_std > best:
+                best, found = (
+                    hypothesis.score_in_std,
+                    (b, h, int(np.argmax(block.hypothesis_tests_by_onset.score[h]))),
+                )
     return found
 
 
@@ -179,7 +182,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     felt = _affected_axes(of, now["signature"][:, h], len(block.axis_indices))
     n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axis_indices[i] for i in felt]
     square = np.ix_(range(len(rows)), felt, felt)
-    known = [j for j in np.flatnonzero(block.regressor_tolerance > 0.0).tolist()
+    known = [j for j in np.flatnonzero(block.regressor_coefficient_tolerance > 0.0).tolist()
              if now["regressor_response"][:, j][:, felt].any()]  # fmt: skip
     drift = dt * then["drift_intensity"][square]  # which is felt a frame later
     drift[1:], drift[0] = drift[:-1].copy(), 0.0
@@ -198,13 +201,13 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     if diagnosis.gust.accounts_for_gusts:
         its["air"] = tape.filters["air"][here][1:][:, axes]
         drift += (
-            block.gust_drift_intensity_factor
+            block.factor_on_gust_drift_intensity
             * tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
         )
-    onset_tests = block.onset_tests
-    sense, explained = onset_tests.supporting_correlation_sign[h, slot], {
-        "predictable_innovation_in_calm_air": onset_tests.correlation_by_calm_air,
-        "coarse_gust_response": onset_tests.correlation_by_coarse_gust,
+    tests_by_onset = block.hypothesis_tests_by_onset
+    sense, explained = tests_by_onset.supporting_correlation_sign[h, slot], {
+        "predictable_innovation_in_calm_air": tests_by_onset.calm_air_part_of_correlation,
+        "coarse_gust_response": tests_by_onset.coarse_gust_part_of_correlation,
     }  # fmt: skip
     taken = [name for name, values in explained.items() if sense * values[h, slot] > 0.0]
     if taken:  # each of them where it speaks for the loss
@@ -217,7 +220,7 @@ def _likelihood_fields(tape: Tape, history: History, test: tuple[int, int, int],
     frames = [dict(zip(its, row, strict=True)) for row in lists]
     return {
         "level": diagnosis.statistical_alarm_level, "axes": axes, "sense": "less" if sense else "either",
-        "tolerance": [float(block.regressor_tolerance[j]) for j in known],
+        "tolerance": [float(block.regressor_coefficient_tolerance[j]) for j in known],
         "R": of["gyro_noise_variance"][0, felt].tolist(), "Y": Y.tolist(),
         "P": (0.5 * (P + P.T)).tolist(),  # else rounding sets both sides apart
         "first": rows[0], "frames": frames,

@@ -37,7 +37,7 @@ def instrument_alarm_statement(monitor: SensorMonitor) -> Document:
             looks, value = [[predicted, reading, bound] for reading, predicted, bound in looks], -value
         if value > limit:
             return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
-    sensor = monitor.isolated_sensor
+    sensor = monitor.isolated_sensor_index
     if sensor >= 0 and monitor.is_reading_unused[sensor] and not failed:
         because = f"there was no reading of {sensor_words(SENSORS[sensor])}, and no column that says so"
         return {"missing": [sensor], "because": because}
@@ -63,14 +63,14 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
         return
     reading = TESTS[number]
     predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
-    pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
+    pole = int(np.argmax(np.abs(test.filtered_residual_by_pole) / test.filtered_bound_by_pole))
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s
         + test.bound_per_sample
-        + test.residual_per_gust_speed_change * monitor.gust_change_bound_mps[pole]
+        + test.residual_per_gust_speed_change * monitor.filtered_gust_change_bound_by_pole_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
-    filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]
+    filtered, bound = test.filtered_residual_by_pole[pole], test.filtered_bound_by_pole[pole]
     earlier = np.array([filtered - test.residual, bound - sample_bound])
     earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(filtered), bound])] = 0.0
     yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

@@ -36,7 +36,7 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
     """(surface, type, frame) of each type excluded on a surface that can be at fault."""
     layout = tape.alarm.diagnosis.layout
     for s, kinds in enumerate(tape.types[-1]):
-        if tape.excluded[-1][layout.position_estimator[s]]:
+        if tape.excluded[-1][layout.position_estimator_index_by_surface[s]]:
             continue
         for kind in np.flatnonzero(kinds):
             yield s, int(kind), tape.first + int(np.argmax(tape.types[:, s, kind] > 0))
@@ -108,11 +108,11 @@ def _effect_of_relation(
 ) -> Hypothesis:
     """G (p - u) of a relation; p: position of the surface, u: command in effect, rad."""
     diagnosis = tape.alarm.diagnosis
-    e = diagnosis.layout.position_estimator[surface]
+    e = diagnosis.layout.position_estimator_index_by_surface[surface]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
-        axes = (diagnosis.layout.dominant_axis[surface],)
+        axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     actuator = diagnosis.surface_fault_types[surface].actuator
     low, high = relation.theta_range_for_travel(actuator.travel_low_rad, actuator.travel_high_rad)
     offset, slope = (relation.gain - 1.0) * Gu, Gu if relation.theta_is_share else G

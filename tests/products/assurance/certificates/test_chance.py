@@ -15,7 +15,7 @@ SURFACES, LOSS = ("left", "right", "flap"), STEP_HYPOTHESIS + 1
 
 def hypothesis(score, kind=LOSS, surface=0, axis=0, may_raise_alarm=True):
     return SimpleNamespace(
-        score=score, kind=kind, surface=surface, axis=axis, may_raise_alarm=may_raise_alarm
+        score_in_std=score, hypothesis_kind=kind, surface=surface, axis=axis, may_raise_alarm=may_raise_alarm
     )
 
 
@@ -23,7 +23,7 @@ def block(*hypotheses, slots=()):
     onsets = np.zeros((len(hypotheses), 4))
     for h, slot in enumerate(slots):
         onsets[h, slot] = 1.0
-    return SimpleNamespace(hypotheses=hypotheses, onset_tests=SimpleNamespace(score=onsets))
+    return SimpleNamespace(hypotheses=hypotheses, hypothesis_tests_by_onset=SimpleNamespace(score=onsets))
 
 
 BLOCKS = (

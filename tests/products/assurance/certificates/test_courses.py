@@ -276,7 +276,9 @@ def tape(travel=(-0.2, 0.7), blocks=1):
     offset, slope, spread = numbers(3, 5, 4, 3)
     actuator = Actuator(*travel, 0.1, 0.2, 0.3)
     diagnosis = SimpleNamespace(
-        layout=SimpleNamespace(position_estimator=(0, 2, 3), dominant_axis=(0, 1, 2)),
+        layout=SimpleNamespace(
+            position_estimator_index_by_surface=(0, 2, 3), dominant_axis_by_surface=(0, 1, 2)
+        ),
         estimators=[SimpleNamespace(active_axes=(e,)) for e in "abcd"],
         surface_fault_types=[None, SimpleNamespace(actuator=actuator), None],
         types_config=CONFIG._replace(frames_per_block=blocks),

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.design.context import Context, Declared
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.rivals.kalman import GustStates
+from beaver_ftc.diagnosis.rivals.kalman import AirRotationModel
 from beaver_ftc.diagnosis.rivals.observer import SurfaceFit, healthy_residual_std
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
@@ -202,8 +202,8 @@ def test_the_observers_threshold_is_the_deviation_of_its_residual(pole_per_s):
 
 
 def test_air_that_is_not_declared_has_no_states():
-    assert GustStates(context()).n_states == 0
-    assert GustStates(context(GUSTY)).n_states == 3
+    assert AirRotationModel(context()).n_states == 0
+    assert AirRotationModel(context(GUSTY)).n_states == 3
 
 
 def test_on_a_linear_plant_the_unscented_filter_is_the_extended_one():
@@ -218,10 +218,10 @@ def test_cusum_waits_inversely_to_the_excess():
     """A steady excess e over the allowance crosses h after h / e samples [Page1954]."""
     detector = plugin_class(DETECTORS, "augmented-ukf")()
     detector.reset(context(alarm=50.0, allowance=1.0))
-    values = [detector.statistic(5.0) for _ in range(26)]
+    values = [detector.update_statistic(5.0) for _ in range(26)]
     assert values[24] == pytest.approx(1.0)
     assert values[25] > 1.0
-    assert detector.statistic(0.0) == pytest.approx((52.0 - 3.0) / 50.0)
+    assert detector.update_statistic(0.0) == pytest.approx((52.0 - 3.0) / 50.0)
 
 
 def test_the_observers_residual_has_its_closed_form():
@@ -305,10 +305,10 @@ def test_the_multiple_models_alarm_by_the_odds_of_any_fault():
     for odds, statistic in ((1.0, 0.0), (np.exp(1.0), 0.5), (np.exp(-2.0), -1.0)):
         models.mode_probabilities[:] = odds / (1.0 + odds) / (len(models.mode_probabilities) - 1)
         models.mode_probabilities[0] = 1.0 / (1.0 + odds)
-        assert models.verdict().statistic == pytest.approx(statistic)
-        assert not models.verdict().detected
+        assert models.latch_alarm_and_decide_verdict().statistic == pytest.approx(statistic)
+        assert not models.latch_alarm_and_decide_verdict().detected
     models.mode_probabilities[0] = 1.0 / (1.0 + np.exp(2.1))
-    assert models.verdict().detected
+    assert models.latch_alarm_and_decide_verdict().detected
 
 
 def test_the_observer_names_nothing_until_its_statistic_is_over_one():

@@ -184,7 +184,7 @@ def test_multiple_models_name_the_surface_that_their_probabilities_add_up_to(los
     imm.context = SimpleNamespace(leaders=("aileron", "elevator", "rudder"))
     healthy = 1.0 - np.sum(losses) - unknown
     imm.mode_probabilities = np.array([healthy, *np.ravel(losses), unknown])
-    found = imm.verdict()
+    found = imm.latch_alarm_and_decide_verdict()
     assert found.statistic == pytest.approx(np.log((1.0 - healthy) / healthy) / 2.0)
     assert found.detected is says.pop("detected", True)
     for name, value in says.items():

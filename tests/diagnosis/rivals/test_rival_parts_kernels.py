@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis.rivals.effectiveness import (
     AugmentedUkf,
     EffectivenessFilter,
 )
-from beaver_ftc.diagnosis.rivals.kalman import GustStates, unexplained_acceleration_size, update_state
+from beaver_ftc.diagnosis.rivals.kalman import AirRotationModel, unexplained_acceleration_size, update_state
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest, RecursiveLeastSquaresFit, RlsMonitor
 
 DT, BOUND = 0.02, np.array([0.02, 0.03, 0.05])
@@ -44,7 +44,7 @@ class Plain(EffectivenessFilter):
     def propagate(self, measured):
         pass
 
-    def statistic(self, square):
+    def update_statistic(self, square):
         return square / 10.0
 
 
@@ -55,7 +55,7 @@ def started(declared=None, **options):
 
 
 def test_the_air_is_a_first_order_process_of_each_axis():
-    air, none = GustStates(context(GUSTY)), GustStates(context())
+    air, none = AirRotationModel(context(GUSTY)), AirRotationModel(context())
     keep = np.exp(-DT / GUSTY.gust_time_s)
     assert (air.n_states, none.n_states, none.decay_factor.size, none.rate_effect.shape) == (3, 0, 0, (3, 0))
     assert air.decay_factor == pytest.approx(keep)
@@ -90,7 +90,11 @@ def test_a_filter_starts_healthy_with_theta_known_to_a_tenth():
 def test_its_noise_is_the_bounds_the_walks_and_the_airs():
     detector = started(GUSTY, noise=2.0, drift_per_s=0.3)
     size = unexplained_acceleration_size(detector.context, BOUND)
-    expected = [*(DT * 2.0 * size) ** 2, *[0.3**2 * DT] * 3, *detector.gust_states.process_noise_variance]
+    expected = [
+        *(DT * 2.0 * size) ** 2,
+        *[0.3**2 * DT] * 3,
+        *detector.air_rotation_model.process_noise_variance,
+    ]
     assert detector.process_noise_variances(seen()) == pytest.approx(expected)
 
 
@@ -121,7 +125,7 @@ def named(theta, variance=(0.01, 0.01, 0.01), square=3.0, statistic=2.0, **optio
     detector = started(**{"misfit": 3.0, **options})
     detector.z[3:6], detector.mean_normalised_innovation_square = theta, square
     detector.P[range(3, 6), range(3, 6)] = variance
-    return detector, detector.verdict(seen(), statistic)
+    return detector, detector.latch_alarm_and_decide_verdict(seen(), statistic)
 
 
 def test_the_surface_most_significantly_off_is_named():
@@ -133,7 +137,7 @@ def test_the_surface_most_significantly_off_is_named():
     assert verdict.statistic == 2.0
     quiet = named((-0.2, -0.5, -0.3), statistic=1.0)[1]
     assert (quiet.detected, quiet.isolated, quiet.statistic) == (False, None, 1.0)
-    again = detector.verdict(seen(), 0.5)
+    again = detector.latch_alarm_and_decide_verdict(seen(), 0.5)
     assert (again.detected, again.isolated) == (True, "rudder"), "an alarm is latched"
 
 
@@ -248,8 +252,8 @@ def test_each_sigma_point_moves_by_the_model_its_losses_and_its_air():
 def test_the_unscented_filters_statistic_sums_what_is_more_than_expected():
     detector = AugmentedUkf()
     detector.reset(context(allowance=2.0, alarm=4.0))
-    assert [detector.statistic(square) for square in (10.0, 7.0, 1.0, 9.0)] == [1.0, 1.25, 0.0, 0.75]
-    assert detector.statistic(9e9) == pytest.approx((3.0 + 1e6 - 6.0) / 4.0)
+    assert [detector.update_statistic(square) for square in (10.0, 7.0, 1.0, 9.0)] == [1.0, 1.25, 0.0, 0.75]
+    assert detector.update_statistic(9e9) == pytest.approx((3.0 + 1e6 - 6.0) / 4.0)
 
 
 def test_what_turbulence_turns_adds_by_squares():

@@ -25,8 +25,8 @@ from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS
 
 TUNED_FILE = Path(__file__).with_name("tuned.json")
-EXACT_GRADE, LAGGING_ACTUATORS_GRADE, DECLARED_ERRORS_GRADE = "exact", "actuators", "errors"
-FLIGHT_GRADES = (EXACT_GRADE, LAGGING_ACTUATORS_GRADE, DECLARED_ERRORS_GRADE)
+EXACT_GRADE, LAGGING_ACTUATORS_GRADE, SENSOR_OR_AIR_ERRORS_GRADE = "exact", "actuators", "errors"
+FLIGHT_GRADES = (EXACT_GRADE, LAGGING_ACTUATORS_GRADE, SENSOR_OR_AIR_ERRORS_GRADE)
 # key in TUNED_FILE of each group of plug-ins
 TUNED_FILE_KEY_BY_PLUGIN_GROUP = {DETECTORS: "detectors", LAWS: "laws"}
 
@@ -40,11 +40,11 @@ def load_tuned_values() -> TunedValuesByGrade:
     return tuned_values_by_grade
 
 
-def flight_grade(has_errors: bool, has_ideal_actuators: bool) -> str:
+def flight_grade(has_sensor_or_air_errors: bool, has_ideal_actuators: bool) -> str:
     """Return the grade of a flight: with declared errors of sensors or air, with actuators that lag, or with
     neither."""
-    if has_errors:
-        return DECLARED_ERRORS_GRADE
+    if has_sensor_or_air_errors:
+        return SENSOR_OR_AIR_ERRORS_GRADE
     return EXACT_GRADE if has_ideal_actuators else LAGGING_ACTUATORS_GRADE
 
 
@@ -76,8 +76,8 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
         not declared_uncertainty.bandwidth_rad_s.any() and not declared_uncertainty.rate_limit_rad_s.any(),
     )
     tuned_options = {
-        option_name: option_value
+        option_name: tuned_value
         for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
-        for option_name, option_value in tuned_values(load_tuned_values(), grade, plugin_group, name).items()
+        for option_name, tuned_value in tuned_values(load_tuned_values(), grade, plugin_group, name).items()
     }
     return {**defaults, **tuned_options, **context.options}

@@ -18,7 +18,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 from beaver_ftc.diagnosis.rivals.kalman import (
-    GustStates,
+    AirRotationModel,
     sigma_points,
     unexplained_acceleration_size,
     update_state,
@@ -38,7 +38,7 @@ DEFAULT_OPTIONS = {
 
 
 class EffectivenessFilter:
-    """Base of the augmented filters; they differ in `propagate` and in `statistic`."""
+    """Base of the augmented filters; they differ in `propagate` and in `update_statistic`."""
 
     name: ClassVar[str] = ""
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS
@@ -47,12 +47,12 @@ class EffectivenessFilter:
         """Start healthy, with theta known to a tenth."""
         self.context, self.options = context, rival_options(self.name, self.defaults, context)
         self.leading_surface_indices = list(context.leading)
-        self.gust_states = GustStates(context)
-        self.n_states = N_STATES_WITHOUT_GUSTS + self.gust_states.n_states
+        self.air_rotation_model = AirRotationModel(context)
+        self.n_states = N_STATES_WITHOUT_GUSTS + self.air_rotation_model.n_states
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.z = np.zeros(self.n_states)
         self.P = np.diag(
-            np.concatenate((measured_rate_variance, [0.01] * 3, self.gust_states.initial_variance))
+            np.concatenate((measured_rate_variance, [0.01] * 3, self.air_rotation_model.initial_variance))
         )
         self.R = np.diag(measured_rate_variance)
         self.theta_walk_variance = self.options["drift_per_s"] ** 2 * context.dt_s
@@ -64,7 +64,7 @@ class EffectivenessFilter:
         if self.is_first_frame:
             self.is_first_frame = False
             self.z[:3] = measured.x
-            return self.verdict(measured, 0.0)
+            return self.latch_alarm_and_decide_verdict(measured, 0.0)
         self.propagate(measured)
         nu = measured.x - self.z[:3]
         self.z, self.P, S = update_state(self.z, self.P, nu, self.R)
@@ -74,13 +74,15 @@ class EffectivenessFilter:
             self.averaging_decay * self.mean_normalised_innovation_square
             + (1.0 - self.averaging_decay) * min(normalised_innovation_square, 1e6)
         )
-        return self.verdict(measured, self.statistic(normalised_innovation_square))
+        return self.latch_alarm_and_decide_verdict(
+            measured, self.update_statistic(normalised_innovation_square)
+        )
 
     def propagate(self, measured: Measured) -> None:
         """Predict z and P over the elapsed frame."""
         raise NotImplementedError
 
-    def statistic(self, normalised_innovation_square: float) -> float:
+    def update_statistic(self, normalised_innovation_square: float) -> float:
         """The decision statistic, 1 at the alarm, by nu' S^-1 nu."""
         raise NotImplementedError
 
@@ -94,7 +96,7 @@ class EffectivenessFilter:
             (
                 rate_process_noise_variance,
                 np.full(3, self.theta_walk_variance),
-                self.gust_states.process_noise_variance,
+                self.air_rotation_model.process_noise_variance,
             )
         )
 
@@ -102,14 +104,16 @@ class EffectivenessFilter:
         """theta^2 / variance of each surface, chi-square with one degree of freedom when healthy, (3,)."""
         return self.z[3:N_STATES_WITHOUT_GUSTS] ** 2 / np.diagonal(self.P)[3:N_STATES_WITHOUT_GUSTS]
 
-    def verdict(self, measured: Measured, statistic: float) -> Verdict:
+    def latch_alarm_and_decide_verdict(self, measured: Measured, statistic: float) -> Verdict:
         """Name the surface whose theta is most significantly off, or none: innovations misfit, or a surface
         would have gained."""
         self.detected = self.detected or statistic > 1.0
         if not self.detected:
             return Verdict(statistic=statistic)
-        effectiveness = np.ones(len(self.context.surfaces))
-        effectiveness[self.leading_surface_indices] += np.clip(self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0)
+        effectiveness_by_surface = np.ones(len(self.context.surfaces))
+        effectiveness_by_surface[self.leading_surface_indices] += np.clip(
+            self.z[3:N_STATES_WITHOUT_GUSTS], -1.0, 0.0
+        )
         most_significant_axis = int(np.argmax(self.wald_statistics()))
         if (
             self.mean_normalised_innovation_square > 3.0 * self.options["misfit"]
@@ -117,14 +121,17 @@ class EffectivenessFilter:
         ):
             return Verdict(True, None, "unanticipated", "unanticipated", None, None, statistic)
         surface_index = self.leading_surface_indices[most_significant_axis]
-        theta, surface_name = float(effectiveness[surface_index] - 1.0), self.context.surfaces[surface_index]
+        effectiveness_change, surface_name = (
+            float(effectiveness_by_surface[surface_index] - 1.0),
+            self.context.surfaces[surface_index],
+        )
         return Verdict(
             True,
             "pqr"[most_significant_axis],
             surface_name,
             "loss_of_effectiveness",
-            theta,
-            effectiveness,
+            effectiveness_change,
+            effectiveness_by_surface,
             statistic,
         )
 
@@ -144,9 +151,9 @@ class AugmentedEkf(EffectivenessFilter):
             measured.acceleration
             + measured.contribution[:, self.leading_surface_indices] @ self.z[3:N_STATES_WITHOUT_GUSTS]
         )
-        if self.gust_states.n_states:
-            self.z[:3] += self.gust_states.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
-            self.z[N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
+        if self.air_rotation_model.n_states:
+            self.z[:3] += self.air_rotation_model.rate_effect @ self.z[N_STATES_WITHOUT_GUSTS:]
+            self.z[N_STATES_WITHOUT_GUSTS:] *= self.air_rotation_model.decay_factor
         self.P = F @ self.P @ F.T
         self.P[np.diag_indices(self.n_states)] += self.process_noise_variances(measured)
 
@@ -158,13 +165,13 @@ class AugmentedEkf(EffectivenessFilter):
         f_at_steps = f(np.concatenate((measured.x + rate_steps, measured.x - rate_steps)), y)
         F[:3, :3] += dt * (f_at_steps[:3] - f_at_steps[3:]).T / (2.0 * _DIFFERENCE_STEP_RAD_S)
         F[:3, 3:N_STATES_WITHOUT_GUSTS] = dt * measured.contribution[:, self.leading_surface_indices]
-        F[:3, N_STATES_WITHOUT_GUSTS:] = self.gust_states.rate_effect
+        F[:3, N_STATES_WITHOUT_GUSTS:] = self.air_rotation_model.rate_effect
         F[range(N_STATES_WITHOUT_GUSTS, self.n_states), range(N_STATES_WITHOUT_GUSTS, self.n_states)] = (
-            self.gust_states.decay_factor
+            self.air_rotation_model.decay_factor
         )
         return F
 
-    def statistic(self, normalised_innovation_square: float) -> float:
+    def update_statistic(self, normalised_innovation_square: float) -> float:
         """The largest theta^2 / variance over the alarm level."""
         return float(self.wald_statistics().max() / self.options["alarm"])
 
@@ -187,7 +194,7 @@ class AugmentedUkf(EffectivenessFilter):
     def propagate(self, measured: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-."""
         state_points, point_weights = sigma_points(
-            self.z, self.P, self.options["spread"] + self.gust_states.n_states
+            self.z, self.P, self.options["spread"] + self.air_rotation_model.n_states
         )
         state_points = self.propagate_points(state_points, measured)
         self.z = point_weights @ state_points
@@ -207,14 +214,14 @@ class AugmentedUkf(EffectivenessFilter):
             ]
         )
         propagated_points[:, :3] += dt * (measured.acceleration + f_change_from_measured + loss_accelerations)
-        if self.gust_states.n_states:
+        if self.air_rotation_model.n_states:
             propagated_points[:, :3] += (
-                state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.gust_states.rate_effect.T
+                state_points[:, N_STATES_WITHOUT_GUSTS:] @ self.air_rotation_model.rate_effect.T
             )
-            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.gust_states.decay_factor
+            propagated_points[:, N_STATES_WITHOUT_GUSTS:] *= self.air_rotation_model.decay_factor
         return propagated_points
 
-    def statistic(self, normalised_innovation_square: float) -> float:
+    def update_statistic(self, normalised_innovation_square: float) -> float:
         """g = max(0, g + (normalised_innovation_square - 3 allowance)) over the alarm level; 3 is what a
         healthy flight expects."""
         self.cusum = max(

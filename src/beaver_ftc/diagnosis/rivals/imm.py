@@ -14,7 +14,7 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals import rival_options
 from beaver_ftc.diagnosis.rivals.kalman import (
-    GustStates,
+    AirRotationModel,
     log_likelihood,
     unexplained_acceleration_size,
     update_state,
@@ -82,16 +82,19 @@ class InteractingMultipleModels:
         self.transition_probabilities = transition_matrix(self.options["stay"], N_MODES)
         self.mode_probabilities = np.full(N_MODES, _MIN_MODE_PROBABILITY)
         self.mode_probabilities[0] = 1.0 - (N_MODES - 1) * _MIN_MODE_PROBABILITY
-        self.gust_states = GustStates(context)
+        self.air_rotation_model = AirRotationModel(context)
         measured_rate_variance = context.declared.rate_variance(self.options["measurement_rad_s"])
         self.R = np.diag(measured_rate_variance)
-        self.x = np.zeros((N_MODES, 3 + self.gust_states.n_states))
+        self.x = np.zeros((N_MODES, 3 + self.air_rotation_model.n_states))
         self.P = np.tile(
-            np.diag(np.concatenate((measured_rate_variance, self.gust_states.initial_variance))),
+            np.diag(np.concatenate((measured_rate_variance, self.air_rotation_model.initial_variance))),
             (N_MODES, 1, 1),
         )
-        self.F = np.eye(3 + self.gust_states.n_states)
-        self.F[:3, 3:], self.F[3:, 3:] = self.gust_states.rate_effect, np.diag(self.gust_states.decay_factor)
+        self.F = np.eye(3 + self.air_rotation_model.n_states)
+        self.F[:3, 3:], self.F[3:, 3:] = (
+            self.air_rotation_model.rate_effect,
+            np.diag(self.air_rotation_model.decay_factor),
+        )
         self.acceleration_noise_scale = np.full(N_MODES, self.options["noise"])
         self.acceleration_noise_scale[-1] = self.options["unknown_noise"]
         self.detected = False
@@ -105,9 +108,9 @@ class InteractingMultipleModels:
         x, P, predicted_probabilities = mix_states(
             self.x, self.P, self.mode_probabilities, self.transition_probabilities
         )
-        if self.gust_states.n_states:
+        if self.air_rotation_model.n_states:
             x, P = x @ self.F.T, self.F @ P @ self.F.T
-            P[:, range(3, 6), range(3, 6)] += self.gust_states.process_noise_variance
+            P[:, range(3, 6), range(3, 6)] += self.air_rotation_model.process_noise_variance
         x[:, :3] += self.dt * self.accelerations(measured)
         unexplained_acceleration = unexplained_acceleration_size(self.context, measured.eta_bar)
         P[:, :3, :3] += np.einsum(
@@ -116,7 +119,7 @@ class InteractingMultipleModels:
         nu = measured.x - x[:, :3]
         self.x, self.P, S = update_state(x, P, nu, self.R)
         self.mode_probabilities = posterior_probabilities(predicted_probabilities, log_likelihood(nu, S))
-        return self.verdict()
+        return self.latch_alarm_and_decide_verdict()
 
     def accelerations(self, measured: Measured) -> np.ndarray:
         """Compute each hypothesis' acceleration in the elapsed frame, (M, 3) rad/s2."""
@@ -126,7 +129,7 @@ class InteractingMultipleModels:
                 mode_accelerations[m] += theta * measured.contribution[:, self.context.leading[leading_axis]]
         return mode_accelerations
 
-    def verdict(self) -> Verdict:
+    def latch_alarm_and_decide_verdict(self) -> Verdict:
         """The alarm by the odds of any fault; the surface by the sum of its hypotheses."""
         healthy_probability = self.mode_probabilities[0]
         statistic = float(np.log((1.0 - healthy_probability) / healthy_probability) / self.options["alarm"])
@@ -149,12 +152,18 @@ class InteractingMultipleModels:
                 if probability > min_candidate_probability
             )
             return Verdict(True, "pqr"[most_likely_axis], statistic=statistic, candidates=candidates)
-        theta = float(
+        effectiveness_change = float(
             loss_mode_probabilities[most_likely_axis]
             @ LOSS_THETA_LEVELS
             / loss_probability_by_main_surface[most_likely_axis]
         )
         surface_name = self.context.leaders[most_likely_axis]
         return Verdict(
-            True, "pqr"[most_likely_axis], surface_name, "loss_of_effectiveness", theta, None, statistic
+            True,
+            "pqr"[most_likely_axis],
+            surface_name,
+            "loss_of_effectiveness",
+            effectiveness_change,
+            None,
+            statistic,
         )

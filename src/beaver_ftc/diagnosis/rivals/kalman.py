@@ -16,7 +16,7 @@ import numpy as np
 from beaver_ftc.design.context import Context
 
 
-class GustStates:
+class AirRotationModel:
     """The model of turbulence: rotation of the air about n_states axes, 3, or 0 if no turbulence is declared.
 
     decay_factor (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
@@ -72,17 +72,17 @@ def log_likelihood(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
     )
 
 
-def sigma_points(state: np.ndarray, P: np.ndarray, point_spread: float) -> tuple[np.ndarray, np.ndarray]:
+def sigma_points(state: np.ndarray, P: np.ndarray, covariance_factor: float) -> tuple[np.ndarray, np.ndarray]:
     """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean `state` and the covariance P.
 
-    point_spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one
+    covariance_factor is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one
     dimension.
     """
     n_states = len(state)
-    point_offsets = _matrix_root(point_spread * P).T
+    point_offsets = _matrix_root(covariance_factor * P).T
     state_points = np.concatenate((state[None], state + point_offsets, state - point_offsets))
-    point_weights = np.full(2 * n_states + 1, 0.5 / point_spread)
-    point_weights[0] = 1.0 - n_states / point_spread
+    point_weights = np.full(2 * n_states + 1, 0.5 / covariance_factor)
+    point_weights[0] = 1.0 - n_states / covariance_factor
     return state_points, point_weights
 
 

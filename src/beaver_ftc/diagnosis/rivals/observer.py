@@ -35,12 +35,18 @@ class SurfaceFit:
         self.weight_sum, self.residual_square_sum = 0.0, 0.0
         self.cross_sums, self.regressor_square_sums = np.zeros(3), np.zeros(3)
 
-    def step(self, eps: np.ndarray, Omega: np.ndarray) -> None:
-        """Add one frame: eps (3,) and Omega (3, 3), a column a surface, both over the threshold."""
+    def step(self, residual_over_threshold: np.ndarray, effects_over_threshold: np.ndarray) -> None:
+        """Add one frame: eps (3,) and Omega (3, 3), a column a surface, each divided by the threshold."""
         self.weight_sum = self._fading_factor * self.weight_sum + 1.0
-        self.residual_square_sum = self._fading_factor * self.residual_square_sum + float(eps @ eps)
-        self.cross_sums = self._fading_factor * self.cross_sums + eps @ Omega
-        self.regressor_square_sums = self._fading_factor * self.regressor_square_sums + (Omega**2).sum(axis=0)
+        self.residual_square_sum = self._fading_factor * self.residual_square_sum + float(
+            residual_over_threshold @ residual_over_threshold
+        )
+        self.cross_sums = (
+            self._fading_factor * self.cross_sums + residual_over_threshold @ effects_over_threshold
+        )
+        self.regressor_square_sums = self._fading_factor * self.regressor_square_sums + (
+            effects_over_threshold**2
+        ).sum(axis=0)
 
     def fit_best_surface(self) -> tuple[int, float, float]:
         """(surface, theta, mean misfit square of an axis) of the surface that fits best."""
@@ -63,13 +69,13 @@ class SurfaceFit:
 def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
     """Standard deviation (3,) rad/s of the healthy residual behind the filter, by what is declared."""
     declared_uncertainty, dt = context.declared, context.dt_s
-    residual_std_by_model_error = (
+    residual_std_from_model_error = (
         np.hypot(np.maximum(context.constant_rad_s2, 1e-4), declared_uncertainty.model_rad_s2)
         * dt
         / (1.0 - decay_factor)
     )
     gust_correlation = np.exp(-dt / np.maximum(declared_uncertainty.turbulence_time_s, dt))
-    residual_std_by_gust = (
+    residual_std_from_gust = (
         dt
         * declared_uncertainty.turbulence_rad_s2
         * np.sqrt(
@@ -77,8 +83,8 @@ def healthy_residual_std(context: Context, decay_factor: float) -> np.ndarray:
             / ((1.0 - decay_factor * decay_factor) * (1.0 - decay_factor * gust_correlation))
         )
     )
-    residual_std_by_gyro = declared_uncertainty.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
-    return np.sqrt(residual_std_by_model_error**2 + residual_std_by_gust**2 + residual_std_by_gyro**2)
+    residual_std_from_gyro = declared_uncertainty.gyro_rad_s * sqrt(2.0 / (1.0 + decay_factor))
+    return np.sqrt(residual_std_from_model_error**2 + residual_std_from_gust**2 + residual_std_from_gyro**2)
 
 
 class ConstantThresholdObserver:
@@ -118,18 +124,21 @@ class ConstantThresholdObserver:
                 + self.dt_s * measured.contribution[:, self.leading_surface_indices]
             )
         self.previous_rates = measured.x
-        residual_threshold_ratio = np.abs(self.eps) / self.threshold
-        statistic = float(residual_threshold_ratio.max())
+        residual_threshold_ratio_by_axis = np.abs(self.eps) / self.threshold
+        statistic = float(residual_threshold_ratio_by_axis.max())
         if statistic > 1.0 and self.alarm_at_s is None:
-            self.alarm_at_s, self.alarm_axis = measured.t_s, "pqr"[int(np.argmax(residual_threshold_ratio))]
+            self.alarm_at_s, self.alarm_axis = (
+                measured.t_s,
+                "pqr"[int(np.argmax(residual_threshold_ratio_by_axis))],
+            )
             self.residual_since_alarm, self.filtered_effects = np.zeros(3), np.zeros((3, 3))
         if self.alarm_at_s is None:
             return Verdict(statistic=statistic)
         if measured.t_s <= self.alarm_at_s + self.options["window_s"]:
-            self.isolation_verdict = self.verdict()
+            self.isolation_verdict = self.update_fit_and_decide_verdict()
         return self.isolation_verdict._replace(statistic=statistic)
 
-    def verdict(self) -> Verdict:
+    def update_fit_and_decide_verdict(self) -> Verdict:
         """The surface that fits; none fits if what it leaves is still over the threshold in the mean."""
         self.surface_fit.step(
             self.residual_since_alarm / self.threshold, self.filtered_effects / self.threshold[:, None]

@@ -15,7 +15,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
-from beaver_ftc_logs.readers import check_exists, detect_reader, read_parts
+from beaver_ftc_logs.readers import check_exists, read_parts, reader_name_for_path
 from beaver_ftc_logs.readers.table import TIME_COLUMN, column_names, first_numbers_of_column
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
 from beaver_ftc_logs.samples import Samples, read_parts_for_vehicle, resample
@@ -189,7 +189,7 @@ def _column_in_si(columns: Any, quantity_column: Any) -> Column:
 def _guess_vehicle(path: Path, reader_name: str | None, remarks: list[str]) -> Document | None:
     """The keys of a vehicle file for a log, by its first part; None where rates or commands are not found."""
     check_exists(path)
-    reader_name = reader_name or detect_reader(path)
+    reader_name = reader_name or reader_name_for_path(path)
     time_column_and_unit = _find_time_column_and_unit(path, remarks) if reader_name == "table" else None
     recognized_columns = _recognized_columns(column_names(path)) if reader_name == "table" else None
     recording = next(read_parts(path, reader_name, time_column_and_unit, recognized_columns))

@@ -54,10 +54,10 @@ def _read_messages(path: Path, wanted_columns: Collection[str] | None) -> dict[s
             }
             if message.get_type() not in _IGNORED_MESSAGES and _TIME_FIELD in numeric_fields:
                 message_name = _message_name(message.get_type(), fields)
-                for field, values in values_by_message_and_field.setdefault(
+                for field, field_values in values_by_message_and_field.setdefault(
                     message_name, _empty_arrays_of_wanted_fields(message_name, numeric_fields, wanted_columns)
                 ).items():
-                    values.append(numeric_fields.get(field, nan))
+                    field_values.append(numeric_fields.get(field, nan))
     return values_by_message_and_field
 
 

@@ -14,7 +14,7 @@ from beaver_ftc_logs.readers.text import (
     TableLayout,
     check_broken_lines,
     find_layout,
-    join_blocks,
+    join_and_consume_blocks,
     read_cells,
     text_cell_and_layout_remarks,
 )
@@ -83,11 +83,11 @@ def read_parts(
             for column_name, values in table.items()
         }
         is_whole_table = part_number == 1 and not has_more
-        all_notes = (*filter(None, note_of_column.get("", "").split("\n")), *left_out_row_notes)
+        table_notes = (*filter(None, note_of_column.get("", "").split("\n")), *left_out_row_notes)
         yield RecordedFlight(
             path.stem if is_whole_table else f"{path.stem}-part-{part_number}",
             flight_columns,
-            notes=all_notes,
+            notes=table_notes,
         )
 
 
@@ -139,7 +139,7 @@ def _text_table_layout(path: Path) -> TableLayout:
 
 
 @contextmanager
-def _refuse_unreadable(path: Path) -> Iterator[None]:
+def _convert_read_errors_to_bad_input(path: Path) -> Iterator[None]:
     """Within this a table is read. Raises BadInput where it is none."""
     import pyarrow as pa
 
@@ -167,7 +167,7 @@ def _column_names_and_parts(
 ) -> tuple[list[str], Iterator[TablePart]]:
     """The names of a table's columns, and its parts of so many rows; the whole where None."""
     layout = None if path.suffix.lower() == ".parquet" else _text_table_layout(path)
-    with _refuse_unreadable(path):
+    with _convert_read_errors_to_bad_input(path):
         names, readable_columns = (
             _all_and_number_columns_of_parquet(path, columns)
             if layout is None
@@ -187,14 +187,14 @@ def _join_blocks_into_parts(
     path: Path, layout: TableLayout | None, blocks: Iterator[TableCells], rows_per_part: int | None
 ) -> Iterator[TablePart]:
     held_blocks: list[TableCells] = []
-    with _refuse_unreadable(path):
+    with _convert_read_errors_to_bad_input(path):
         for block in blocks:
             held_blocks.append(block)
             n_held_rows = sum(held_block.n_rows for held_block in held_blocks)
             if rows_per_part is None and n_held_rows > _MAX_ROWS:
                 raise BadInput(f"{path}: has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}")
             while rows_per_part is not None and n_held_rows > _MAX_LAST_PART_FACTOR * rows_per_part:
-                joined_cells = join_blocks(held_blocks)
+                joined_cells = join_and_consume_blocks(held_blocks)
                 part_cells = joined_cells.select_rows(0, rows_per_part)
                 remaining_cells = joined_cells.select_rows(
                     rows_per_part - round(_PART_OVERLAP_SHARE * rows_per_part)
@@ -209,7 +209,7 @@ def _join_blocks_into_parts(
                     list(text_cell_and_layout_remarks(layout, part_cells)) if layout else [],
                     True,
                 )
-        joined_cells = join_blocks(held_blocks)
+        joined_cells = join_and_consume_blocks(held_blocks)
         if layout:
             check_broken_lines(path, layout, joined_cells)
         yield joined_cells, list(text_cell_and_layout_remarks(layout, joined_cells)) if layout else [], False
@@ -256,10 +256,12 @@ def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None
     if metadata.num_rows > _MAX_ROWS:
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
     row_groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    column_chunks = [row_group.column(i) for row_group in row_groups for i in range(row_group.num_columns)]
+    all_column_chunks = [
+        row_group.column(i) for row_group in row_groups for i in range(row_group.num_columns)
+    ]
     uncompressed_bytes = sum(
         column_chunk.total_uncompressed_size
-        for column_chunk in column_chunks
+        for column_chunk in all_column_chunks
         if column_chunk.path_in_schema in set(names)
     )
     n_bytes = max(uncompressed_bytes, _BYTES_PER_NUMBER * metadata.num_rows * len(names))

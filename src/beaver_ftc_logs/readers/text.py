@@ -52,7 +52,7 @@ class TableCells:
         return TableCells(numbers, len(range(self.n_rows)[first_row:end_row]), self.n_rows_before + first_row)
 
 
-def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
+def join_and_consume_blocks(blocks: Sequence[TableCells]) -> TableCells:
     """Blocks that follow one another as one; they are used up."""
     first_block = blocks[0]
     column_names = list(first_block.numbers)
@@ -87,7 +87,7 @@ def _unreadable_error(path: Path, reason: str) -> BadInput:
 
 def _layout_with_delimiter(lines: Sequence[str], delimiter: str) -> TableLayout | None:
     """The table that lines hold if this is what is between cells; None if they hold none."""
-    lines_of_cells = [_split_cells(line, delimiter) for line in lines]
+    lines_of_cells = [_split_cells(line_text, delimiter) for line_text in lines]
     for line_index, header_cells in enumerate(lines_of_cells):
         rows_below = [row for row in lines_of_cells[line_index + 1 :] if row][:4]
         if not rows_below and line_index == 0 and len(header_cells) > 1:

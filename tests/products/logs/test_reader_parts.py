@@ -232,7 +232,7 @@ def test_a_cell_of_text_is_counted_in_its_row_of_the_whole_table(tmp_path, monke
     assert {name: found for one in reversed(blocks) for name, found in one.text_cell_summaries.items()} == {
         "b": (1, 123, "odd"), "c": (1, 399, "last"),
     }  # fmt: skip
-    whole = text.join_blocks(blocks)
+    whole = text.join_and_consume_blocks(blocks)
     assert whole.text_cell_summaries == {"b": (2, 123, "odd"), "c": (1, 399, "last")}
     assert (whole.n_rows, np.isnan(whole.numbers["b"]).sum(), np.isnan(whole.numbers["a"]).sum()) == (
         400,
